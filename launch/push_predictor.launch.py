@@ -38,6 +38,7 @@ from push_predictor.nodes.launch_checks import (
     start_or_refuse,
 )
 
+FRAMES = ("wrench_frame", "world_frame")
 TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
 SWITCHES = ("use_sim_time", "autostart", "rviz")
 RELIABILITIES = ("", "reliable", "best_effort")
@@ -49,7 +50,7 @@ ARGUMENTS = (
     ("log_level", "info", "debug, info, warn, error or fatal."),
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
-    ("recording", "", "Recording to replay: rosbag2 folder or .mcap file. Empty: none, the sensors are live."),
+    ("recording", "", "Recording to replay: a folder, .mcap, .db3 or .bag file. Empty: none, the sensors are live."),
     ("bag", "", "Another name of the argument recording."),
     ("model", "", "Model file to load and to validate."),
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
@@ -113,11 +114,15 @@ def _server(given: dict[str, str]) -> dict[str, Any]:
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
-    texts = (*TOPICS, "wrench_frame", "world_frame")
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
     scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
-    found: dict[str, Any] = {**paths, **{name: given[name] for name in texts if given[name]}, **_qos(given)}
+    found: dict[str, Any] = {**paths, **_streams(given), **_qos(given)}
     return {**found, "scalar_topics": scalars} if scalars else found
+
+
+def _streams(given: dict[str, str]) -> dict[str, str]:
+    """Where the streams of pushes are, as far as it was given."""
+    return {name: given[name] for name in (*TOPICS, *FRAMES) if given[name]}
 
 
 def _qos(given: dict[str, str]) -> dict[str, str]:
@@ -137,7 +142,7 @@ def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
     # Without this wait the validator would miss the first pushes.
-    return {**rig, **rate, "recording": _path(recording), "wait_for_subscribers": 30.0}
+    return {**rig, **rate, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
 
 
 def _node(

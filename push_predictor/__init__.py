@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from push_predictor.api import Validation, choose_push, find_windows, trace, train, validate
     from push_predictor.design.batch import suggest_pushes
     from push_predictor.design.limits import Limits
+    from push_predictor.errors import DataWarning
     from push_predictor.models.push_model import PushModel
     from push_predictor.models.pushes import Pushes
     from push_predictor.models.store.model_file import load_model
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from push_predictor.recordings.topics import Topics
 
 _PLACES = {
+    "DataWarning": "errors",
     "Goal": "planning.goal",
     "Limits": "design.limits",
     "PushModel": "models.push_model",
@@ -60,6 +62,7 @@ _PLACES = {
 }
 
 __all__ = [
+    "DataWarning",
     "Goal",
     "Limits",
     "PushModel",

@@ -19,8 +19,10 @@ Paths are str or Path. `from push_predictor import ...` gives these functions; `
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -30,17 +32,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
-from push_predictor.errors import RequestError
+from push_predictor.errors import DataWarning, RequestError
 from push_predictor.evaluation.metrics_text import metrics_lines
-from push_predictor.evaluation.offline import validate_recording, window_options
+from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.predictor_record import LEARNT
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.planning import choose
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
 from push_predictor.planning.repertoire import Repertoire
+from push_predictor.recordings.checks.data_checks import DataChecks
 from push_predictor.recordings.load import different_supports, load_data, load_rig_for
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig
@@ -48,13 +52,14 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import empty_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows import finder
-from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 from push_predictor.watch import Watch
 
 if TYPE_CHECKING:
     from push_predictor.residuals.outcome import Trace
 
 AnyPath = str | os.PathLike[str]
+_OWN_FILES = (f"{Path(__file__).parent}{os.sep}", contextlib.__file__)  # contextlib: of the decorators below
 
 
 def train(
@@ -69,6 +74,7 @@ def train(
     mean: MeanChoice = "auto",
     topics: Topics = Topics(),
     watch: Watch | None = None,
+    strict: bool = False,
 ) -> PushModel:
     """Train a model on recordings or push tables; a prior model needs none, but then a rig.
 
@@ -78,6 +84,9 @@ def train(
     an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
     auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
     and the share of the work done; by default stages are printed to stderr. topics: of the recordings.
+
+    The data are checked as by `push_predictor check`. A DataWarning names a probable mistake, or too few pushes for a
+    learnt model; strict: raise RecordingError instead.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
     watch = watch or _print_stage
@@ -85,7 +94,12 @@ def train(
     watch("read the data", 0.0)
     known = _rig(rig) or load_rig_for(paths)
     supports = different_supports(paths) if (fit or kind == "prior") and rig is None else {}
-    table = load_data(paths, known, numbered=bool(supports), topics=topics) if paths else empty_table()
+    checks = DataChecks(strict, _warn)
+    table = empty_table()
+    if paths:
+        table = load_data(paths, known, numbered=bool(supports), topics=topics, inspect=checks)
+        if kind in LEARNT:
+            checks.learnt_from(paths, table, known)
     return train_model(
         table,
         known,
@@ -130,13 +144,25 @@ class Validation:
 
 @one_blas_thread()
 def validate(
-    model: PushModel, recording: AnyPath, *, rig: Rig | AnyPath | None = None, topics: Topics = Topics()
+    model: PushModel,
+    recording: AnyPath,
+    *,
+    rig: Rig | AnyPath | None = None,
+    topics: Topics = Topics(),
+    strict: bool = False,
 ) -> Validation:
     """Predict every window of a recording that the model was not trained on, and score the predictions.
 
+    The recording is checked as by `push_predictor check`. A DataWarning names a probable mistake, faults of the
+    streams, another slider than the model's, training pushes, or a domain of which little was pushed. strict: raise
+    RecordingError for a mistake, and where little was pushed.
     Raises RecordingError or RigError that names the file.
     """
-    return Validation(*validate_recording(model, Path(recording), _rig(rig), None, topics))
+    path, given = Path(recording), _rig(rig)
+    windows, comparison = validate_recording(model, path, given, _warn, topics, DataChecks(strict, _warn))
+    for text in remarks(model, given or recording_rig(path), windows_to_table(windows)):
+        _warn(text)
+    return Validation(windows, comparison)
 
 
 @one_blas_thread()
@@ -151,20 +177,32 @@ def trace(
     watch: Watch | None = None,
     experiment: AnyPath | Sequence[AnyPath] = (),
     topics: Topics = Topics(),
+    strict: bool = False,
 ) -> Trace:
     """Find out why a model no longer fits new recordings: the effect it lacks, its size, and the extended model.
 
     alpha: probability of reporting any effect where there is none. covariates: those to try; all unless given.
     experiment: recordings of the pushes that an earlier trace proposed; they are analysed and never held out.
-    topics: of the recordings. Raises RequestError, RecordingError, TableError or RigError.
-    """
-    from push_predictor.residuals.evidence.loading import load_evidence
-    from push_predictor.residuals.trace import trace as trace_loaded
+    topics: of the recordings.
 
-    designed = _paths(experiment) if experiment else []
-    loaded = load_evidence(_paths(data), _rig(rig), window_options(model), experiment=designed, topics=topics)
-    watch = watch or _print_stage
-    return trace_loaded(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
+    The data are checked as by `push_predictor check`. A DataWarning names a probable mistake, or a domain of which
+    little was pushed; strict: raise RecordingError instead.
+    Raises RequestError, RecordingError, TableError or RigError.
+    """
+    from push_predictor.residuals.trace import trace_data
+
+    return trace_data(
+        _paths(data),
+        model,
+        alpha=alpha,
+        covariates=covariates,
+        rig=_rig(rig),
+        seed=seed,
+        watch=watch or _print_stage,
+        experiment=_paths(experiment) if experiment else [],
+        topics=topics,
+        checks=DataChecks(strict, _warn),
+    )
 
 
 @one_blas_thread()
@@ -199,3 +237,11 @@ def _rig(rig: Rig | AnyPath | None) -> Rig | None:
 
 def _print_stage(stage: str, done: float) -> None:
     print(f"{100 * done:3.0f} %  {stage}", file=sys.stderr, flush=True)
+
+
+def _warn(text: str) -> None:
+    """Issue a DataWarning at the line that called this package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_OWN_FILES):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, DataWarning, stacklevel=level)

@@ -24,6 +24,10 @@ class PushPredictorError(Exception):
     """Any failure that this package foresees."""
 
 
+class DataWarning(UserWarning):
+    """Data contain a probable mistake, cover little of the domain, or do not fit the model."""
+
+
 class RigError(PushPredictorError):
     """The push_rig record is missing or invalid."""
 

@@ -23,6 +23,7 @@ from push_predictor.commands.common.options import (
     add_command,
     add_model,
     add_rig,
+    add_strict,
     add_topics,
     save_topics_of,
     topics_of,
@@ -41,6 +42,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     add_model(parser)
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    add_strict(parser)
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
@@ -54,17 +56,21 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.models.request import check_table
     from push_predictor.models.store.model_file import load_model
     from push_predictor.models.supports import on_supports
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, known_rig, load_data
     from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
     given = load_rig(options.rig) if options.rig else None
+    checks = DataChecks(options.strict, warn)
     check_data(options.data)
     with progress("evaluate"):
         supports = {} if given else different_supports(options.data)
-        table = load_data(options.data, given, numbered=bool(supports), topics=topics_of(options))
+        table = load_data(options.data, given, numbered=bool(supports), topics=topics_of(options), inspect=checks)
         save_topics_of(options, options.data)
-        model = on_supports(model, given or known_rig(options.data[0]), supports)
+        known = given or known_rig(options.data[0])
+        checks.judged_by(options.data, table, known)
+        model = on_supports(model, known, supports)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
     for path in options.data:

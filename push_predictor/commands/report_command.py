@@ -28,11 +28,12 @@ from push_predictor.commands.common.options import (
     add_out,
     add_recording,
     add_rig,
+    add_strict,
     add_topics,
     save_topics_of,
     topics_of,
 )
-from push_predictor.commands.common.output import check_folder, write_json, write_text
+from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
 from push_predictor.commands.common.progress import JobProgress, progress
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.watch import Watch, part_of, watched
@@ -77,6 +78,7 @@ def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "*", note="; the report compares the others with the first")
     add_recording(parser, "give one that was not used for training")
     _add_common(parser)
+    add_strict(parser)
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=_validation)
@@ -159,6 +161,7 @@ def _validation(options: argparse.Namespace) -> None:
 
     from push_predictor.evaluation.offline import report_recording
     from push_predictor.models.store.model_file import load_model
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.rig import load_rig
 
     if bool(options.model) != (options.recording is not None):
@@ -173,7 +176,10 @@ def _validation(options: argparse.Namespace) -> None:
             watch = part_of(watch, 0.5, 1.0)
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
-        page, metrics = report_recording(models, recording, options.out, rig, topics_of(options), watch)
+        checks = DataChecks(options.strict, warn)
+        page, metrics = report_recording(
+            models, recording, options.out, rig, topics_of(options), watch=watch, report=warn, checks=checks
+        )
         save_topics_of(options, [recording])
     write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):

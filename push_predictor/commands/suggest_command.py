@@ -33,7 +33,7 @@ from push_predictor.commands.common.options import (
     save_topics_of,
     topics_of,
 )
-from push_predictor.commands.common.output import check_data, check_output, check_seed, write_json, write_text
+from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 
@@ -148,11 +148,12 @@ def _model(options: argparse.Namespace) -> PushModel:
 
 def _matter(options: argparse.Namespace, model: PushModel) -> Pushes:
     from push_predictor.models.pushes import Pushes
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import load_data
 
     path = options.matter
     check_data([path])
-    table = load_data([path], model.rig, topics=topics_of(options))
+    table = load_data([path], model.rig, topics=topics_of(options), inspect=DataChecks(False, warn))
     save_topics_of(options, [path])
     if not len(table):
         raise RequestError("--matter", str(path), "a recording or table with at least one window")

@@ -21,7 +21,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.data_checks import DataChecks
 from push_predictor.commands.common.options import (
     add_command,
     add_model,
@@ -83,6 +82,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Trace, write JSON and model, print the verdict, then draw the report: what can fail late comes last."""
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.rig import load_rig
     from push_predictor.residuals.trace import trace_data
 
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
             experiment=options.experiment,
             topics=topics_of(options),
             watch=watch,
-            inspect=DataChecks(options.strict),
+            checks=DataChecks(options.strict, warn),
         )
     save_topics_of(options, [*options.data, *options.experiment])
     saved = False

@@ -23,7 +23,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.data_checks import DataChecks
 from push_predictor.commands.common.options import (
     add_command,
     add_out,
@@ -111,6 +110,7 @@ def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
     from push_predictor.models.store.table_cache import keep_table
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, load_data, load_rig_for
     from push_predictor.recordings.table import empty_table
     from push_predictor.recordings.windows.push_window import WindowOptions
@@ -124,21 +124,21 @@ def run(options: argparse.Namespace) -> None:
     windows = WindowOptions(stride=options.stride)
     with progress("read"):
         numbered, topics = bool(supports), topics_of(options)
-        checks = DataChecks(options.strict)
+        checks = DataChecks(options.strict, warn)
         table = (
             load_data(options.data, rig, windows, numbered=numbered, topics=topics, inspect=checks)
             if options.data
             else empty_table()
         )
         if kind in LEARNT and options.strict:  # an error comes before the work, a warning with its result
-            checks.coverage(options.data, table, rig)
+            checks.learnt_from(options.data, table, rig)
         save_topics_of(options, options.data)
     model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     with progress("table for predict_server"):
         keep_table(model, options.out)
     if kind in LEARNT:
-        checks.coverage(options.data, table, rig)
+        checks.learnt_from(options.data, table, rig)
     lines = _saved_ladder(model, ladder, options.out)
     result = {
         "model": str(options.out),

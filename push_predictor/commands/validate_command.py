@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.data_checks import DataChecks
 from push_predictor.commands.common.options import (
     add_command,
     add_model,
@@ -47,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
     )
     add_model(parser)
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a rosbag2 folder or an .mcap file")
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a folder, .mcap, .db3 or .bag file")
     parser.add_argument(
         "--false-alarm-rate",
         type=float,
@@ -70,11 +69,12 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.alarm.scores import recording_alarm
     from push_predictor.evaluation.judgement import judgement
     from push_predictor.evaluation.metrics_text import metrics_lines
-    from push_predictor.evaluation.offline import recording_rig, rig_difference, training_overlap, validate_recording
+    from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
     from push_predictor.evaluation.report.summary import opening_sentences
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
     from push_predictor.online.files.window_log import write_window_log
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 
@@ -84,17 +84,15 @@ def run(options: argparse.Namespace) -> None:
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate") as watch:
         watch("windows and predictions", 0.0)
-        checks = DataChecks(options.strict)
+        checks = DataChecks(options.strict, warn)
         windows, comparison = validate_recording(model, options.recording, rig, warn, topics_of(options), checks)
         save_topics_of(options, [options.recording])
         table = windows_to_table(windows)
         alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, 1.0))
         metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}
         metrics["judgement"] = judgement(metrics)
-    if difference := rig_difference(model, rig):
-        warn(difference)
-    if overlap := training_overlap(model, table):
-        warn(overlap)
+    for text in remarks(model, rig, table):
+        warn(text)
     if options.windows:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +30,6 @@ from push_predictor.models.request import check_table
 from push_predictor.models.supports import on_supports
 from push_predictor.models.tabulated.tabulated_model import as_served
 from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.recordings.load import Inspect, no_inspection
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.table import PushTable
@@ -39,6 +39,9 @@ from push_predictor.recordings.windows.push_window import PushWindow, WindowOpti
 from push_predictor.recordings.windows.stream_faults import describe_recording_faults
 from push_predictor.watch import Watch, no_watch, part_of, watched
 
+if TYPE_CHECKING:
+    from push_predictor.recordings.checks.data_checks import DataChecks
+
 
 def recorded_windows(
     model: PushModel,
@@ -46,14 +49,15 @@ def recorded_windows(
     rig: Rig | None = None,
     report: Callable[[str], None] | None = None,
     topics: Topics = Topics(),
-    inspect: Inspect = no_inspection,
+    checks: DataChecks | None = None,
 ) -> tuple[list[PushWindow], PushTable]:
     """Find the windows of a recording, with the model's duration. Raises RecordingError if there is none.
 
-    report receives a sentence for each fault of the streams. inspect: called with path, recording and rig.
+    report receives a sentence for each fault of the streams. checks: of the recording and of what its windows cover.
     """
     recording = read_recording(path, rig=rig, topics=topics)
-    inspect(path, recording, require_rig(recording))
+    if checks is not None:
+        checks(path, recording, require_rig(recording))
     finder = WindowFinder(require_rig(recording), window_options(model))
     windows = finder.find(recording)
     if report is not None:
@@ -61,7 +65,10 @@ def recorded_windows(
             report(fault)
     if not windows:
         raise RecordingError(f"{path}: no push was found in {len(recording.slider)} slider poses")
-    return windows, windows_to_table(windows)
+    table = windows_to_table(windows)
+    if checks is not None:
+        checks.judged_by([path], table, require_rig(recording))
+    return windows, table
 
 
 def window_options(model: PushModel) -> WindowOptions:
@@ -91,6 +98,11 @@ def rig_difference(model: PushModel, rig: Rig) -> str:
     return ""
 
 
+def remarks(model: PushModel, rig: Rig, table: PushTable) -> list[str]:
+    """Why the scores of a model on the windows of a rig may mislead: another slider, or training pushes."""
+    return [text for text in (rig_difference(model, rig), training_overlap(model, table)) if text]
+
+
 def training_overlap(model: PushModel, table: PushTable) -> str:
     """A warning that names how many pushes of a table were used for training, empty if none."""
     used, pushes = len(trained_on(model, table)), len(table.pushes)
@@ -103,10 +115,10 @@ def validate_recording(
     rig: Rig | None = None,
     report: Callable[[str], None] | None = None,
     topics: Topics = Topics(),
-    inspect: Inspect = no_inspection,
+    checks: DataChecks | None = None,
 ) -> tuple[list[PushWindow], Comparison]:
-    """Predict every window of a recording, as predict_server does; report and inspect as for `recorded_windows`."""
-    windows, table = recorded_windows(model, path, rig, report, topics, inspect)
+    """Predict every window of a recording, as predict_server does; report and checks as for `recorded_windows`."""
+    windows, table = recorded_windows(model, path, rig, report, topics, checks)
     model = on_supports(model, rig or recording_rig(path), {})
     check_table(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
@@ -120,13 +132,15 @@ def report_recording(
     rig: Rig | None = None,
     topics: Topics = Topics(),
     watch: Watch = no_watch,
+    report: Callable[[str], None] | None = None,
+    checks: DataChecks | None = None,
 ) -> tuple[Path, list[dict[str, object]]]:
     """Write the HTML report of models on a recording, the main model first; return page and metrics.
 
-    watch: called with the share of the work done.
+    watch: called with the share of the work done. report and checks as for `recorded_windows`.
     """
     watch("windows", 0.0)
-    windows, table = recorded_windows(models[0], path, rig, topics=topics)
+    windows, table = recorded_windows(models[0], path, rig, report, topics, checks)
     models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
     for model in models:
         check_table(model, table)

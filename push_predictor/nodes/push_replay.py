@@ -35,7 +35,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.errors import RequestError, RigError
+from push_predictor.errors import RecordingError, RequestError, RigError
 from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
@@ -44,18 +44,19 @@ from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
+from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.replay.capacity import measure_capacity
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
 from push_predictor.replay.flow_control import FlowControl
 from push_predictor.replay.options import ReplayOptions
 from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.push_topics import missing_poses, push_topics
 from push_predictor.replay.report import ReplayReport
 from push_predictor.replay.restamper import Restamper
 from push_predictor.replay.source import BagSource
 from push_predictor.resources import share_path
 
 LARGEST_CHECKED = 300_000_000  # bytes: a check reads the whole recording into memory
-_PUSH_TOPICS = ("slider/pose", "pusher/pose", "pusher/wrench")
 
 
 class PushReplay(Node):
@@ -77,6 +78,7 @@ class PushReplay(Node):
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
         self._checks = CheckProcess(options.strict)
+        self._streams = self._stream_topics()
         self._player = self._make_player(options)
         self._check(bag)
         self._start_reporting()
@@ -120,22 +122,35 @@ class PushReplay(Node):
         self._rig.publish(String(data=json.dumps(record)))
         return ""
 
+    def _stream_topics(self) -> Topics:
+        """The topics of slider, pusher and wrench: given, or saved next to the recording; the others are not named."""
+        try:
+            return self._options.topics.over(load_topics(self._options.recording))
+        except RecordingError as error:  # of NAME.recording.yaml, which playing does not need
+            self.get_logger().warning(str(error))
+            return self._options.topics
+
     def _check(self, bag: Bag) -> None:
-        """Begin the check of the recording, in a process of its own; one with other topics is not checked."""
-        names = {topic.strip("/") for topic in bag.topics}
-        if self._rig_warning or not {"slider/pose", "pusher/pose"} <= names:
-            self._checks.result = "not checked: no rig, slider/pose or pusher/pose"
+        """Begin the check of the recording, in a process of its own; one without a rig or poses is not checked."""
+        missing = missing_poses(bag.topics, self._streams)
+        if self._rig_warning:
+            self._checks.skip("no rig")
+        elif missing:
+            self._checks.skip(f"no topic {' or '.join(missing)}")
+            if self._streams != Topics():
+                self.get_logger().warning(f"the recording is {self._checks.result}")
         elif (size := _size(bag.path)) > LARGEST_CHECKED:
-            self._checks.result = f"not checked: {size / 1e6:.0f} MB. Run `push_predictor check`."
+            self._checks.skip(f"{size / 1e6:.0f} MB. Run `push_predictor check`.")
         else:
             rig = None if self._options.rig is None else load_rig(self._options.rig)
-            self._checks.start(self._options.recording, rig)
+            self._checks.start(self._options.recording, rig, self._options.topics)
 
     def _report_regularly(self) -> None:
-        before = self._checks.findings
+        checked = not self._checks.busy
         self._checks.work()
-        if self._checks.findings is not before:
-            for problem in self._checks.problems:
+        if not checked and not self._checks.busy:
+            failure = [f"the recording is {self._checks.result}"] if self._checks.failure else []
+            for problem in failure or self._checks.problems:
                 self.get_logger().warning(problem)
         self._publish_report(self._report())
 
@@ -193,7 +208,8 @@ class PushReplay(Node):
 
     def _wait_for_subscribers(self) -> None:
         senders = self._topics.senders
-        wanted = [s for topic, s in senders.items() if topic.strip("/") in _PUSH_TOPICS] or list(senders.values())
+        needed = push_topics(senders, self._streams)
+        wanted = [sender for topic, sender in senders.items() if topic in needed] or list(senders.values())
         deadline = time.perf_counter_ns() + self._options.wait_for_subscribers
         while time.perf_counter_ns() < deadline and not self._ending.is_set():
             if all(sender.publisher.get_subscription_count() for sender in wanted) and self._rig_received():

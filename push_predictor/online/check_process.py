@@ -28,6 +28,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.topics import Topics
 
 NICENESS = 5  # the samples come first; on a busy machine a lower priority would never be served
 PENDING = "not checked yet"
@@ -36,8 +37,8 @@ PENDING = "not checked yet"
 class CheckProcess:
     """Checks one recording at a time. Call `work` often, from one thread.
 
-    findings: refusals and warnings of the last check that ended. result: in words, what it found. strict: a warning is
-    an error too.
+    findings: refusals and warnings of the last check that ended. result: in words, what it found. failure: why the
+    recording could not be checked, empty if it could. strict: a warning is an error too.
     """
 
     def __init__(self, strict: bool = False) -> None:
@@ -45,7 +46,7 @@ class CheckProcess:
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self.findings: tuple[Finding, ...] = ()
-        self.result = PENDING
+        self.result, self.failure = PENDING, ""
 
     @property
     def busy(self) -> bool:
@@ -62,14 +63,14 @@ class CheckProcess:
         """The findings in words."""
         return [finding.text for finding in self.findings]
 
-    def start(self, data: Recording | Path, rig: Rig | None) -> None:
-        """Check a recording, or that of a path, if no check runs. rig: None for that of the recording."""
+    def start(self, data: Recording | Path, rig: Rig | None, topics: Topics = Topics()) -> None:
+        """Check a recording, or that of a path and its topics, if no check runs. rig: None for the recorded one."""
         if self.busy:
             return
         # spawned: a fork would inherit the threads' locks of the middleware
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_check, args=(theirs, data, rig), daemon=True, name="check")
+        self._process = context.Process(target=_check, args=(theirs, data, rig, topics), daemon=True, name="check")
         self._process.start()
         theirs.close()
 
@@ -83,10 +84,15 @@ class CheckProcess:
             reply = "the process of the check ended"
         self.stop()
         if isinstance(reply, str):
-            self.result = f"not checked: {reply}"
+            self.skip(reply)
             return
+        self.failure = ""
         self.findings = tuple(finding for finding in reply if finding.severity != "note")
         self.result = ", ".join(finding.name for finding in self.findings) or "sound"
+
+    def skip(self, why: str) -> None:
+        """Report that a recording is not checked."""
+        self.failure, self.result = why, f"not checked: {why}"
 
     def stop(self) -> None:
         """End the process."""
@@ -98,14 +104,14 @@ class CheckProcess:
         self._process, self._connection = None, None
 
 
-def _check(connection: Connection, data: Recording | Path, rig: Rig | None) -> None:
+def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     os.nice(NICENESS)
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.read import read_recording, require_rig
 
     try:
-        recording = read_recording(data, rig=rig) if isinstance(data, Path) else data
+        recording = read_recording(data, rig=rig, topics=topics) if isinstance(data, Path) else data
         connection.send(check_recording(recording, rig or require_rig(recording)))
     except (PushPredictorError, OSError) as error:
         connection.send(" ".join(str(error).split()))

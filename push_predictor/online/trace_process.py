@@ -121,12 +121,12 @@ def _run(connection: Connection, task: TraceTask) -> None:
     except (BrokenPipeError, ConnectionResetError):
         shutil.rmtree(task.folder, ignore_errors=True)  # the node has died and cannot do it
     except (PushPredictorError, OSError) as error:
-        connection.send(Failed(_reason(error, task), error_code(error)))
+        connection.send(Failed(_for_client(str(error), task), error_code(error)))
 
 
-def _reason(error: Exception, task: TraceTask) -> str:
-    """The error's message on one line, with the paths and the advice that the action's client knows."""
-    text = str(error).replace(str(task.folder / COPIES), str(task.evidence[0].parent))
+def _for_client(text: str, task: TraceTask) -> str:
+    """A message on one line, with the paths and the advice that the action's client knows."""
+    text = text.replace(str(task.folder / COPIES), str(task.evidence[0].parent))
     text = text.replace(str(task.folder), str(task.folder.parent))  # where the results would have been moved
     text = text.replace(HOW_TO_GIVE, "write it there")  # an action has no command-line options
     return " ".join(text.split())
@@ -135,6 +135,7 @@ def _reason(error: Exception, task: TraceTask) -> str:
 def _traced(connection: Connection, task: TraceTask) -> Traced:
     # Imported here: the node that starts this process does not need these modules.
     from push_predictor.models.store.model_file import save_model
+    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
     from push_predictor.residuals.trace import trace_data
@@ -142,14 +143,16 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     def watch(stage: str, share: float) -> None:
         connection.send(Stage(stage, 0.9 * share))
 
-    paths = [_settled(path, task.folder) for path in task.evidence]
-    trace = trace_data(paths, task.model, alpha=task.alpha, covariates=task.covariates or None, watch=watch)
+    paths, warnings = [_settled(path, task.folder) for path in task.evidence], list[str]()
+    checks, names = DataChecks(False, warnings.append), task.covariates or None
+    trace = trace_data(paths, task.model, alpha=task.alpha, covariates=names, watch=watch, checks=checks)
     watch("report", 1.0)
     text = json.dumps(trace_json(trace), indent=2, allow_nan=False)
     write_whole(task.folder / VERDICT, f"{text}\n".encode())
     if trace.extended is not None:
         save_model(trace.extended, task.folder / EXTENDED)
     sentences = [verdict_sentence(trace, "in the JSON"), worth_sentence(trace), *_report(task.folder / REPORT, trace)]
+    sentences += [f"Warning: {_for_client(text, task)}" for text in warnings]
     return Traced(text, " ".join(sentences), None if trace.extended is None else trace.extended.needs)
 
 

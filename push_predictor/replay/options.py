@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RequestError
+from push_predictor.recordings.topics import STREAMS, Topics
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 
@@ -48,7 +49,7 @@ class ReplayOptions:
     """The options of a replay; times in ns.
 
     storage: rosbag2's name of the recording's format, empty for any. clock_triggers: topics before whose messages
-    /clock is published if clock_with_topics, empty for all.
+    /clock is published if clock_with_topics, empty for all. topics: of the streams of pushes, where they were given.
     """
 
     recording: Path
@@ -71,6 +72,7 @@ class ReplayOptions:
     window: int
     acked_timeout: int
     strict: bool
+    topics: Topics
 
     def triggers_clock(self, topic: str) -> bool:
         """Whether /clock is published with the log time before each message of a topic."""
@@ -114,17 +116,23 @@ def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptio
         window=values["play.read_ahead_queue_size"],
         acked_timeout=times["play.wait_acked_timeout"],
         strict=values["strict"],
+        topics=_topics(values),
     )
 
 
 def _recording(values: Mapping[str, Any]) -> Path:
     paths = {Path(values[name]).expanduser() for name in ("recording", "storage.uri") if values[name]}
     if not paths:
-        raise RequestError("recording", "", "an MCAP file or the folder of a rosbag2 MCAP bag")
+        raise RequestError("recording", "", "the path of a recording (docs/reference/recordings.md)")
     if len(paths) > 1:
         accepted = f"one recording: recording is {values['recording']!r}"
         raise RequestError("storage.uri", values["storage.uri"], accepted)
     return paths.pop()
+
+
+def _topics(values: Mapping[str, Any]) -> Topics:
+    named = {stream: values[f"{stream}_topic"] for stream in STREAMS}
+    return Topics(**named, world=values["world_frame"], wrench_frame=values["wrench_frame"])
 
 
 def _filter(values: Mapping[str, Any]) -> TopicFilter:

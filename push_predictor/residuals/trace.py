@@ -24,12 +24,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.recordings.load import Inspect, no_inspection
+from push_predictor.recordings.load import no_inspection
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
@@ -53,12 +54,15 @@ from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, note
 from push_predictor.residuals.selection.absolute_fit import parts_of_others
 from push_predictor.watch import Watch, no_watch
 
+if TYPE_CHECKING:
+    from push_predictor.recordings.checks.data_checks import DataChecks
+
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 
 
 def trace_data(
     paths: Sequence[Path | str],
-    model_path: Path | str,
+    model: PushModel | Path | str,
     *,
     alpha: float = 0.01,
     covariates: Sequence[str] | None = None,
@@ -67,19 +71,21 @@ def trace_data(
     watch: Watch = no_watch,
     experiment: Sequence[Path | str] = (),
     topics: Topics = Topics(),
-    inspect: Inspect = no_inspection,
+    checks: DataChecks | None = None,
 ) -> Trace:
-    """Judge a model file on recordings or push tables that it was not trained on; see `trace`.
+    """Judge a model, or a model file, on recordings or push tables that it was not trained on; see `trace`.
 
     experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
-    the errors before and after are of the same pushes as in that trace. topics: of all recordings. inspect: called
-    with each path, its data and the rig.
+    the errors before and after are of the same pushes as in that trace. topics: of all recordings. checks: of the data
+    and of what their pushes cover.
     """
     watch("windows", 0.0)
-    model = load_model(Path(model_path))
+    model = model if isinstance(model, PushModel) else load_model(Path(model))
     data, designed = ([Path(path) for path in given] for given in (paths, experiment))
-    options = window_options(model)
+    options, inspect = window_options(model), checks or no_inspection
     loaded = load_evidence(data, rig, options, experiment=designed, topics=topics, inspect=inspect)
+    if checks is not None:
+        checks.judged_by([*data, *designed], loaded.table, loaded.rig)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 

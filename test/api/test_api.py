@@ -128,7 +128,7 @@ def blas_threads() -> list[int]:
             "push_predictor.api.model_repertoire",
             lambda model: choose_push(model, [0.0, 0.0, 0.0], Goal([0.03, 0.0, 0.0], 0.01, None)),
         ),
-        ("push_predictor.api.window_options", lambda model: trace(model, TEST)),
+        ("push_predictor.residuals.trace.window_options", lambda model: trace(model, TEST)),
     ],
 )
 def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pytest.MonkeyPatch, step: str, call: Any):
@@ -276,7 +276,8 @@ def flat(tree: Any) -> list[float]:
 def test_a_validation_has_the_metrics_of_the_command_line(tmp_path: Path):
     model = train(FEW, kind="gp", n_train=40, watch=lambda stage, done: None)
     model.save(tmp_path / "m.pushmodel")
-    found = validate(model, str(FEW))
+    with pytest.warns(push_predictor.DataWarning, match="pushes were used for training"):
+        found = validate(model, str(FEW))
     call = ["-m", "push_predictor.cli", "validate", str(tmp_path / "m.pushmodel"), str(FEW), "--json", "-"]
     printed = json.loads(
         subprocess.run([sys.executable, *call], check=True, cwd=REPOSITORY, capture_output=True).stdout

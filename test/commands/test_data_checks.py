@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lab_bags import short_recording
 from mistakes import MISTAKES, outline_altered
 from repository import REPOSITORY
 
@@ -38,7 +39,7 @@ SMALL = REPOSITORY / "bags" / "hexagon_delrin"
 
 def lines_of(capsys: pytest.CaptureFixture[str]) -> list[str]:
     """The lines on stderr, without those of progress."""
-    return [line for line in capsys.readouterr().err.splitlines() if not re.fullmatch(r"[a-z ]+: \d+ s", line)]
+    return [line for line in capsys.readouterr().err.splitlines() if not re.fullmatch(r"[a-z ]+: \d+ s(, .*)?", line)]
 
 
 @pytest.fixture(scope="module")
@@ -151,3 +152,48 @@ def test_validate_and_trace_fail_with_strict(
     assert main(["trace", str(model), wrong, "--strict"]) == 1
     lines = lines_of(capsys)
     assert [line.split(":")[0] for line in lines] == ["push_predictor validate", "push_predictor trace"]
+
+
+MEANING = "The results are valid only for the part of the domain that was pushed."
+
+
+@pytest.fixture
+def few(tmp_path: Path) -> Path:
+    """A recording of the first seconds, with few pushes."""
+    write_recording(tmp_path / "few", short_recording(8.0))
+    return tmp_path / "few"
+
+
+@pytest.mark.parametrize("command", ["validate", "evaluate", "trace"])
+def test_few_pushes_limit_the_results_of_the_commands_that_judge(
+    few: Path, model: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    """Once, as a warning; with --strict as an error."""
+    words = [command, str(model), str(few)]
+    assert main(words) == (1 if command == "trace" else 0)  # which needs more pushes
+    (line,) = [line for line in lines_of(capsys) if MEANING in line]
+    assert re.match(rf"warning: {few}: The data contain \d push(es)? only\. ", line)
+    assert main([*words, "--strict"]) == 1
+    (line,) = lines_of(capsys)
+    assert line.startswith(f"push_predictor {command}: {few}: The data contain") and line.endswith(MEANING)
+
+
+def test_evaluate_and_suggest_check_as_train_does(
+    altered: dict[str, Path], model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    suggest = ["suggest", str(model), "--count", "1", "--out", str(tmp_path / "next.csv"), "--matter"]
+    for words in (["evaluate", str(model)], suggest):
+        assert main([*words, str(altered["both in mm"])]) == 1
+        assert "its positions are probably in mm" in lines_of(capsys)[0]
+        main([*words, str(altered["wrench of the wrong sign"])])  # suggest: an analytical model has nothing to learn
+        assert any("change the sign" in line for line in lines_of(capsys))
+
+
+def test_a_report_checks_the_recording(
+    altered: dict[str, Path], model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["report", "validation", str(model), "--out", str(tmp_path), "--recording"]
+    assert main([*words, str(altered["both in mm"])]) == 1
+    assert "its positions are probably in mm" in lines_of(capsys)[0]
+    assert main([*words, str(altered["wrench of the wrong sign"]), "--strict"]) == 1
+    assert "change the sign" in lines_of(capsys)[0]

@@ -41,6 +41,8 @@ CALLS = [  # {old} exists; the inputs are absent or damaged, so that nothing is 
     ["trace", "absent", "absent", "--save-model", "{old}"],
     ["trace", "absent", "absent", "--json", "{old}"],
     ["report", "validation", "absent", "--recording", "absent", "--out", "{folder}"],
+    ["report", "paper", "--data", "absent", "--out", "{folder}"],
+    ["import", "mit-square", "absent", "--out", "{folder}", "--json", "{old}"],
 ]
 
 
@@ -48,7 +50,7 @@ def filled(call: list[str], folder: Path) -> list[str]:
     """The call with names of files that exist."""
     outputs = folder / "outputs"
     outputs.mkdir()
-    for name in ("report.html", "new.ladder.json"):
+    for name in ("report.html", "paper.html", "new.ladder.json"):
         (outputs / name).write_text("earlier result")
     for name in ("old", "old.mcap"):
         (folder / name).write_text("earlier result")

@@ -20,32 +20,15 @@ import re
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
 from repository import REPOSITORY
 
 pytest.importorskip("rosbags")
-from lab_bags import Lab, pose_rows, short_recording, write_db3
+from lab_bags import laboratory, short_recording, write_db3
 
 from push_predictor.cli import main
-from push_predictor.recordings.streams import Recording
 
 pytestmark = pytest.mark.slow
-
-BASE = [0.4, -0.3, 0.1, 0.0, 0.0, 0.0, 1.0]  # the robot's base in the world
-TURN = "geometry_msgs/msg/TransformStamped"
-
-
-def laboratory(recording: Recording) -> Lab:
-    """A Vicon that tracks the slider, a robot in tf and a force sensor."""
-    lab = Lab()
-    lab.pose("/vicon/block/block", TURN, recording.slider, "transform", child_frame_id="block")
-    lab.transform("/tf_static", "world", "base", recording.pusher.stamp[:1], [BASE])
-    tip = pose_rows(recording.pusher) - np.array([*BASE[:3], 0.0, 0.0, 0.0, 0.0])
-    lab.transform("/tf", "base", "tool0", recording.pusher.stamp, tip)
-    assert recording.wrench is not None
-    lab.wrench("/netft", recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
-    return lab
 
 
 def commands() -> list[list[str]]:

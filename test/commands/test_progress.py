@@ -140,9 +140,8 @@ def test_commands_report_what_is_done(tmp_path: Path, seen: list[tuple[str, str,
 def test_a_report_and_a_trace_report_what_is_done(
     tmp_path: Path, seen: list[tuple[str, str, float]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def reported(*arguments: object) -> tuple[Path, list[object]]:
-        assert callable(arguments[-1])
-        arguments[-1]("figures", 0.5)
+    def reported(*arguments: object, watch: Watch, **options: object) -> tuple[Path, list[object]]:
+        watch("figures", 0.5)
         return tmp_path, []
 
     def traced(*arguments: object, watch: Watch, **options: object) -> None:

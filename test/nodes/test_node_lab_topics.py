@@ -24,8 +24,8 @@ import pytest
 
 pytest.importorskip("rosbags")
 from diagnostic_msgs.msg import DiagnosticStatus
-from lab_bags import Lab, robot_in_tf, short_recording
-from ros_harness import free_domain, node_process, ros_context
+from lab_bags import LABORATORY, Lab, laboratory, robot_in_tf, short_recording, write_db3
+from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from standard_interfaces import provide_interfaces
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
@@ -33,44 +33,44 @@ from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.load import load_data, load_rig_for
-from push_predictor.recordings.topics import Topics, save_topics
+from push_predictor.recordings.topics import STREAMS, Topics, save_topics
 from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
 
-VICON, UR, FORCE, TIP = "/vicon/block/block", "/ur5/tool0_pose", "/force_torque_sensor_broadcaster/wrench", "/tf:tip"
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
+IN_TF = Topics("/tf:block", "/tf:tip", "/force_torque_sensor_broadcaster/wrench")
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A recording in a laboratory's types, its topics next to it, a model of its slider, and a QoS file."""
+    """A recording in a laboratory's types, its topics, and a model of its slider."""
 
     bag: Path
     topics: Topics
     model: Path
-    overrides: Path
 
 
-def recorded(folder: Path, tip: str) -> Rig:
-    """Eight seconds of pushes: block as TransformStamped and tip as PoseStamped, or both in tf; and the wrench."""
-    recording = short_recording()
-    assert recording.wrench is not None and recording.rig is not None
-    lab = robot_in_tf(recording) if tip == TIP else Lab()
-    if tip == UR:
-        lab.pose(VICON, TRANSFORM, recording.slider, "transform")
-        lab.pose(UR, "geometry_msgs/msg/PoseStamped", recording.pusher, "pose")
-    lab.wrench(FORCE, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
-    bag, topics = lab.mcap(folder / "lab", recording.rig), Topics(VICON if tip == UR else "/tf:block", tip, FORCE)
+def recorded(folder: Path, lab: Lab, topics: Topics) -> Rig:
+    """Eight seconds of pushes, as an MCAP bag with its topics next to it."""
+    bag = lab.mcap(folder / "lab", short_recording().rig)
     save_topics(bag, topics)
-    (folder / "qos.yaml").write_text("".join(f"{topic}: {{reliability: best_effort}}\n" for topic in (VICON, UR)))
     model = folder / "square.pushmodel"
     save_model(train_model(load_data([bag]), load_rig_for([bag]), "analytical", name="square"), model)
-    return Rig(bag, topics, model, folder / "qos.yaml")
+    return Rig(bag, topics, model)
+
+
+def robot_with_force() -> Lab:
+    """Block and tip below moving frames of tf, and the wrench."""
+    recording = short_recording()
+    assert recording.wrench is not None
+    lab = robot_in_tf(recording)
+    lab.wrench(IN_TF.wrench, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    return lab
 
 
 def parameters(rig: Rig, output: Path) -> dict[str, object]:
-    topics = {f"{name}_topic": getattr(rig.topics, name) for name in ("slider", "pusher", "wrench")}
+    topics = {f"{name}_topic": getattr(rig.topics, name) for name in STREAMS}
     return {**topics, "model": rig.model, "output": output, "report": False, "diagnostics_period": 0.2}
 
 
@@ -80,34 +80,56 @@ def tf_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     provide_interfaces("tf2_msgs", monkeypatch)
 
 
-def test_best_effort_transforms_give_the_windows_of_the_recording_after_a_wrong_type(tmp_path: Path) -> None:
-    rig, domain, output = recorded(tmp_path, UR), free_domain(), tmp_path / "out"
+def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_recording(
+    tmp_path: Path, tf_installed: None
+) -> None:
+    """From .db3 with the topics saved next to it, then from MCAP with the topics as parameters; after a wrong type."""
+    rig, domain, output = recorded(tmp_path, laboratory(short_recording()), LABORATORY), free_domain(), tmp_path / "out"
+    db3 = write_db3(laboratory(short_recording()), tmp_path / "sqlite", short_recording().rig)
+    save_topics(db3, LABORATORY)
+    saved = save_topics(rig.bag, LABORATORY)
+    (tmp_path / "qos.yaml").write_text(f"{LABORATORY.slider}: {{reliability: best_effort}}\n")
     with (
         ros_context(domain) as node,
         node_process("predict_server", domain=domain, params={"models": [str(rig.model)]}),
         node_process("push_validator", domain=domain, params=parameters(rig, output)) as process,
     ):
-        status = Status(node)
+        status, replay = Status(node), Status(node, "push_replay")
         status.wait_for_first()
-        wrong = node.create_publisher(JointState, VICON, 10)
+        wrong = node.create_publisher(JointState, LABORATORY.slider, 10)
         message = status.wait_for_message("is of type 'sensor_msgs/msg/JointState', which has no pose")
-        assert f"slider_topic '{VICON}'" in message and status.all[-1][0] == DiagnosticStatus.ERROR
+        assert f"slider_topic '{LABORATORY.slider}'" in message and status.all[-1][0] == DiagnosticStatus.ERROR
         node.destroy_publisher(wrong)
         status.wait_for_server()
-        with replaying(domain, recording=rig.bag, rate=2.0, **{"play.qos_profile_overrides_path": rig.overrides}):
+        played = {"rate": 2.0, "play.qos_profile_overrides_path": tmp_path / "qos.yaml"}
+        with replaying(domain, recording=db3, **played):
             process.wait_for_text(WRITTEN, 60.0)
-        assert f"slider: {VICON}, {TRANSFORM}, best effort, frame_id 'world', 1" in process.text(), process.text()
+            replay.wait_for("data_check", "sound")
+        assert_same_as_offline(output, rig.model, db3)
+        assert_windows_of_the_poses(output)
+        saved.unlink()
+        for path in output.glob("*.json"):
+            path.unlink()
+        named = {f"{name}_topic": getattr(LABORATORY, name) for name in STREAMS}
+        with replaying(domain, recording=rig.bag, **played, **named):
+            assert wait_until(lambda: process.text().count(WRITTEN) == 2), process.text()
+            replay.wait_for("recording", str(rig.bag))
+            replay.wait_for("data_check", "sound")
+        assert f"slider: {LABORATORY.slider}, {TRANSFORM}, best effort, frame_id 'world', 1" in process.text()
         lines = [line for line in process.text().splitlines() if "JointState" in line]
         assert len(lines) == 1 and "[ERROR]" in lines[0], "logged once"
-        assert f"pusher: {UR}, geometry_msgs/msg/PoseStamped, best effort" in process.text()
-        assert f"wrench: {FORCE}, geometry_msgs/msg/WrenchStamped, reliable" in process.text()
+        assert f"pusher: {LABORATORY.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
+        assert f"wrench: {LABORATORY.wrench}, geometry_msgs/msg/WrenchStamped, reliable" in process.text()
+        status.wait_for("coverage check", "limited")  # eight seconds
+        assert "only for the part of the domain that was pushed" in status.message
         assert process.stop() == 0, process.text()
+    save_topics(rig.bag, LABORATORY)
     assert_same_as_offline(output, rig.model, rig.bag)
     assert_windows_of_the_poses(output)
 
 
 def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_installed: None) -> None:
-    rig, domain, output = recorded(tmp_path, TIP), free_domain(), tmp_path / "out"
+    rig, domain, output = recorded(tmp_path, robot_with_force(), IN_TF), free_domain(), tmp_path / "out"
     with (
         ros_context(domain) as node,
         node_process("predict_server", domain=domain, params={"models": [str(rig.model)]}),
@@ -116,9 +138,9 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
         status = Status(node)
         status.wait_for_first()
         status.wait_for_server()
-        with replaying(domain, recording=rig.bag, rate=2.0, **{"play.qos_profile_overrides_path": rig.overrides}):
+        with replaying(domain, recording=rig.bag, rate=2.0):
             process.wait_for_text(WRITTEN, 60.0)
-        assert f"pusher: {TIP}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
+        assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert process.stop() == 0, process.text()
     assert_same_as_offline(output, rig.model, rig.bag)
     assert_windows_of_the_poses(output)

@@ -109,7 +109,7 @@ def test_discovery_is_limited_to_this_machine_unless_the_environment_sets_it(
     assert setting.args == ("ROS_AUTOMATIC_DISCOVERY_RANGE", inside)
 
 
-def test_the_validator_gets_the_topics_of_a_laboratory(launch_file):
+def test_validator_and_replay_get_the_topics_of_a_laboratory(launch_file):
     given = {
         "slider_topic": "/vicon/block/block",
         "pusher_topic": "/tf:tool0",
@@ -118,6 +118,9 @@ def test_the_validator_gets_the_topics_of_a_laboratory(launch_file):
     }
     assert parameters(nodes(launch_file, **given)["push_validator"]) == given
     assert given.keys().isdisjoint(parameters(nodes(launch_file)["push_validator"]))
+    replay = parameters(nodes(launch_file, recording="bags/x", **given)["push_replay"])
+    assert {name: replay[name] for name in given} == given
+    assert given.keys().isdisjoint(parameters(nodes(launch_file, recording="bags/x")["push_replay"]))
 
 
 def test_three_nodes_start_with_their_parameters(launch_file):

@@ -271,7 +271,9 @@ def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[
         portion(early + 1, early, 2**62, 2**62),
     ):
         run.feed(samples)
+    assert run.coverage is None
     run.finish()
+    assert run.coverage == []  # some twenty pushes on all sides
     expected = find_windows(recording, recording.rig)
     assert [(w.push_id, w.index) for w in run.validation.windows] == [(w.push_id, w.index) for w in expected]
     assert [r.velocity for r in asked] == pytest.approx([w.velocity for w in expected], rel=1e-9)

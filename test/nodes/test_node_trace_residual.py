@@ -22,6 +22,7 @@ import shutil
 import signal
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,7 +32,7 @@ import ros_harness as harness
 from action_msgs.msg import GoalStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from made_up_traces import pushes
+from made_up_traces import made_up_trace, pushes, slippery
 from synthetic import square_rig
 from trace_bench import RIG, Server, drifting_folder, server_of
 from validator_bench import Status
@@ -49,7 +50,7 @@ from push_predictor.online.trace_process import (
     TraceTask,
     evidence_in,
 )
-from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.table_file import read_table, write_table
 from push_predictor_interfaces.srv import LoadModel
 
 
@@ -187,6 +188,23 @@ def test_process_of_a_trace_reports_the_reason(
     assert isinstance(sent[-1], Failed) and ".trace-" not in sent[-1].reason
     assert all(word in sent[-1].reason for word in words), sent[-1].reason
     assert {path.name for path in folder.iterdir()} <= {COPIES}
+
+
+def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
+    place: Path, drifting: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
+    monkeypatch.setattr(trace_process.signal, "signal", lambda number, handler: None)
+    monkeypatch.setattr(trace_process, "_report", lambda path, trace: [])
+    found = made_up_trace(slippery(0.1), count=30)
+    monkeypatch.setattr("push_predictor.residuals.trace.trace", lambda *_, **__: found)
+    table = read_table(drifting / "pushes.csv")
+    write_table(drifting / "pushes.csv", replace(table, inputs=table.inputs * [1.0, 1.0, 0.1]))
+    (folder := drifting / ".trace-work").mkdir()
+    sent: list[Any] = []
+    task = TraceTask((drifting / "pushes.csv",), place / "deployed.pushmodel", (), 0.01, folder)
+    trace_process._run(SimpleNamespace(send=sent.append), task)
+    assert f"Warning: {drifting}/pushes.csv: The push angles span" in sent[-1].message
 
 
 @pytest.mark.slow

@@ -106,15 +106,25 @@ class FakePlayer:
             raise OSError("disk")
         self.sought = time
 
+    def toggle_paused(self) -> None:
+        self.paused = not self.paused
+
     def stop(self) -> None:
+        raise ZeroDivisionError
+
+
+class BrokenPlayer(FakePlayer):
+    """Whatever is asked of it fails."""
+
+    def __getattribute__(self, name: str) -> Any:
         raise ZeroDivisionError
 
 
 class Desk:
     """Controls of a fake player, and a function that calls them."""
 
-    def __init__(self, restamps: bool = False) -> None:
-        self.node, self.player = FakeNode(), FakePlayer()
+    def __init__(self, restamps: bool = False, player: FakePlayer | None = None) -> None:
+        self.node, self.player = FakeNode(), player or FakePlayer()
         self.controls = ReplayControls(self.node, self.player, restamps)  # type: ignore[arg-type]  # fakes
 
     def call(self, name: str, **fields: Any) -> Any:
@@ -180,10 +190,19 @@ def test_the_code_of_an_empty_burst_states_whether_pause_would_help() -> None:
         assert response.error_code == response.NOT_PAUSED and "pause" in response.message
 
 
-def test_an_unforeseen_failure_does_not_leave_the_callback() -> None:
-    desk = Desk()
-    assert desk.call("stop") == srv.Stop.Response()
+@pytest.mark.parametrize("name", NAMES)
+def test_an_unforeseen_failure_does_not_leave_the_callback_and_the_client_sees_it(name: str) -> None:
+    desk = Desk(player=BrokenPlayer())
+    response = desk.call(name)
+    assert response.error_code == response.INTERNAL_ERROR and "ZeroDivisionError" in response.message
+    assert not any(getattr(response, field, False) for field in ("success", "paused", "rate", "actually_burst"))
     assert "ZeroDivisionError" in desk.node.logged[-1]
+
+
+@pytest.mark.parametrize("name", ["pause", "resume", "toggle_paused", "is_paused", "get_rate"])
+def test_a_response_that_refuses_nothing_has_the_code_of_no_error(name: str) -> None:
+    response = Desk().call(name)
+    assert response.error_code == response.NONE == 0 and response.message == ""
 
 
 # --- rosbag2's types ----------------------------------------------------------------------------------------------

@@ -88,7 +88,7 @@ def test_help_version_and_unknown_arguments_start_no_node(
     assert end.value.code == status and words in getattr(capsys.readouterr(), stream)
 
 
-@pytest.mark.parametrize("node", ["predict_server", "push_replay", "push_validator"])
+@pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay", "push_validator"])
 @pytest.mark.parametrize(("argument", "status"), [("--version", 0), ("--help", 0), ("--typo", 2)])
 def test_every_node_answers_before_ros_starts(
     node: str, argument: str, status: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

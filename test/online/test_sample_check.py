@@ -23,6 +23,7 @@ from time import monotonic, sleep
 
 import numpy as np
 import pytest
+from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
 from repository import REPOSITORY
 
@@ -140,6 +141,19 @@ def test_a_path_that_cannot_be_read_is_reported_as_not_checked(tmp_path: Path) -
     check.start(tmp_path / "missing.mcap", None)
     wait(check, check.work)
     assert check.result.startswith("not checked: ") and "missing.mcap" in check.result and not check.failed
+
+
+def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -> None:
+    """And is reported as not checked, with the reason, without them."""
+    bag = laboratory(short_recording(2.0)).mcap(tmp_path / "lab", rig_of(short_recording(2.0)))
+    named, unnamed = CheckProcess(), CheckProcess()
+    named.start(bag, None, LABORATORY)
+    unnamed.start(bag, None)
+    wait(named, named.work)
+    wait(unnamed, unnamed.work)
+    assert (named.result, named.failure) == ("sound", "")
+    assert "no topic /slider/pose and /pusher/pose" in unnamed.failure
+    assert unnamed.result == f"not checked: {unnamed.failure}"
 
 
 def test_a_replay_reports_what_the_check_found() -> None:

@@ -61,8 +61,9 @@ class Stage:
         output = PlayerOutput(
             lambda message: None, self.publish, lambda: self.settled.append(len(self.log)), self.states.append
         )
+        source = options.pop("source", ListSource(messages))
         settings = {"window": 10, "loop": False, "delay": 0, **options}
-        self.player = ReplayPlayer(ListSource(messages), self.clock, self, output, **settings)
+        self.player = ReplayPlayer(source, self.clock, self, output, **settings)
 
     def now(self) -> int:
         return self.time

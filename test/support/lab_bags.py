@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -30,10 +31,13 @@ from push_predictor.recordings.fields.pose_rows import composed, inverted, norma
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import RECORD_NAME, Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.topics import Topics
 
 Message = tuple[int, str, bytes]  # log time, topic, CDR
 SECONDS = 8.0
 LATENCY = 7_000_000  # ns from the header stamp to the log time
+LABORATORY = Topics("/vicon/block/block", "/tf:tool0", "/netft")
+BASE = [0.4, -0.3, 0.1, 0.0, 0.0, 0.0, 1.0]  # the robot's base in the world
 
 
 def short_recording(seconds: float = SECONDS, after: float = 0.0) -> Recording:
@@ -132,6 +136,19 @@ class Lab:
         return path
 
 
+def laboratory(recording: Recording) -> Lab:
+    """A Vicon that tracks the slider, a robot in tf and a force sensor; LABORATORY names their topics."""
+    lab = Lab()
+    kind = "geometry_msgs/msg/TransformStamped"
+    lab.pose(LABORATORY.slider, kind, recording.slider, "transform", child_frame_id="block")
+    lab.transform("/tf_static", "world", "base", recording.pusher.stamp[:1], [BASE])
+    tip = pose_rows(recording.pusher) - np.array([*BASE[:3], 0.0, 0.0, 0.0, 0.0])
+    lab.transform("/tf", "base", "tool0", recording.pusher.stamp, tip)
+    assert recording.wrench is not None
+    lab.wrench(LABORATORY.wrench, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    return lab
+
+
 def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
     """A block below a static camera, and a robot of two moving joints and a static tool."""
     lab, slider, pusher = Lab(), recording.slider, recording.pusher
@@ -193,11 +210,13 @@ def assign(message: Any, path: str, value: object) -> None:
     setattr(message, last, value)
 
 
-def write_db3(lab: Lab, path: Path, *, version: int = 9) -> Path:
-    """Write the bag of a laboratory as a folder with a sqlite3 file, by `rosbags`."""
+def write_db3(lab: Lab, path: Path, rig: Rig | None = None, *, version: int = 9) -> Path:
+    """Write the bag of a laboratory as a folder with a sqlite3 file, by `rosbags`; the rig into metadata.yaml."""
     from rosbags.rosbag2 import Writer
 
     with Writer(path, version=version) as writer:
+        if rig is not None:
+            writer.set_custom_data(RECORD_NAME, json.dumps(rig.to_record()))
         connections = {
             topic: writer.add_connection(topic, kind, typestore=lab.store) for topic, kind in lab.kinds.items()
         }

@@ -38,11 +38,21 @@ def _duration(name: str, default: tuple[int, int], description: str) -> tuple[Pa
     )
 
 
+SAVED = "Empty: as in NAME.recording.yaml"
 PARAMETERS: tuple[Param, ...] = (
-    Param("recording", "", "MCAP file, or folder of a rosbag2 MCAP bag, to play; or give storage.uri"),
+    Param(
+        "recording",
+        "",
+        "recording to play: a rosbag2 folder, .mcap, .db3 or .bag file, or folder of CSV streams; or give storage.uri",
+    ),
     Param("storage.uri", "", "another name of the parameter recording, that of rosbag2"),
     Param("storage.storage_id", "", "the format that the recording must have, mcap or sqlite3 (empty: any)"),
     Param("rig", "", "YAML file with the rig; it replaces the push_rig record of the recording"),
+    Param("slider_topic", "", f"the slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. {SAVED}, or slider/pose"),
+    Param("pusher_topic", "", f"the pose of the pusher's tip, in the same manner. {SAVED}, or pusher/pose"),
+    Param("wrench_topic", "", f"the wrench at the tip: TOPIC or TOPIC.FIELD. {SAVED}, or pusher/wrench"),
+    Param("wrench_frame", "", f"axes of the wrench: world, tip or a frame of tf. {SAVED}, or world"),
+    Param("world_frame", "", f"frame of the poses, into which tf turns others. {SAVED}, or their own"),
     Param("restamp", False, "add one constant offset to all header stamps so that they start now; requires rate 1"),
     Param("spin_us", 0, "busy-wait during the last microseconds before a deadline: less lateness, more CPU", 0, 5000),
     Param(

@@ -86,7 +86,7 @@ class StatusPublisher:
         unsaved = run.journal.failure if run and run.journal else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
-        found += run.checks.check.problems if run else []
+        found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
         return [*filter(None, dict.fromkeys(found))]
 
     def _activity(self) -> str:
@@ -120,7 +120,7 @@ def validator_status(
     values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
-        values |= _stream_figures(run) | _scores(run) | {"data check": run.checks.check.result}
+        values |= _stream_figures(run) | _scores(run) | _checks(run)
         values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     message = _paragraph([failure, *warnings]) or state
     return diagnostic_status(node_name, "validation", level, message, values, rig.shape if rig else "")
@@ -169,6 +169,12 @@ def _alarm_figures(alarm: AlarmProcess | None) -> dict[str, object]:
     values |= {"alarm log10 evidence": state.log10_evidence, "alarm strongest": state.strongest}
     fired = {"alarm push": state.fired_at, "alarm fired log10 evidence": state.fired_evidence}
     return values | (fired if state.fired else {})
+
+
+def _checks(run: ValidationRun) -> dict[str, object]:
+    """Results of the checks of the samples and, at the end of a run, of what its pushes cover."""
+    coverage = "not checked yet" if run.coverage is None else "limited" if run.coverage else "sufficient"
+    return {"data check": run.checks.check.result, "coverage check": coverage}
 
 
 def _scores(run: ValidationRun) -> dict[str, object]:

@@ -39,10 +39,12 @@ from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
 from push_predictor.online.sample_check import SampleCheck
 from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.pushed_part import pushed_part
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import PredictPush
 
@@ -75,6 +77,7 @@ class ValidationRun:
         self.validation = LiveValidation(models)
         self.sync = StreamSync(scalars)  # how far each stream has come
         self.checks = SampleCheck(rig, strict)
+        self.coverage: list[Finding] | None = None  # what the windows leave out of the domain, known at the end
         self.refused = 0
         self.last_refusal = ""
         self._pushes = CompletedPushes()
@@ -105,6 +108,8 @@ class ValidationRun:
         """Take the last scalars and find the last windows: no more samples will arrive."""
         self._add_scalars(scalars)
         self._request(self._finder.finish())
+        if len(self.validation.windows):
+            self.coverage = pushed_part(windows_to_table(self.validation.windows), self.rig)
 
     def no_more_answers(self) -> None:
         """Hand the last pushes to the alarm, without the windows that were not answered."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
+from heapq import merge
 from pathlib import Path
 
 import numpy as np
@@ -74,11 +75,13 @@ class CsvStreams:
         return {topic: kind for topic, (kind, _, _) in self._streams.items()}
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """CDR messages, one topic after the other, of all topics or of the given ones."""
-        for topic, (kind, stamp, data) in self._streams.items():
-            if topics is None or topic in topics:
-                for time, message in zip(stamp.tolist(), data, strict=True):
-                    yield RawMessage(topic, kind, time, message)
+        """CDR messages in order of time, of all topics or of the given ones; those of a topic in its file's order."""
+        wanted = [topic for topic in self._streams if topics is None or topic in topics]
+        return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
+
+    def _of_topic(self, topic: str) -> Iterator[RawMessage]:
+        kind, stamp, data = self._streams[topic]
+        return (RawMessage(topic, kind, time, message) for time, message in zip(stamp.tolist(), data, strict=True))
 
 
 def is_csv_recording(folder: Path) -> bool:

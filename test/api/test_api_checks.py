@@ -1,0 +1,177 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The functions of the Python interface check their data: warnings of a category, errors where they are strict."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mistakes import MISTAKES, tracked
+from repository import BAGS
+
+from push_predictor import DataWarning, PushModel, trace, train, validate
+from push_predictor.errors import PushPredictorError, RecordingError
+from push_predictor.recordings.load import load_data
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.write import write_recording
+
+HEXAGON, SQUARE = BAGS / "hexagon_delrin", BAGS / "square_abs_test"
+MEANING = "The results are valid only for the part of the domain that was pushed."
+
+
+def quiet(stage: str, done: float) -> None:
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording whose tracked frame is turned by 8 degrees and shifted by 4 mm."""
+    path = tmp_path_factory.mktemp("turned") / "turned"
+    write_recording(path, tracked(read_recording(HEXAGON), np.radians(8.0), (0.004, 0.0)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def in_mm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording in millimetres."""
+    path = tmp_path_factory.mktemp("mm") / "mm"
+    mistake, *_ = MISTAKES["both in mm"]
+    write_recording(path, mistake(read_recording(HEXAGON)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> PushModel:
+    """An analytical model of the hexagon, trained on half of its pushes."""
+    folder, table, rig = tmp_path_factory.mktemp("half"), load_data([HEXAGON]), read_recording(HEXAGON).rig
+    assert rig is not None
+    write_table(folder / "half.csv", table.take(np.isin(table.push_id, table.pushes[:5])))
+    return train(folder / "half.csv", kind="analytical", rig=rig, watch=quiet)
+
+
+@pytest.fixture
+def narrow(tmp_path: Path) -> Path:
+    """A table of pushes along the normal."""
+    table, rig = load_data([HEXAGON]), read_recording(HEXAGON).rig
+    assert rig is not None
+    write_table(tmp_path / "narrow.csv", replace(table, inputs=table.inputs * [1.0, 1.0, 0.1]))
+    save_rig(rig, tmp_path / "narrow.rig.yaml")
+    return tmp_path / "narrow.csv"
+
+
+@pytest.fixture
+def loaded_only(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """A trace that ends once its data are loaded."""
+
+    def enough(*_: Any, **__: Any) -> None:
+        raise PushPredictorError("loaded")
+
+    monkeypatch.setattr("push_predictor.residuals.trace.trace", enough)
+
+    def traced(*arguments: Any, **options: Any) -> None:
+        with pytest.raises(PushPredictorError, match="loaded"):
+            trace(*arguments, **options, watch=quiet)
+
+    yield traced
+
+
+def warned(call: Callable[[], object]) -> list[str]:
+    """The messages of the warnings of a call; each has the category, and names a line of this file."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    assert all(each.category is DataWarning and each.filename == __file__ for each in caught)
+    return [str(each.message) for each in caught]
+
+
+def test_a_turned_and_shifted_recording_warns_wherever_it_enters(
+    turned: Path, model: PushModel, loaded_only: Callable[..., None]
+) -> None:
+    for call in (
+        lambda: train(turned, kind="analytical", watch=quiet),
+        lambda: validate(model, turned),
+        lambda: loaded_only(model, turned),
+    ):
+        found = [text for text in warned(call) if "turned by" in text]
+        assert len(found) == 1 and found[0].startswith(f"{turned}: ")
+
+
+def test_strict_makes_the_warning_an_error(turned: Path, model: PushModel) -> None:
+    for call in (
+        lambda: train(turned, kind="analytical", watch=quiet, strict=True),
+        lambda: validate(model, turned, strict=True),
+        lambda: trace(model, turned, watch=quiet, strict=True),
+    ):
+        with pytest.raises(RecordingError, match="turned by"):
+            call()
+
+
+def test_a_recording_in_mm_is_an_error_in_any_case(in_mm: Path, model: PushModel) -> None:
+    for call in (
+        lambda: train(in_mm, kind="analytical", watch=quiet),
+        lambda: validate(model, in_mm),
+        lambda: trace(model, in_mm, watch=quiet),
+    ):
+        with pytest.raises(RecordingError, match="probably in mm"):
+            call()
+
+
+def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel, loaded_only: Callable[..., None]) -> None:
+    assert warned(lambda: train(SQUARE, kind="analytical", watch=quiet, strict=True)) == []
+    assert warned(lambda: loaded_only(model, HEXAGON, strict=True)) == []
+
+
+def test_a_learnt_model_of_few_pushes_warns_and_an_analytical_one_does_not(tmp_path: Path) -> None:
+    table, rig = load_data([HEXAGON]), read_recording(HEXAGON).rig
+    assert rig is not None
+    write_table(tmp_path / "few.csv", table.take(np.isin(table.push_id, table.pushes[:5])))
+    few: dict[str, Any] = {"data": tmp_path / "few.csv", "rig": rig, "watch": quiet}
+    (text,) = warned(lambda: train(**few, kind="gp", mean="zero"))
+    assert text.startswith(f"{tmp_path / 'few.csv'}: The data contain 5 pushes")
+    assert warned(lambda: train(**few, kind="analytical", strict=True)) == []
+    with pytest.raises(RecordingError, match="The data contain 5 pushes"):
+        train(**few, kind="gp", strict=True)
+
+
+def test_a_validation_warns_of_training_pushes_and_of_another_slider(model: PushModel) -> None:
+    (text,) = warned(lambda: validate(model, HEXAGON))
+    assert "were used for training" in text
+    (text,) = warned(lambda: validate(model, SQUARE))
+    assert "was trained with the outline of 'hex'" in text
+
+
+def test_a_validation_warns_of_faults_of_the_streams_also_if_strict(model: PushModel, tmp_path: Path) -> None:
+    """They do not make the data wrong."""
+    write_recording(tmp_path / "blind", replace(read_recording(HEXAGON), wrench=None))
+    assert any(
+        "no wrench was recorded" in text for text in warned(lambda: validate(model, tmp_path / "blind", strict=True))
+    )
+
+
+def test_a_trace_of_a_narrow_domain_states_what_that_means(
+    model: PushModel, narrow: Path, loaded_only: Callable[..., None]
+) -> None:
+    (text,) = warned(lambda: loaded_only(model, narrow))
+    assert text.startswith(f"{narrow}: The push angles span ") and text.endswith(MEANING)
+    with pytest.raises(RecordingError, match="push angles span"):
+        trace(model, narrow, watch=quiet, strict=True)

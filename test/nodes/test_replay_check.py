@@ -1,0 +1,91 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which recordings push_replay checks, and with which topics; without a node process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from push_predictor.nodes.push_replay import PushReplay
+from push_predictor.online.check_process import CheckProcess
+from push_predictor.recordings.topics import Topics, save_topics
+
+LAB = {"/vicon/block/block": "geometry_msgs/msg/TransformStamped", "/tf": "tf2_msgs/msg/TFMessage"}
+NAMED = Topics("/vicon/block/block", "/tf:tool0", "/netft", wrench_frame="tip")
+
+
+class Bench:
+    """In place of a node: its options and its log. started: what the process was asked to check."""
+
+    def __init__(self, recording: Path, topics: Topics, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.logged: list[str] = []
+        self.started: list[tuple[Any, ...]] = []
+        monkeypatch.setattr(CheckProcess, "start", lambda _, *what: self.started.append(what))
+        self._options = SimpleNamespace(recording=recording, topics=topics, rig=None)
+        self._rig_warning, self._checks = "", CheckProcess()
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=self.logged.append)
+
+    def check(self, rig_warning: str = "") -> str:
+        """Begin the check as the node does; returns its result so far."""
+        self._streams = PushReplay._stream_topics(self)  # type: ignore[arg-type]  # a stand-in for the node
+        self._rig_warning = rig_warning
+        bag = SimpleNamespace(path=self._options.recording, topics=LAB)
+        PushReplay._check(self, bag)  # type: ignore[arg-type]
+        return self._checks.result
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    (tmp_path / "lab.mcap").write_bytes(b"")
+    return tmp_path / "lab.mcap"
+
+
+def test_saved_topics_are_found_and_given_ones_win(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_topics(bag, NAMED)
+    bench = Bench(bag, Topics(wrench="/ft"), monkeypatch)
+    bench.check()
+    assert bench.started == [(bag, None, Topics(wrench="/ft"))], "the process reads the saved ones itself"
+    assert bench._streams == Topics(NAMED.slider, NAMED.pusher, "/ft", wrench_frame="tip") and bench.logged == []
+
+
+def test_without_names_a_bag_of_other_topics_is_not_checked_and_nobody_is_warned(
+    bag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(bag, Topics(), monkeypatch)
+    assert bench.check() == "not checked: no topic slider/pose or pusher/pose"
+    assert bench.started == [] and bench.logged == []
+
+
+def test_a_name_that_the_bag_lacks_is_warned_about(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(bag, Topics("/vicon/block/blok", "/tf:tool0"), monkeypatch)
+    assert bench.check() == "not checked: no topic /vicon/block/blok"
+    assert bench.started == [] and bench.logged == ["the recording is not checked: no topic /vicon/block/blok"]
+
+
+def test_a_recording_without_a_rig_is_not_checked(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert Bench(bag, NAMED, monkeypatch).check("no push_rig record") == "not checked: no rig"
+
+
+def test_damaged_saved_topics_do_not_end_the_replay(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag.with_name("lab.recording.yaml").write_text("slider: /a")
+    bench = Bench(bag, NAMED, monkeypatch)
+    bench.check()
+    assert len(bench.started) == 1 and len(bench.logged) == 1 and "key 'slider' is not accepted" in bench.logged[0]
