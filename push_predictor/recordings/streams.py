@@ -27,8 +27,8 @@ from push_predictor.types import Array, IntArray
 class PoseStream:
     """n samples of a planar pose.
 
-    Header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured. tilt (n,) in rad: between the body's z
-    axis and the vertical; None where only headings are known.
+    Header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured. tilt (n,) in rad: between the
+    body's z axis and the vertical; None where only headings are known.
     """
 
     stamp: IntArray

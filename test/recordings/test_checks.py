@@ -39,6 +39,7 @@ from mistakes import (
     on_hand,
     outline_altered,
     spatial_rows,
+    stream_part,
     tracked,
     w_first,
     without_orientation,
@@ -143,10 +144,7 @@ def test_exchanged_topics_are_refused(name: str) -> None:
 
 def test_few_pushes_give_no_estimate_of_the_outline() -> None:
     """Measured recordings of one long push gave a shift of 10 mm with an sd of 0.01 mm."""
-    slider = bag(SMALL).slider
-    cut = slice(0, len(slider) // 3)
-    short = replace(slider, stamp=slider.stamp[cut], x=slider.x[cut], y=slider.y[cut], z=slider.z[cut])
-    short = replace(short, heading=slider.heading[cut])
+    short = stream_part(bag(SMALL).slider, 0.0, 1.0 / 3.0)
     findings = found(tracked(replace(bag(SMALL), slider=short), 0.0, (0.003, 0.0)), rig_of(SMALL))
     assert {name: each.severity for name, each in findings.items()} == {"outline_unchecked": "note"}
 

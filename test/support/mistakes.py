@@ -50,6 +50,12 @@ def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Rec
     return replace(recording, slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=heading))
 
 
+def stream_part(poses: PoseStream, begin: float, end: float) -> PoseStream:
+    """The samples between two shares of a stream."""
+    part = slice(round(begin * len(poses)), round(end * len(poses)))
+    return replace(poses, **{name: values[part] for name, values in vars(poses).items() if values is not None})
+
+
 def scaled(recording: Recording, stream: str, factor: float) -> Recording:
     """Positions of a stream in another unit."""
     poses: PoseStream = getattr(recording, stream)
