@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 from lab_bags import Lab, pose_values
 from mistakes import (
+    BAGS,
     MISTAKES,
     UPSIDE_DOWN,
     Mistake,
@@ -57,7 +58,6 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 
-BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
 SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
 
@@ -89,9 +89,9 @@ def test_the_bags_give_no_finding(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BAGS)
-@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012)])
+@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012), (0.0012, 0.0), (-0.0012, 0.0)])
 def test_a_shift_of_over_a_millimetre_is_found_within_four_sd(name: str, shift: tuple[float, float]) -> None:
-    shift = shift[::-1] if name == ONE_SIDE else shift  # along its side no contact shows a shift
+    shift = (shift[0] or shift[1], 0.0) if name == ONE_SIDE else shift  # along its side no contact shows a shift
     finding = found(tracked(bag(name), 0.0, shift), rig_of(name))["outline_shifted"]
     for estimate, true in zip((finding.values["x"], finding.values["y"]), shift, strict=True):
         assert estimate.sd is not None
@@ -133,8 +133,29 @@ def test_a_mirrored_frame_is_named(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in BAGS if name != "circle_pu"])
-def test_a_clockwise_heading_is_named(name: str) -> None:
-    assert "heading_clockwise" in found(mirrored(bag(name), 1.0, -1.0), rig_of(name))
+@pytest.mark.parametrize(("y", "heading", "finding"), [(1.0, -1.0, "heading_clockwise"), (-1.0, 1.0, "y_mirrored")])
+def test_a_heading_or_a_y_axis_of_the_wrong_sign_is_named(name: str, y: float, heading: float, finding: str) -> None:
+    assert list(found(mirrored(bag(name), y, heading), rig_of(name))) == [finding]
+
+
+def test_a_circle_with_a_wrong_y_axis_is_named_as_mirrored() -> None:
+    """Its heading changes no contact."""
+    assert list(found(mirrored(bag("circle_pu"), -1.0, 1.0), rig_of("circle_pu"))) == ["frame_mirrored"]
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("error", [0.0011, -0.0011])
+def test_a_wrong_tip_radius_is_found(name: str, error: float) -> None:
+    """As the size or a shift where the contacts do not separate the two; the advice or the sentence names the tip."""
+    rig = rig_of(name)
+    (finding,) = check_recording(bag(name), replace(rig, pusher_radius=rig.pusher_radius + error))
+    if name == ONE_SIDE:
+        assert finding.name == "outline_shifted" and abs(finding.values["x"].value) == pytest.approx(0.0011, abs=1e-4)
+    elif name == "ellipse_plywood":
+        assert finding.name == "tip_radius"
+        assert finding.values["radius"].value == pytest.approx(rig.pusher_radius, abs=1e-4)
+    else:
+        assert finding.name == "outline_size" and f"tip radius by {-1e3 * error:.1f} mm" in finding.advice
 
 
 @pytest.mark.parametrize("name", BAGS)

@@ -21,6 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 from lab_bags import pose_rows
+from repository import REPOSITORY
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
@@ -31,6 +32,7 @@ from push_predictor.recordings.samples import slider_stream
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.types import Array
 
+BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
 TRACKER_NOISE = 3e-5  # m
 TILT = np.array([0.002, -0.001])  # rad
 UPRIGHT, UPSIDE_DOWN = np.array([0.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])

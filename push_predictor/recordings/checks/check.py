@@ -19,6 +19,7 @@ from __future__ import annotations
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.fixed_to_tip import fixed_to_tip
 from push_predictor.recordings.checks.frames import frame_findings, tip_follows
+from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.checks.units import orientation_finding, stream_units, table_units
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.rig import Rig
@@ -50,4 +51,4 @@ def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
 
 def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:
     """The probable mistakes of a push table, none if it is sound."""
-    return tuple(table_units(table, rig))
+    return tuple(table_units(table, rig) or table_signs(table, rig))

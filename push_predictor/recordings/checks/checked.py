@@ -23,6 +23,7 @@ from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.contact_fit import ContactFit, contact_fit
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
@@ -65,6 +66,8 @@ def checked_recording(recording: Recording) -> CheckedData:
     if any(finding.severity == "refused" for finding in found):
         return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
     table = windows_to_table(find_windows(recording, rig))
+    if all(finding.severity == "note" for finding in found):
+        found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
     coverage = coverage_of(table, rig.outline, rig.pusher_radius)
     fit = contact_fit(recording, rig, table)
     return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
