@@ -55,6 +55,12 @@ def test_gaps_have_the_size_and_sign_of_the_outlines_error(size: float) -> None:
     assert min(fit.inside, fit.off) == 0.0
 
 
+def test_contacts_of_a_sound_outline_are_neither_inside_nor_off_it() -> None:
+    fit = fit_of(hexagon(), require_rig(hexagon()))
+    assert max(fit.inside, fit.off) < 0.01
+    assert all(gap is not None and abs(gap) < 2e-4 for gap in fit.gaps)
+
+
 def test_a_side_without_contact_has_no_gap() -> None:
     """The bag begins with pushes on some sides."""
     half = replace(hexagon(), slider=stream_part(hexagon().slider, 0.0, 0.3))

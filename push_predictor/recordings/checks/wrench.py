@@ -51,7 +51,7 @@ CONE = 0.5  # tangent of an angle beyond which contacts slide
 ROUNDS, OUTLYING = 10, 0.05  # of the robust regression; rad
 SIGN = "Give the force of the slider on the pusher: change the sign."
 AXES = "Give the force along the world's axes, or state the sensor's: --wrench-frame tip or FRAME."
-TOPIC = "Check the wrench topic and its stamps."
+TOPIC = "Check the wrench topic, its stamps and its zero."
 
 
 def wrench_findings(recording: Recording, rig: Rig, outlined: bool = True) -> list[Finding]:
