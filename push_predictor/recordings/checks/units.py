@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lengths in millimetres, angles in degrees, times in milliseconds, quaternions with w first."""
+"""Lengths in millimetres, angles in degrees, times in milliseconds, quaternions with w first or not recorded."""
 
 from __future__ import annotations
 
