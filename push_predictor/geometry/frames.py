@@ -51,6 +51,11 @@ def yaw_of_quaternion(x: Array, y: Array, z: Array, w: Array) -> Array:
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def tilt_of_quaternion(x: Array, y: Array, z: Array, w: Array) -> Array:
+    """Angles (rad, 0 to pi) between the vertical and the z axes that unit quaternions turn."""
+    return np.asarray(2.0 * np.arctan2(np.hypot(x, y), np.hypot(z, w)))
+
+
 def quaternion_of_yaw(yaw: Array) -> tuple[Array, Array]:
     """The (z, w) parts of the unit quaternion that turns by yaw (rad) about the vertical; x = y = 0."""
     return np.sin(yaw / 2.0), np.cos(yaw / 2.0)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.geometry.frames import yaw_of_quaternion
+from push_predictor.geometry.frames import tilt_of_quaternion, yaw_of_quaternion
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, decode, frame_of
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.streams import PoseStream, WrenchStream
@@ -105,7 +105,7 @@ def slider_stream(stamp: IntArray, values: Array) -> PoseStream:
     quaternion = values[:, 3:] / np.abs(values[:, 3:]).max(axis=1, keepdims=True)
     unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     x, y, z = values[:, :3].T.copy()
-    return PoseStream(stamp, x, y, z, yaw_of_quaternion(*unit.T))
+    return PoseStream(stamp, x, y, z, yaw_of_quaternion(*unit.T), tilt_of_quaternion(*unit.T))
 
 
 def pusher_stream(stamp: IntArray, values: Array) -> PoseStream:

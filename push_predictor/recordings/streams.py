@@ -27,7 +27,8 @@ from push_predictor.types import Array, IntArray
 class PoseStream:
     """n samples of a planar pose.
 
-    Header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured.
+    Header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured. tilt (n,) in rad: between the
+    body's z axis and the vertical; None where only headings are known.
     """
 
     stamp: IntArray
@@ -35,6 +36,7 @@ class PoseStream:
     y: Array
     z: Array
     heading: Array
+    tilt: Array | None = None
 
     def __len__(self) -> int:
         return len(self.stamp)

@@ -46,8 +46,9 @@ def write_recording(path: Path, recording: Recording, *, compression: str = "zst
     """Write a recording to a folder, or to a bare file if path ends in .mcap; an earlier bag is replaced.
 
     compression: 'zstd', 'lz4' or 'none'. A folder contains metadata.yaml and NAME_0.mcap. Poses get frame_id 'world'
-    and no roll or pitch; scalars become std_msgs/Float64. Messages are in order of log time. The log time is the header
-    stamp, or the latest stamp so far where stamps go back, so that the order is kept. Raises RecordingError.
+    and their tilt as a roll, which `check` judges; scalars become std_msgs/Float64. Messages are in order of log time.
+    The log time is the header stamp, or the latest stamp so far where stamps go back, so that the order is kept. Raises
+    RecordingError.
     """
     topics = _encoded(recording)
     with BagWriter(path, compression=compression) as writer:
@@ -72,8 +73,9 @@ def _encoded(recording: Recording) -> list[_Encoded]:
 
 def _pose(name: str, stream: PoseStream) -> _Encoded:
     z, w = quaternion_of_yaw(stream.heading)
-    none = np.zeros(len(stream))
-    values = np.stack([stream.x, stream.y, stream.z, none, none, z, w], axis=1)
+    roll, upright = quaternion_of_yaw(np.zeros(len(stream)) if stream.tilt is None else stream.tilt)
+    x, y = w * roll + 0.0, z * roll + 0.0  # without negative zeros: bags of equal recordings have equal bytes
+    values = np.stack([stream.x, stream.y, stream.z, x, y, z * upright, w * upright], axis=1)
     return _Encoded(name, POSE, _arrival(stream.stamp), encode(stream.stamp, values, POSE_STAMPED))
 
 

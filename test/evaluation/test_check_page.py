@@ -24,8 +24,8 @@ import pytest
 from mistakes import another_body, tracked
 from repository import REPOSITORY
 
-from push_predictor.evaluation.check_page.answer import answer_of, with_minus
-from push_predictor.evaluation.check_page.figures import Correction, correction_of, track_charts
+from push_predictor.evaluation.check_page.answer import answer_of, contact_sentence, with_minus
+from push_predictor.evaluation.check_page.figures import Correction, contact_chart, correction_of, track_chart
 from push_predictor.evaluation.check_page.page import check_json, write_check_page
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.load import load_data
@@ -77,7 +77,8 @@ def test_hyphens_of_words_and_dates_stay() -> None:
 
 
 def test_the_corrected_outline_goes_through_the_contacts(turned: CheckedData) -> None:
-    contacts = track_charts(turned)[1]
+    contacts = contact_chart(turned)
+    assert contacts is not None
     (dots,) = (mark for mark in contacts.marks if isinstance(mark, Dots))
     recorded, corrected = (mark for mark in contacts.marks if isinstance(mark, Line))
 
@@ -98,7 +99,8 @@ def test_a_correction_there_and_back_changes_nothing() -> None:
 
 
 def test_both_axes_of_the_tracks_have_one_scale(sound: CheckedData) -> None:
-    for chart in track_charts(sound):
+    for chart in (contact_chart(sound), track_chart(sound)):
+        assert chart is not None
         frame, box = chart.frame, chart.box
         across = (box["right"] - box["left"]) / (frame.x[1] - frame.x[0])
         assert across == pytest.approx((box["bottom"] - box["top"]) / (frame.y[1] - frame.y[0]))
@@ -122,8 +124,29 @@ def test_the_page_contains_answer_findings_and_folded_tables(
     text = (tmp_path / "check.html").read_text()
     assert text.count('<div class="answer">') == 3
     assert re.findall(r"<h2>(monday|tuesday|wednesday)</h2>", text) == ["monday", "tuesday", "wednesday"]
-    assert text.index('class="answer"') < text.index("Contacts on the outline") < text.index("<h2>Findings</h2>")
-    assert text.count("<summary>Coverage in numbers</summary>") == 2 and "outline_turned, yaw" in text
+    assert text.index('class="opening"') < text.index("Contacts on the outline") < text.index("<h2>Findings</h2>")
+    assert text.index("<h2>Findings</h2>") < text.index("Tracks from above")
+    assert text.count("<summary>Coverage in numbers (") == 2 and "outline_turned, yaw" in text
+    assert text.count("<summary>Median gap between tip and outline by side (6 rows)</summary>") == 3
+    assert text.count("<table") == text.count('<details class="tabular">')
+
+
+def test_the_caption_and_the_json_state_where_the_contacts_are(
+    turned: CheckedData, sound: CheckedData, refused: CheckedData
+) -> None:
+    """A slider shifted by 3.6 mm is partly inside its outline and partly off it."""
+    for checked, low, high in ((sound, 0.0, 0.01), (turned, 0.4, 1.0)):
+        contacts = check_json(checked)["contacts"]
+        assert isinstance(contacts, dict) and checked.contacts is not None
+        assert low <= contacts["inside_share"] + contacts["off_share"] <= high
+        assert contacts["samples"] > 1000 and len(contacts["gap_by_side"]) == 6
+        assert contacts["lost_share"] == pytest.approx(1.0 - contacts["window_time"] / contacts["contact_time"])
+    assert sound.contacts is not None and refused.contacts is not None and refused.contacts.lost is None
+    assert contact_sentence(sound.contacts) == (
+        "0.0 % of the contacts are more than 1 mm inside it, 0.0 % as far outside. "
+        "Windows use 94 % of the time in contact."
+    )
+    assert contact_sentence(refused.contacts).endswith("as far outside.")
 
 
 def test_a_table_has_a_page_without_tracks(tmp_path: Path) -> None:

@@ -25,7 +25,9 @@ from mistakes import MISTAKES
 
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.importers import import_source
+from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import read_table
@@ -39,6 +41,12 @@ CAUGHT = (
     "w first",
     "wrench of the wrong sign",
     "wrench along other axes",
+    "no orientation",
+    "no wrench",
+    "wrench in mN",
+    "constant wrench",
+    "wrench of another time",
+    "wrench of random direction",
 )  # by the right name, also with one long push; outline and clocks need eight
 
 
@@ -52,12 +60,12 @@ def recordings(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 @pytest.fixture(scope="module")
-def tables(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> list[PushTable]:
-    """The tables of mit_square and mlab."""
+def tables(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> list[tuple[PushTable, Rig | None]]:
+    """The tables of mit_square and mlab, with their rigs."""
     out = tmp_path_factory.mktemp("tables")
     sources = [("mit-square", measured_data / "mit_square" / "pushes_3500.npz"), ("mlab", measured_data / "mlab")]
     written = [path for kind, source in sources for path in import_source(kind, [source], out / kind).written]
-    return [read_table(path) for path in written if path.suffix == ".csv"]
+    return [(read_table(path), known_rig(path)) for path in written if path.suffix == ".csv"]
 
 
 def test_sound_recordings_are_neither_refused_nor_warned_about(recordings: dict[str, Recording]) -> None:
@@ -83,11 +91,20 @@ def test_exchanged_topics_are_refused(recordings: dict[str, Recording], name: st
     assert "refused" in {finding.severity for finding in check_recording(wrong, require_rig(wrong))}
 
 
-def test_sound_tables_have_no_finding_and_wrong_units_are_refused(tables: list[PushTable]) -> None:
+def test_sound_tables_have_no_finding_and_wrong_units_are_refused(tables: list[tuple[PushTable, Rig | None]]) -> None:
     assert len(tables) > 10
-    for table in tables:
-        assert check_table(table) == ()
+    for table, rig in tables:
+        assert check_table(table, rig) == check_table(table) == ()
         in_mm = replace(table, inputs=table.inputs * [1e3, 1.0, 1.0], outcomes=table.outcomes * [1e3, 1e3, 1.0])
         assert "refused" in {finding.severity for finding in check_table(in_mm)}
-    degrees = replace(tables[0], outcomes=tables[0].outcomes * [1.0, 1.0, np.degrees(1.0)])
+    degrees = replace(tables[0][0], outcomes=tables[0][0].outcomes * [1.0, 1.0, np.degrees(1.0)])
     assert [finding.name for finding in check_table(degrees)] == ["units_dtheta"]
+
+
+def test_mirrored_tables_are_named(tables: list[tuple[PushTable, Rig | None]]) -> None:
+    """Those with enough pushes outside the friction cone."""
+    large = [(table, rig) for table, rig in tables if len(table) >= 50]
+    assert len(large) >= 8
+    for table, rig in large:
+        wrong = replace(table, outcomes=table.outcomes * [1.0, -1.0, -1.0])
+        assert [finding.name for finding in check_table(wrong, rig)] == ["table_mirrored"]

@@ -19,31 +19,50 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from lab_bags import Lab, pose_values
 from mistakes import (
+    BAGS,
     MISTAKES,
+    UPRIGHT,
+    UPSIDE_DOWN,
     Mistake,
+    force_constant,
     force_in_slider_frame,
+    force_of_another_time,
+    force_of_random_direction,
+    force_scaled,
     force_turned,
     heading_in_degrees,
     late,
+    on_hand,
     outline_altered,
+    spatial_rows,
+    stream_part,
     tracked,
+    w_first,
+    without_orientation,
 )
 from repository import REPOSITORY
 
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.samples import slider_stream
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.write import write_recording
+from push_predictor.types import Array
 
-BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
-SMALL = "ellipse_plywood"
+SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
 
 
@@ -74,9 +93,9 @@ def test_the_bags_give_no_finding(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BAGS)
-@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012)])
+@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012), (0.0012, 0.0), (-0.0012, 0.0)])
 def test_a_shift_of_over_a_millimetre_is_found_within_four_sd(name: str, shift: tuple[float, float]) -> None:
-    shift = shift[::-1] if name == ONE_SIDE else shift  # along its side no contact shows a shift
+    shift = (shift[0] or shift[1], 0.0) if name == ONE_SIDE else shift  # along its side no contact shows a shift
     finding = found(tracked(bag(name), 0.0, shift), rig_of(name))["outline_shifted"]
     for estimate, true in zip((finding.values["x"], finding.values["y"]), shift, strict=True):
         assert estimate.sd is not None
@@ -118,8 +137,29 @@ def test_a_mirrored_frame_is_named(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in BAGS if name != "circle_pu"])
-def test_a_clockwise_heading_is_named(name: str) -> None:
-    assert "heading_clockwise" in found(mirrored(bag(name), 1.0, -1.0), rig_of(name))
+@pytest.mark.parametrize(("y", "heading", "finding"), [(1.0, -1.0, "heading_clockwise"), (-1.0, 1.0, "y_mirrored")])
+def test_a_heading_or_a_y_axis_of_the_wrong_sign_is_named(name: str, y: float, heading: float, finding: str) -> None:
+    assert list(found(mirrored(bag(name), y, heading), rig_of(name))) == [finding]
+
+
+def test_a_circle_with_a_wrong_y_axis_is_named_as_mirrored() -> None:
+    """Its heading changes no contact."""
+    assert list(found(mirrored(bag("circle_pu"), -1.0, 1.0), rig_of("circle_pu"))) == ["frame_mirrored"]
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("error", [0.0011, -0.0011])
+def test_a_wrong_tip_radius_is_found(name: str, error: float) -> None:
+    """As the size or a shift where the contacts do not separate the two; the advice or the sentence names the tip."""
+    rig = rig_of(name)
+    (finding,) = check_recording(bag(name), replace(rig, pusher_radius=rig.pusher_radius + error))
+    if name == ONE_SIDE:
+        assert finding.name == "outline_shifted" and abs(finding.values["x"].value) == pytest.approx(0.0011, abs=1e-4)
+    elif name == "ellipse_plywood":
+        assert finding.name == "tip_radius"
+        assert finding.values["radius"].value == pytest.approx(rig.pusher_radius, abs=1e-4)
+    else:
+        assert finding.name == "outline_size" and f"tip radius by {-1e3 * error:.1f} mm" in finding.advice
 
 
 @pytest.mark.parametrize("name", BAGS)
@@ -127,18 +167,9 @@ def test_exchanged_topics_are_refused(name: str) -> None:
     assert found(swapped(bag(name)), rig_of(name))["topics_swapped"].severity == "refused"
 
 
-def test_another_body_is_refused() -> None:
-    slider = replace(bag(SMALL).slider, heading=np.linspace(0.0, 30.0, len(bag(SMALL).slider)))
-    far = replace(bag(SMALL), slider=replace(slider, x=slider.x + 0.5))
-    assert found(far, rig_of(SMALL))["another_body"].severity == "refused"
-
-
 def test_few_pushes_give_no_estimate_of_the_outline() -> None:
     """Measured recordings of one long push gave a shift of 10 mm with an sd of 0.01 mm."""
-    slider = bag(SMALL).slider
-    cut = slice(0, len(slider) // 3)
-    short = replace(slider, stamp=slider.stamp[cut], x=slider.x[cut], y=slider.y[cut], z=slider.z[cut])
-    short = replace(short, heading=slider.heading[cut])
+    short = stream_part(bag(SMALL).slider, 0.0, 1.0 / 3.0)
     findings = found(tracked(replace(bag(SMALL), slider=short), 0.0, (0.003, 0.0)), rig_of(SMALL))
     assert {name: each.severity for name, each in findings.items()} == {"outline_unchecked": "note"}
 
@@ -178,11 +209,82 @@ def test_stamps_in_a_wrong_unit_are_refused(factor: float) -> None:
     assert "units_time_slider" in found(replace(bag(SMALL), slider=replace(slider, stamp=stamp)), rig_of(SMALL))
 
 
-def test_a_quaternion_with_w_first_is_refused() -> None:
-    slider = bag(SMALL).slider
-    assert "quaternion_order" in found(
-        replace(bag(SMALL), slider=replace(slider, heading=0.0 * slider.x)), rig_of(SMALL)
+@pytest.mark.parametrize("name", BAGS)
+def test_a_quaternion_with_w_first_is_refused(name: str) -> None:
+    """Of a tracker, whose quaternions have a tilt of some milliradians."""
+    (finding,) = check_recording(w_first(bag(name)), rig_of(name))
+    assert (finding.name, finding.severity) == ("quaternion_order", "refused")
+    assert finding.values["tilt"].value > np.radians(90.0)
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_the_tilt_of_a_tracker_is_no_finding(name: str) -> None:
+    recording = bag(name)
+    tracked_in_space = slider_stream(recording.slider.stamp, spatial_rows(recording.slider))
+    assert check_recording(replace(recording, slider=tracked_in_space), rig_of(name)) == ()
+    assert tracked_in_space.tilt is not None
+    assert np.median(tracked_in_space.tilt) == pytest.approx(0.003, abs=0.001)
+
+
+@pytest.mark.parametrize("turn", [UPRIGHT, UPSIDE_DOWN])
+def test_heading_and_tilt_are_kept_by_writing(tmp_path: Path, turn: Array) -> None:
+    """So that a mistake is found in an imported or repaired recording too."""
+    slider = slider_stream(bag(SMALL).slider.stamp, spatial_rows(bag(SMALL).slider, turn))
+    write_recording(tmp_path / "written", replace(bag(SMALL), slider=slider))
+    read = read_recording(tmp_path / "written").slider
+    assert read.tilt is not None and slider.tilt is not None and np.ptp(slider.tilt) > 1e-3
+    np.testing.assert_allclose(read.tilt, slider.tilt, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(wrap_angle(read.heading - slider.heading), 0.0, atol=1e-9)
+
+
+def test_a_body_that_is_upside_down_is_a_warning() -> None:
+    """Its heading is sound, unlike that of a quaternion with w first, but the outline is seen from below."""
+    rows = spatial_rows(bag(SMALL).slider, UPSIDE_DOWN)
+    recording = replace(bag(SMALL), slider=slider_stream(bag(SMALL).slider.stamp, rows))
+    finding = found(recording, rig_of(SMALL))["slider_tilted"]
+    assert finding.severity == "warning" and "180 degrees" in finding.sentence
+
+
+@pytest.mark.parametrize("w_is_first", [True, False])
+def test_quaternions_of_transforms_are_checked_too(tmp_path: Path, w_is_first: bool) -> None:
+    """As the Vicon bridge sends them."""
+    recording, lab = bag(SMALL), Lab()
+    rows = spatial_rows(recording.slider)
+    kind, stamps = "geometry_msgs/msg/TransformStamped", recording.slider.stamp
+    rows = rows[:, [0, 1, 2, 6, 3, 4, 5]] if w_is_first else rows
+    lab.add(
+        "/vicon",
+        kind,
+        stamps,
+        (
+            lab.header(stamp) | pose_values(row, "transform", ("translation", "rotation"))
+            for stamp, row in zip(stamps.tolist(), rows, strict=True)
+        ),
     )
+    lab.pose("/pusher/pose", "geometry_msgs/msg/PoseStamped", recording.pusher, "pose")
+    read = read_recording(lab.mcap(tmp_path / "lab", rig_of(SMALL)), topics=Topics("/vicon"))
+    assert list(found(read, rig_of(SMALL))) == (["quaternion_order"] if w_is_first else [])
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_an_orientation_that_is_not_recorded_is_refused(name: str) -> None:
+    assert found(without_orientation(bag(name)), rig_of(name))["heading_constant"].severity == "refused"
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("place", [(0.03, 0.0), (0.0, -0.03), (-0.08, 0.0), (0.05, 0.06)])
+def test_a_body_on_the_robots_hand_is_refused(name: str, place: tuple[float, float]) -> None:
+    """Whether the tip seems to be inside the outline, on it, or outside."""
+    (finding,) = check_recording(on_hand(bag(name), place), rig_of(name))
+    assert (finding.name, finding.severity) == ("another_body", "refused")
+    assert "moves with the tip" in finding.sentence
+
+
+@pytest.mark.parametrize(("name", "shift"), [*((name, 0.003) for name in BAGS), ("circle_pu", 0.02)])
+def test_a_shifted_world_frame_is_no_exchange_of_topics(name: str, shift: float) -> None:
+    slider = bag(name).slider
+    findings = found(replace(bag(name), slider=replace(slider, x=slider.x + shift)), rig_of(name))
+    assert findings and {each.severity for each in findings.values()} == {"warning"}
 
 
 @pytest.mark.parametrize("name", BAGS)
@@ -211,6 +313,43 @@ def test_a_wrench_in_the_sliders_or_a_turned_frame_is_named(name: str, mistake: 
 def test_a_heading_in_degrees_is_refused(name: str) -> None:
     finding = found(heading_in_degrees(bag(name)), rig_of(name))["units_heading"]
     assert finding.severity == "refused" and "degrees" in finding.sentence
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("alter", [
+    force_of_random_direction,
+    force_of_another_time,
+    lambda recording: force_of_another_time(recording, -1.0 / 3.0),
+    lambda recording: force_constant(recording, 0.0),
+    lambda recording: force_constant(recording, 2.0),
+])  # fmt: skip
+def test_a_force_that_has_nothing_to_do_with_the_push_is_named(name: str, alter: Mistake) -> None:
+    (finding,) = wrench_findings(alter(bag(name)), rig_of(name))
+    assert (finding.name, finding.severity) == ("wrench_unrelated", "warning")
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize(("factor", "finding"), [
+    (0.0, "wrench_absent"), (1e-3, "wrench_absent"), (1.0 / 9.81, "wrench_absent"),
+    (102.0, "wrench_units"), (1e3, "wrench_units"),
+])  # fmt: skip
+def test_a_force_that_is_absent_or_in_another_unit_is_named(name: str, factor: float, finding: str) -> None:
+    """In N, kN, kgf, gf or mN."""
+    assert [each.name for each in wrench_findings(force_scaled(bag(name), factor), rig_of(name))] == [finding]
+
+
+def test_the_force_of_a_light_slider_is_judged_by_its_weight() -> None:
+    """The forces that a slider of 98 g with this friction gives, of 0.12 N in the median."""
+    light = replace(rig_of(SMALL), object_mass=rig_of(SMALL).object_mass / 10.0)
+    assert wrench_findings(force_scaled(bag(SMALL), 0.1), light) == []
+    assert wrench_findings(force_scaled(bag(SMALL), 0.1), rig_of(SMALL)) != []
+
+
+def test_without_friction_any_force_below_three_weights_is_plausible() -> None:
+    unknown = replace(rig_of(SMALL), surface_friction=None)
+    assert wrench_findings(force_scaled(bag(SMALL), 20.0), unknown) == []
+    assert [each.name for each in wrench_findings(force_scaled(bag(SMALL), 30.0), unknown)] == ["wrench_units"]
+    assert [each.name for each in wrench_findings(force_scaled(bag(SMALL), 6.0), rig_of(SMALL))] == ["wrench_units"]
 
 
 @pytest.mark.parametrize("name", MISTAKES)

@@ -20,16 +20,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from repository import REPOSITORY
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.recordings.checks.checked import checked_data
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.table import PushTable, empty_table
 
-BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
 SQUARE, RADIUS = shape_outline("rect1"), 0.00475
 RECTANGLE = Outline(np.array([[-0.06, -0.03], [0.06, -0.03], [0.06, 0.03], [-0.06, 0.03]]))
 WINDOWS = 5  # of each push
@@ -65,14 +62,6 @@ def with_inputs(table: PushTable, column: int, scale: float, middle: float = 0.0
     inputs = table.inputs.copy()
     inputs[:, column] = middle + scale * (inputs[:, column] - middle)
     return replace(table, inputs=inputs)
-
-
-@pytest.mark.parametrize("name", BAGS)
-def test_no_bag_gives_a_warning(name: str) -> None:
-    checked = checked_data(REPOSITORY / "bags" / name)
-    assert {finding.severity for finding in checked.findings} <= {"note"}
-    assert checked.coverage is not None and checked.coverage.sliding is not None
-    assert checked.coverage.sliding > 0.3
 
 
 def test_pushes_of_all_kinds_give_no_finding() -> None:

@@ -20,14 +20,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from lab_bags import pose_rows
+from repository import REPOSITORY
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.samples import slider_stream
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.types import Array
 
+BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
+TRACKER_NOISE = 3e-5  # m
+TILT = np.array([0.002, -0.001])  # rad
+UPRIGHT, UPSIDE_DOWN = np.array([0.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])
 Mistake = Callable[[Recording], Recording]
 
 
@@ -42,6 +50,12 @@ def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Rec
     move = rotate(np.array(shift), slider.heading)
     heading = wrap_angle(slider.heading + yaw)
     return replace(recording, slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=heading))
+
+
+def stream_part(poses: PoseStream, begin: float, end: float) -> PoseStream:
+    """The samples between two shares of a stream."""
+    part = slice(round(begin * len(poses)), round(end * len(poses)))
+    return replace(poses, **{name: values[part] for name, values in vars(poses).items() if values is not None})
 
 
 def scaled(recording: Recording, stream: str, factor: float) -> Recording:
@@ -75,9 +89,62 @@ def another_body(recording: Recording) -> Recording:
     return replace(recording, slider=replace(slider, x=slider.x + 0.5, heading=np.linspace(0.0, 10.0, len(slider))))
 
 
+def on_hand(recording: Recording, place: tuple[float, float] = (0.03, 0.0)) -> Recording:
+    """The pose of a body that is fixed to the robot's hand, at that place (m) from the tip, instead of the slider's."""
+    tip, draw = recording.pusher, np.random.default_rng(0)
+    x, y = np.array(place)[:, None] + TRACKER_NOISE * draw.standard_normal((2, len(tip)))
+    heading = 0.3 + 10.0 * TRACKER_NOISE * draw.standard_normal(len(tip))
+    return replace(recording, slider=PoseStream(tip.stamp, tip.x + x, tip.y + y, tip.z - 0.01, heading))
+
+
+def spatial_rows(stream: PoseStream, turn: Array = UPRIGHT) -> Array:
+    """Poses (n, 7) as a tracker gives them: tilted by 2 mrad, with as much noise; turn: a quaternion, in the body."""
+    rows, draw = pose_rows(stream), np.random.default_rng(0)
+    n = len(rows)
+    tilt = np.column_stack([0.5 * (TILT + TILT[0] * draw.standard_normal((n, 2))), np.zeros(n), np.ones(n)])
+    own = np.tile(turn, (n, 1))
+    none = np.zeros((n, 3))
+    return composed(composed(rows, normalised(np.hstack([none, tilt]))), np.hstack([none, own]))
+
+
 def w_first(recording: Recording) -> Recording:
-    """A quaternion whose w is read as x: the heading is that of (w, x, y, z) taken as (x, y, z, w)."""
+    """Quaternions (w, x, y, z) that are read as (x, y, z, w)."""
+    rows = spatial_rows(recording.slider)[:, [0, 1, 2, 6, 3, 4, 5]]
+    return replace(recording, slider=slider_stream(recording.slider.stamp, rows))
+
+
+def without_orientation(recording: Recording) -> Recording:
+    """The identity in place of orientations."""
     return replace(recording, slider=replace(recording.slider, heading=0.0 * recording.slider.heading))
+
+
+def force_scaled(recording: Recording, factor: float) -> Recording:
+    """The force in another unit, or none."""
+    wrench = recording.wrench
+    assert wrench is not None
+    return replace(recording, wrench=replace(wrench, fx=factor * wrench.fx, fy=factor * wrench.fy))
+
+
+def force_constant(recording: Recording, angle: float) -> Recording:
+    """A force of 2 N in one direction (rad) of the world all the time."""
+    wrench = recording.wrench
+    assert wrench is not None
+    fx, fy = 2.0 * np.cos(angle), 2.0 * np.sin(angle)
+    return replace(recording, wrench=replace(wrench, fx=np.full(len(wrench), fx), fy=np.full(len(wrench), fy)))
+
+
+def force_of_another_time(recording: Recording, share: float = 1.0 / 3.0) -> Recording:
+    """The force rolled by a share of the recording."""
+    wrench = recording.wrench
+    assert wrench is not None
+    by = round(share * len(wrench))
+    return replace(recording, wrench=replace(wrench, fx=np.roll(wrench.fx, by), fy=np.roll(wrench.fy, by)))
+
+
+def force_of_random_direction(recording: Recording) -> Recording:
+    """The force of the slider, each sample in a direction of its own."""
+    assert recording.wrench is not None
+    return force_turned(recording, np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(recording.wrench)))
 
 
 def force_turned(recording: Recording, angle: Array | float) -> Recording:
@@ -103,8 +170,10 @@ MISTAKES: Mapping[str, tuple[Mistake, str, str]] = {
     "heading in degrees": (heading_in_degrees, "units_heading", "refused"),
     "stamps in ms": (lambda r: stamps_scaled(r, 1e3), "units_time_slider", "refused"),
     "w first": (w_first, "quaternion_order", "refused"),
+    "no orientation": (without_orientation, "heading_constant", "refused"),
     "topics exchanged": (swapped, "topics_swapped", "refused"),
     "another body": (another_body, "another_body", "refused"),
+    "body on the hand": (on_hand, "another_body", "refused"),
     "mirrored": (lambda r: mirrored(r, -1.0, -1.0), "frame_mirrored", "warning"),
     "clockwise heading": (lambda r: mirrored(r, 1.0, -1.0), "heading_clockwise", "warning"),
     "turned": (lambda r: tracked(r, np.radians(4.0), (0.0, 0.0)), "outline_turned", "warning"),
@@ -112,4 +181,9 @@ MISTAKES: Mapping[str, tuple[Mistake, str, str]] = {
     "clocks apart": (lambda r: late(r, 0.05), "clocks_apart", "warning"),
     "wrench of the wrong sign": (lambda r: force_turned(r, np.pi), "wrench_sign", "warning"),
     "wrench along other axes": (lambda r: force_turned(r, np.pi / 2.0), "wrench_frame", "warning"),
+    "no wrench": (lambda r: force_scaled(r, 0.0), "wrench_absent", "warning"),
+    "wrench in mN": (lambda r: force_scaled(r, 1e3), "wrench_units", "warning"),
+    "constant wrench": (lambda r: force_constant(r, 1.0), "wrench_unrelated", "warning"),
+    "wrench of another time": (force_of_another_time, "wrench_unrelated", "warning"),
+    "wrench of random direction": (force_of_random_direction, "wrench_unrelated", "warning"),
 }

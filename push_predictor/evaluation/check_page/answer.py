@@ -21,6 +21,7 @@ import re
 import numpy as np
 
 from push_predictor.recordings.checks.checked import CheckedData
+from push_predictor.recordings.checks.contact_fit import OFF, ContactFit
 from push_predictor.recordings.checks.coverage import Coverage
 from push_predictor.recordings.checks.finding import Finding
 
@@ -28,11 +29,12 @@ ORDER = ("refused", "warning", "note")
 LABELS = {"refused": "refused", "warning": "check first", "note": "sound"}
 
 
-def answer_of(checked: CheckedData) -> tuple[list[str], str]:
+def answer_of(checked: CheckedData) -> tuple[tuple[str, str, str], str]:
     """What was found, what to do, what was pushed; and a label: refused, check first, or sound."""
     worst = min(checked.findings, key=lambda finding: ORDER.index(finding.severity), default=None)
     label = "sound" if worst is None else LABELS[worst.severity]
-    return [with_minus(text) for text in (_found(checked, worst), _to_do(checked, worst), _pushed(checked))], label
+    found, to_do, pushed = _found(checked, worst), _to_do(checked, worst), _pushed(checked)
+    return (with_minus(found), with_minus(to_do), with_minus(pushed)), label
 
 
 def with_minus(text: str) -> str:
@@ -63,6 +65,15 @@ def _pushed(checked: CheckedData) -> str:
     return coverage_sentence(checked.coverage)
 
 
+def contact_sentence(fit: ContactFit) -> str:
+    """Where the contacts lie against the outline, and the share of their time that became windows."""
+    inside, off = (f"{100.0 * share:.1f} %" for share in (fit.inside, fit.off))
+    place = f"{inside} of the contacts are more than {1e3 * OFF:.0f} mm inside it, {off} as far outside."
+    if fit.lost is None:
+        return place
+    return f"{place} Windows use {100.0 * (1.0 - fit.lost):.0f} % of the time in contact."
+
+
 def coverage_sentence(coverage: Coverage) -> str:
     """The pushes, with sides, speeds, angles and the share of sliding contacts where they are known."""
     pushes = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
@@ -72,6 +83,6 @@ def coverage_sentence(coverage: Coverage) -> str:
     slow, fast = (f"{1e3 * speed:.3g}" for speed in coverage.speeds)
     low, high = (f"{np.degrees(angle):.0f}" for angle in coverage.angles)
     sliding = coverage.sliding
-    slides = "" if sliding is None else f"; the contact slides in {100.0 * sliding:.0f} % of the steps"
+    slides = "" if sliding is None else f" The contact slides in {100.0 * sliding:.0f} % of the steps."
     ranges = f"at {slow} to {fast} mm/s and {low} to {high} degrees"
-    return f"The data contain {pushes} ({windows}){sides}, {ranges}{slides}."
+    return f"The data contain {pushes} ({windows}){sides}, {ranges}.{slides}"

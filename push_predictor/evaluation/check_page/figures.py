@@ -80,16 +80,24 @@ def correction_of(findings: Sequence[Finding]) -> Correction | None:
     return Correction(**known) if known else None
 
 
-def track_charts(checked: CheckedData) -> list[Chart]:
-    """Tracks and contacts of a recording; empty for a table, or without common time of slider and tip."""
+def contact_chart(checked: CheckedData) -> Chart | None:
+    """The contacts on the outline, None for a table and for a recording without contact."""
+    motion = _motion(checked)
+    if motion is None or checked.rig is None or not motion.contact.any():
+        return None
+    return _contacts(motion, checked.rig, correction_of(checked.findings))
+
+
+def track_chart(checked: CheckedData) -> Chart | None:
+    """The tracks of slider and tip, None for a table, and where they have no common time."""
+    motion = _motion(checked)
+    return None if motion is None else _tracks(motion)
+
+
+def _motion(checked: CheckedData) -> Motion | None:
     if checked.recording is None or checked.rig is None:
-        return []
-    motion = motion_of(checked.recording, checked.rig)
-    if motion is None:
-        return []
-    if not motion.contact.any():
-        return [_tracks(motion)]
-    return [_tracks(motion), _contacts(motion, checked.rig, correction_of(checked.findings))]
+        return None
+    return motion_of(checked.recording, checked.rig)
 
 
 def coverage_charts(coverage: Coverage, table: PushTable) -> list[Chart]:
@@ -153,14 +161,14 @@ def _contacts(motion: Motion, rig: Rig, correction: Correction | None) -> Chart:
     normal = rotate(rig.outline.project(place.own(tips)).normal, np.array(place.yaw))
     points = MM * (tips - rig.pusher_radius * normal)
     outline = np.vstack([rig.outline.vertices, rig.outline.vertices[:1]])
-    marks: list[Mark] = [Line("held", *(MM * outline).T)]
+    marks: list[Mark] = [Line("held", *(MM * outline).T, name="outline of the rig")]
     every = MM * outline
     if correction is not None:
         corrected = MM * correction.tracked(outline)
-        marks.append(Line("after", *corrected.T))
+        marks.append(Line("after", *corrected.T, name="corrected outline"))
         every = np.vstack([every, corrected])
     titles = [f"push {number}" for number in motion.push[rows]]
-    marks.append(Dots("before", points[:, 0], points[:, 1], titles))
+    marks.append(Dots("before", points[:, 0], points[:, 1], titles, name="contacts"))
     near = points[np.max(np.abs(points), axis=1) < 3.0 * np.max(np.abs(every))]
     x, y = _equal(np.vstack([every, near]))
     label = "Contacts on the outline in the slider's frame"

@@ -19,19 +19,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from push_predictor.evaluation.check_page.answer import answer_of, with_minus
-from push_predictor.evaluation.check_page.figures import correction_of, coverage_charts, track_charts
+from push_predictor.evaluation.check_page.answer import answer_of, contact_sentence, with_minus
+from push_predictor.evaluation.check_page.figures import contact_chart, correction_of, coverage_charts, track_chart
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.checks.checked import CheckedData
 from push_predictor.recordings.checks.finding import Value
 from push_predictor.reporting import html
 
-TRACKS = "Tracks: the tip (grey; orange while the slider moves) and the tracked frame of the slider (blue), from above."
-CONTACTS = (
-    " Contacts: the points that the tip touches (orange), in the slider's frame, and the rig's outline (black). In "
-    "sound data they lie on it."
-)
-CORRECTED = " Blue: the outline corrected by the estimates below."
+TRACKS = "The tip (grey; orange while the slider moves) and the tracked frame of the slider (blue), from above."
+CONTACTS = "The points that the tip touches, in the slider's frame. In sound data they lie on the outline. "
+PUSHES = "Each push by speed and angle."
 
 
 def write_check_page(path: Path, checked: Mapping[str, CheckedData]) -> None:
@@ -47,28 +44,47 @@ def write_check_page(path: Path, checked: Mapping[str, CheckedData]) -> None:
 
 
 def check_json(checked: CheckedData) -> dict[str, object]:
-    """Answer, correction of the outline, and coverage; the findings have their own key."""
+    """Answer, correction of the outline, contacts, and coverage; the findings have their own key."""
     sentences, label = answer_of(checked)
     correction = correction_of(checked.findings)
     return {
         "verdict": label,
         "answer": sentences,
         "correction": None if correction is None else correction.record(),
+        "contacts": None if checked.contacts is None else checked.contacts.record(),
         "coverage": None if checked.coverage is None else checked.coverage.record(),
     }
 
 
 def _parts(checked: CheckedData) -> list[str]:
-    parts = [html.answer(*answer_of(checked))]
-    if charts := track_charts(checked):
-        corrected = CORRECTED if correction_of(checked.findings) is not None else ""
-        parts.append(html.charts(charts, TRACKS + (CONTACTS + corrected if len(charts) > 1 else "")))
-    parts.append(html.heading("Findings"))
+    sentences, label = answer_of(checked)
+    parts = [html.opening(sentences, label, _figure(checked)), html.heading("Findings")]
     parts += [
         html.finding(finding.name.replace("_", " "), finding.severity, with_minus(finding.text))
         for finding in checked.findings
     ] or [html.paragraph("None.")]
-    return [*parts, *_numbers(checked), *_coverage(checked)]
+    return [*parts, *_numbers(checked), *_contacts(checked), *_coverage(checked)]
+
+
+def _figure(checked: CheckedData) -> str:
+    """The contacts on the outline, for a table its pushes."""
+    if checked.contacts is not None and (chart := contact_chart(checked)) is not None:
+        return html.charts([chart], CONTACTS + contact_sentence(checked.contacts))
+    if checked.recording is None and checked.coverage is not None and checked.table is not None:
+        return html.charts(coverage_charts(checked.coverage, checked.table)[:1], PUSHES)
+    return ""
+
+
+def _contacts(checked: CheckedData) -> list[str]:
+    """The gap on each side, folded, and the tracks."""
+    parts = []
+    if (fit := checked.contacts) is not None:
+        caption = f"Median gap between tip and outline by {fit.side}. Counted counter-clockwise from the first vertex."
+        rows = [[str(k + 1), _millimetres(gap)] for k, gap in enumerate(fit.gaps)]
+        parts.append(html.folded_table(caption, (fit.side, "gap, mm"), rows))
+    if (chart := track_chart(checked)) is not None:
+        parts.append(html.charts([chart], TRACKS))
+    return [html.heading("Contacts and tracks"), *parts] if parts else []
 
 
 def _numbers(checked: CheckedData) -> list[str]:
@@ -78,10 +94,8 @@ def _numbers(checked: CheckedData) -> list[str]:
         for finding in checked.findings
         for name, value in finding.values.items()
     ]
-    if not rows:
-        return []
-    table = html.table("Estimates with their standard deviations.", ("finding", "value", "sd"), rows)
-    return [html.details("Estimates in numbers", table)]
+    caption = "Estimates in numbers. With their standard deviations."
+    return [html.folded_table(caption, ("finding", "value", "sd"), rows)] if rows else []
 
 
 def _coverage(checked: CheckedData) -> list[str]:
@@ -89,13 +103,19 @@ def _coverage(checked: CheckedData) -> list[str]:
         return []
     coverage = checked.coverage
     rows = [[name.replace("_", " "), _listed(value)] for name, value in coverage.record().items()]
-    table = html.table("Middle 90 % of speeds (m/s) and angles (rad).", ("what was pushed", "value"), rows)
+    numbers = "Coverage in numbers. Middle 90 % of speeds (m/s) and angles (rad)."
     caption = "What the pushes cover. A learnt model predicts well only where pushes were recorded."
+    charts = coverage_charts(coverage, checked.table)
+    shown = charts if checked.recording is not None else charts[1:]  # a table's first one is the figure of the opening
     return [
         html.heading("Coverage"),
-        html.charts(coverage_charts(coverage, checked.table), caption),
-        html.details("Coverage in numbers", table),
+        *([html.charts(shown, caption)] if shown else []),
+        html.folded_table(numbers, ("what was pushed", "value"), rows),
     ]
+
+
+def _millimetres(gap: float | None) -> str:
+    return html.NOTHING if gap is None else html.number(1e3 * gap, 2)
 
 
 def _listed(value: object) -> str:

@@ -20,8 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.contact_fit import ContactFit, contact_fit
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
@@ -38,7 +40,7 @@ class CheckedData:
     """Findings about mistakes first, then about coverage. recording: None for a push table.
 
     coverage and table (of windows): None for refused data; coverage also without a push. rig: None for a table without
-    one.
+    one. contacts: None for a table, and for a recording without contact.
     """
 
     name: str
@@ -47,6 +49,7 @@ class CheckedData:
     recording: Recording | None
     rig: Rig | None
     table: PushTable | None = None
+    contacts: ContactFit | None = None
 
 
 def checked_data(path: Path, rig: Rig | None = None, topics: Topics = Topics()) -> CheckedData:
@@ -61,10 +64,13 @@ def checked_recording(recording: Recording) -> CheckedData:
     rig = require_rig(recording)
     found = check_recording(recording, rig)
     if any(finding.severity == "refused" for finding in found):
-        return CheckedData(recording.name, found, None, recording, rig)
+        return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
     table = windows_to_table(find_windows(recording, rig))
+    if all(finding.severity == "note" for finding in found):
+        found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
     coverage = coverage_of(table, rig.outline, rig.pusher_radius)
-    return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table)
+    fit = contact_fit(recording, rig, table)
+    return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
 
 
 def _checked_table(name: str, table: PushTable, rig: Rig | None) -> CheckedData:

@@ -94,13 +94,16 @@ def coverage_findings(coverage: Coverage | None) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
+def sides_of(outline: Outline, contact: Array) -> tuple[IntArray, int, str]:
+    """Index (n,) of the side of each contact (n,), the number of sides, and their name: side, or quarter."""
+    if outline.semi_axes is None and len(outline.vertices) <= MOST_SIDES:
+        return outline.edge(contact)[0], len(outline.vertices), "side"
+    return np.floor(4.0 * contact).astype(np.int64), 4, "quarter"
+
+
 def _sides(table: PushTable, outline: Outline) -> tuple[IntArray, str, int]:
     """Windows on each side, the name of a side, and the number of sides after which the outline repeats."""
-    order = outline.rotational_symmetry
-    if outline.semi_axes is None and len(outline.vertices) <= MOST_SIDES:
-        count, side, index = len(outline.vertices), "side", outline.edge(table.inputs[:, 1])[0]
-    else:
-        count, side, index = 4, "quarter", np.floor(4.0 * table.inputs[:, 1]).astype(np.int64)
+    order, (index, count, side) = outline.rotational_symmetry, sides_of(outline, table.inputs[:, 1])
     repeats = order and count % order == 0
     alike = 0 if order == 0 else count // order if repeats else count
     return np.bincount(index, minlength=count), side, alike

@@ -67,7 +67,7 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
         found = outline_findings(contacts, rig, fit)
         return (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found) if found else []
     explained = min(BETTER * fit.gap, FAR * reach)
-    if _gap(swapped(recording), rig) < explained:
+    if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
     mirrors = {name: _gap(mirrored(recording, y, heading), rig) for name, (y, heading, *_) in MIRRORS.items()}
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
@@ -126,6 +126,14 @@ def _leads(recording: Recording, rig: Rig) -> float:
     return float(np.mean(motion.tip_speed[motion.moving] < WindowOptions().least_speed))
 
 
+def tip_follows(recording: Recording, rig: Rig) -> bool:
+    """Whether the tip rests more often while the slider moves than the other way round, as after an exchange.
+
+    Without this evidence, a circle in a world frame shifted by some millimetres fits better as its own tip.
+    """
+    return _leads(recording, rig) > _leads(swapped(recording), rig)
+
+
 def _is_implausible(fit: OutlineFit, reach: float) -> bool:
     """Whether the correction is another slider rather than a mistake in this one's outline."""
     return bool(np.hypot(fit.estimate[1], fit.estimate[2]) > reach or abs(fit.estimate[3]) > LARGEST_GROWTH)
@@ -143,7 +151,7 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
 
 
 def _without_contact(recording: Recording, rig: Rig) -> list[Finding]:
-    if _gap(swapped(recording), rig) < LARGE_GAP:
+    if tip_follows(recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
         return [_swapped(np.inf)]
     sentence = "The slider never moves while the lowered tip moves: no push was recorded."
     return [Finding("no_contact", "refused", sentence, TOPICS)]

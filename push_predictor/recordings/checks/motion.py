@@ -35,14 +35,16 @@ FEWEST = 5  # samples of each stream
 class Motion:
     """n samples at the slider's stamps.
 
-    time (n,) s; slider (n, 3): x, y m, heading rad, unwrapped; tip (n, 2) m; tip_velocity (n, 2) m/s; slider_speed (n,)
-    and tip_speed (n,) m/s, means over SPAN on both sides; force (n, 2) N on the tip, NaN if unknown. moving (n,):
-    whether the slider moves; contact (n,): it moves, and so does the lowered tip. push (n,): number of the contact.
+    time (n,) s; slider (n, 3): x, y m, heading rad, unwrapped; tip (n, 2) m; tip_height (n,) m above its lowest place;
+    tip_velocity (n, 2) m/s; slider_speed (n,) and tip_speed (n,) m/s, means over SPAN on both sides; force (n, 2) N on
+    the tip, NaN if unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip.
+    push (n,): number of the contact.
     """
 
     time: Array
     slider: Array
     tip: Array
+    tip_height: Array
     tip_velocity: Array
     slider_speed: Array
     tip_speed: Array
@@ -75,9 +77,8 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     moving = speed > MOVING
     contact = moving & lowered & (tip_speed > options.least_speed)
     force = _force(recording, origin, time)
-    return Motion(
-        time, pose, tip[:, :2], tip_velocity, speed, tip_speed, force, moving, contact, _number(time, contact)
-    )
+    height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
+    return Motion(time, pose, tip[:, :2], height, tip_velocity, speed, tip_speed, force, moving, contact, number)
 
 
 def body_velocity(motion: Motion) -> Array:

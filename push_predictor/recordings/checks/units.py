@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lengths in millimetres, angles in degrees, times in milliseconds, quaternions with w first."""
+"""Lengths in millimetres, angles in degrees, times in milliseconds, quaternions with w first or not recorded."""
 
 from __future__ import annotations
 
@@ -31,6 +31,9 @@ HIGHEST_RATE = 20e3  # Hz of samples
 LOWEST_RATE = 1.0  # Hz
 LONGEST = 30.0  # s of a table's row
 STILL = 1e-5  # rad; a tracker's noise is larger
+STEEP = np.radians(45.0)  # a slider lies flat, while w read as x rolls it by pi minus its heading
+FROZEN = 0.2  # rad; w read as x leaves a heading of about twice the true tilt
+COVERED = 95.0  # percentile: few samples may be tracked wrongly
 TRAVEL = 0.02  # m of a slider that also turns
 OUTRUN = 5.0  # path lengths of the tip; a slider does not move farther in a window, nor turn by more path lengths
 TURN_SPAN = 0.05  # s between the poses whose turns are summed
@@ -65,17 +68,29 @@ def table_units(table: PushTable, rig: Rig | None = None) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
-def quaternion_order(slider: PoseStream) -> Finding | None:
-    """A finding if the slider moves with a constant heading, as one whose w is read as x."""
+def orientation_finding(slider: PoseStream) -> Finding | None:
+    """A finding if the orientations of a slider that moves have another order of components, or are missing."""
     x, y = slider.x[np.isfinite(slider.x)], slider.y[np.isfinite(slider.y)]
-    if (
-        not (len(x) and len(y))
-        or np.hypot(np.ptp(x), np.ptp(y)) < TRAVEL
-        or np.nanmax(np.abs(np.sin(slider.heading))) > STILL
-    ):
+    if not (len(x) and len(y)) or np.hypot(np.ptp(x), np.ptp(y)) < TRAVEL:
         return None
-    sentence = "The slider moves and its heading does not change at all: the quaternion's order is probably w, x, y, z."
-    return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.")
+    tilt, largest = _tilt(slider), float(np.nanmax(np.abs(slider.heading)))
+    values = {"tilt": Value(tilt, "rad")}
+    if tilt > STEEP:
+        up = f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical"
+        if float(np.nanpercentile(np.abs(slider.heading), COVERED)) < FROZEN:
+            sentence = f"{up} and its heading does not change: the quaternion's order is probably w, x, y, z."
+            return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.", values)
+        advice = "Give a tracked frame whose z axis points up: contacts are mirrored otherwise."
+        return Finding("slider_tilted", "warning", f"{up}.", advice, values)
+    if largest > STILL:
+        return None
+    sentence = "The slider moves and its heading is exactly 0 throughout: its orientation is probably not recorded."
+    return Finding("heading_constant", "refused", sentence, "Record the orientation of the slider.")
+
+
+def _tilt(slider: PoseStream) -> float:
+    """The tilt (rad) that few samples exceed. The median would be small for w first and headings near pi."""
+    return 0.0 if slider.tilt is None or not len(slider.tilt) else float(np.nanpercentile(slider.tilt, COVERED))
 
 
 def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding | None:

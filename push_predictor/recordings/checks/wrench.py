@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sign and the axes of the force, against the motion of the tip.
+"""The force against the motion of the tip: whether it belongs to it, its unit, its sign and its axes.
 
 The slider resists: its force on the tip points against the tip's velocity, up to the angle of the push and the friction
 cone. A force along the slider's axes resists too while the slider turns little, but its direction in the slider's frame
@@ -31,27 +31,96 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.types import Array, BoolArray, IntArray
 
 LEAST_FORCE = 0.3  # N
+LIGHT = 0.05  # of the slider's weight, where that is less: the force of a light slider
+FAINTEST = 0.1  # N: what sensors resolve
 FEWEST = 20  # samples
+FEWEST_FREE = 5  # samples of a tip away from the slider
+AWAY = 0.004  # m from the outline: the tip of a sound rig touches nothing there
+LOOSE = 0.5  # of the force in contact: a force that is as large in free motion belongs to something else
+ABSENT = 0.2  # share of the contacts with a force
+FAINT, STEADY = 0.1, 0.8  # share of the large forces; share of the contacts
 SOUND = 0.5  # mean cosine between the force and the direction against the motion, or against the contact's normal
+UNRELATED = 0.4  # a mean cosine below, while no other reading of the force is sound
 CLEAR = 0.3  # by which another reading of the force must agree better
+FRICTION = (0.01, 3.0)  # of the force over the slider's weight: no surface has less or more
+FRICTION_FACTOR = 5.0  # the force over that of the known friction, or its inverse
+GRAVITY = 9.81  # m/s^2
 FEWEST_PUSHES = 8  # for a standard deviation of the slope over headings
 DOUBT = 4.0  # standard deviations
 CONE = 0.5  # tangent of an angle beyond which contacts slide
 ROUNDS, OUTLYING = 10, 0.05  # of the robust regression; rad
 SIGN = "Give the force of the slider on the pusher: change the sign."
 AXES = "Give the force along the world's axes, or state the sensor's: --wrench-frame tip or FRAME."
+TOPIC = "Check the wrench topic, its stamps and its zero."
 
 
-def wrench_findings(recording: Recording, rig: Rig) -> list[Finding]:
-    """Findings about the wrench; empty without one."""
+def wrench_findings(recording: Recording, rig: Rig, outlined: bool = True) -> list[Finding]:
+    """Findings about the wrench; empty without one. outlined: whether the outline shows where the tip is in contact."""
     motion = motion_of(recording, rig)
     if motion is None:
         return []
     size = np.hypot(*motion.force.T)
-    used = motion.contact & (size > LEAST_FORCE)
-    if np.sum(used) < FEWEST:
+    contact = motion.contact & np.isfinite(size)
+    if np.sum(contact) < FEWEST:
         return []
-    force, heading = motion.force[used] / size[used, None], motion.slider[used, 2]
+    least = _least_force(rig)
+    loose = _loose(motion, size, contact, rig) if outlined else None
+    if found := loose or _absent(size[contact], least) or _scale(size[contact], rig):
+        return [found]
+    used = contact & (size > least)
+    return _directions(motion, used, rig, _steady(size[contact])) if np.sum(used) >= FEWEST else []
+
+
+def _least_force(rig: Rig) -> float:
+    return max(FAINTEST, min(LEAST_FORCE, LIGHT * GRAVITY * rig.object_mass))
+
+
+def _loose(motion: Motion, size: Array, contact: BoolArray, rig: Rig) -> Finding | None:
+    """A finding if the force is there without contact too: constant, of another time, or of another body."""
+    apart = rig.outline.project(to_body(motion.tip, motion.slider)).distance - rig.pusher_radius > AWAY
+    free = apart & np.isfinite(size)
+    if np.sum(free) < FEWEST_FREE:
+        return None
+    loose, touching = float(np.median(size[free])), float(np.median(size[contact]))
+    if loose < max(LOOSE * touching, LEAST_FORCE):
+        return None
+    sentence = f"The force is {loose:.2g} N while the tip is away from the slider, and {touching:.2g} N in contact."
+    values = {"free_force": Value(loose, "N"), "force": Value(touching, "N")}
+    return Finding("wrench_unrelated", "warning", sentence, TOPIC, values)
+
+
+def _absent(size: Array, least: float) -> Finding | None:
+    share = float(np.mean(size > least))
+    if share > ABSENT:
+        return None
+    sentence = f"The force exceeds {least:.2g} N in {100.0 * share:.0f} % of the contacts only."
+    advice = "Check that the sensor is on, that its topic is right, and that forces are in N."
+    return Finding("wrench_absent", "warning", sentence, advice, {"share": Value(share, "1")})
+
+
+def _scale(size: Array, rig: Rig) -> Finding | None:
+    """A finding if no friction explains the force: the slider's weight times its friction moves it."""
+    force, weight = float(np.median(size)), GRAVITY * rig.object_mass
+    lowest, highest = weight * np.array(FRICTION)
+    if rig.surface_friction:
+        known = weight * rig.surface_friction
+        lowest, highest = max(lowest, known / FRICTION_FACTOR), min(highest, known * FRICTION_FACTOR)
+    if lowest <= force <= highest:
+        return None
+    sentence = f"The force in contact is {force:.3g} N in the median, for a slider of {weight:.3g} N of weight."
+    advice = "Give forces in N, torques in N m, and object_mass in kg."
+    values = {"force": Value(force, "N"), "weight": Value(weight, "N")}
+    return Finding("wrench_units", "warning", sentence, advice, values)
+
+
+def _steady(size: Array) -> bool:
+    """Whether nearly all contacts have a force; that of another time is missing in many."""
+    return bool(np.mean(size > FAINT * np.percentile(size, 90.0)) > STEADY)
+
+
+def _directions(motion: Motion, used: BoolArray, rig: Rig, steady: bool) -> list[Finding]:
+    """Findings about sign and axes, from the direction of the force against that of the motion."""
+    force, heading = motion.force[used] / np.linalg.norm(motion.force[used], axis=1)[:, None], motion.slider[used, 2]
     inward = -rig.outline.project(to_body(motion.tip, motion.slider)[used]).normal
     ahead = (motion.tip_velocity[used] / motion.tip_speed[used, None], rotate(inward, heading))
     now = _resistance(force, ahead)
@@ -69,10 +138,13 @@ def wrench_findings(recording: Recording, rig: Rig) -> list[Finding]:
     best, reason, advice = readings[name]
     if now > SOUND:
         return _turns_with_slider(motion, used, rig)
-    if best < now + CLEAR:
-        return []
+    values = {"cosine": Value(now, "1"), "cosine_after": Value(best, "1")}
+    if not steady or best < max(now + CLEAR, SOUND):
+        if now > UNRELATED:
+            return []
+        name, reason, advice = "wrench_unrelated", "It is probably of another time or body.", TOPIC
     sentence = f"The force does not resist the motion (mean cosine {now:.2f}, sound above {SOUND}). {reason}"
-    return [Finding(name, "warning", sentence, advice, {"cosine": Value(now, "1"), "cosine_after": Value(best, "1")})]
+    return [Finding(name, "warning", sentence, advice, values)]
 
 
 def _turns_with_slider(motion: Motion, used: BoolArray, rig: Rig) -> list[Finding]:

@@ -1,0 +1,93 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The signs of a table's dy and dtheta, against what quasi-static mechanics decides for any pressure and friction.
+
+The force of a tip whose velocity is outside the friction cone lies between the normal and the velocity. The slider's
+centre follows the force: dy has the sign of minus the angle. The slider turns as the force turns it. Inside the cone it
+turns as two of three lines do, the cone's edges and the velocity (the voting theorem of Mason, 1986). Only rows in
+which all lines agree are judged.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+CONE, NARROW = np.radians(25.0), np.radians(3.0)  # half angles of friction cones: coefficients of 0.47 and 0.05
+FEWEST = 10  # rows
+WRONG = -0.5  # agreement below which the sign is wrong; it is from -1 to 1, and near 1 in sound data
+FRAMES = "Give dy to the left of the push, angles and contacts counter-clockwise, seen from above."
+
+
+class Agreement(NamedTuple):
+    """The sum of a column with the signs that mechanics expects, over that of its absolute values; rows: how many."""
+
+    share: float
+    rows: int
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the sign is wrong, in enough rows."""
+        return self.rows >= FEWEST and self.share < WRONG
+
+
+def table_signs(table: PushTable, rig: Rig | None = None) -> list[Finding]:
+    """Findings about the signs of dy, and with a rig of dtheta."""
+    dy = _agreement(table.outcomes[:, 1], -_sign_beyond(table.inputs[:, 2], CONE))
+    turn = Agreement(0.0, 0) if rig is None else _agreement(table.outcomes[:, 2], _turning(table, rig))
+    if dy.wrong and turn.wrong:
+        return [_finding("table_mirrored", "dy and dtheta have the wrong sign", {"dy": dy, "dtheta": turn})]
+    if dy.wrong:
+        return [_finding("dy_sign", "dy, or the angle, has the wrong sign", {"dy": dy})]
+    if turn.wrong:
+        return [_finding("dtheta_sign", "dtheta has the wrong sign, or contacts are clockwise", {"dtheta": turn})]
+    return []
+
+
+def _agreement(column: Array, expected: Array) -> Agreement:
+    """Expected (n,): 1, -1, or 0 where mechanics does not decide."""
+    judged = expected != 0.0
+    size = float(np.sum(np.abs(column[judged])))
+    share = float(np.sum(column[judged] * expected[judged])) / size if size > 0.0 else 0.0
+    return Agreement(share, int(np.sum(judged)))
+
+
+def _turning(table: PushTable, rig: Rig) -> Array:
+    """The sign (n,) of the rotation where the three lines agree, else 0."""
+    contact, angle = table.inputs[:, 1], table.inputs[:, 2]
+    arm, normal = rig.outline.point(contact) - rig.outline.centroid, rig.outline.inward_normal(contact)
+    sliding, side = np.abs(angle) > CONE, np.sign(angle)
+    edges = np.where(sliding, side * NARROW, -CONE), np.where(sliding, side * CONE, CONE)
+    lines = [rotate(normal, turn) for turn in (*edges, angle)]
+    moments = [np.sign(arm[:, 0] * line[:, 1] - arm[:, 1] * line[:, 0]) for line in lines]
+    return np.asarray(np.where((moments[0] == moments[1]) & (moments[1] == moments[2]), moments[0], 0.0))
+
+
+def _sign_beyond(values: Array, least: float) -> Array:
+    return np.asarray(np.where(np.abs(values) > least, np.sign(values), 0.0))
+
+
+def _finding(name: str, what: str, agreements: dict[str, Agreement]) -> Finding:
+    shares = " and ".join(f"{each.share:.2f}" for each in agreements.values())
+    sentence = f"The table's {what}: agreement with mechanics {shares}, from -1 to 1."
+    values = {column: Value(each.share, "1") for column, each in agreements.items()}
+    return Finding(name, "warning", sentence, FRAMES, values)

@@ -1,0 +1,213 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tables of windows of bags/: sound as they are; coverage that they lack, and signs that are wrong, are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from mistakes import BAGS
+from repository import REPOSITORY
+
+from push_predictor.recordings.checks.check import check_table
+from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
+from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.frames import mirrored
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import BoolArray
+
+TRAIN = "square_abs_train"
+Change = Callable[[PushTable], PushTable]
+
+
+@cache
+def checked(name: str) -> CheckedData:
+    return checked_data(REPOSITORY / "bags" / name)
+
+
+def table_of(name: str) -> PushTable:
+    table = checked(name).table
+    assert table is not None
+    return table
+
+
+def rig_of(name: str) -> Rig:
+    rig = checked(name).rig
+    assert rig is not None
+    return rig
+
+
+def lacking(table: PushTable, name: str = TRAIN) -> dict[str, Finding]:
+    rig = rig_of(name)
+    return {each.name: each for each in coverage_findings(coverage_of(table, rig.outline, rig.pusher_radius))}
+
+
+def changed(table: PushTable, dy: float = 1.0, dtheta: float = 1.0, angle: float = 1.0) -> PushTable:
+    return replace(table, inputs=table.inputs * [1.0, 1.0, angle], outcomes=table.outcomes * [1.0, dy, dtheta])
+
+
+def clockwise_contacts(table: PushTable) -> PushTable:
+    velocity, contact, angle = table.inputs.T
+    return replace(table, inputs=np.column_stack([velocity, (1.0 - contact) % 1.0, angle]))
+
+
+# --- coverage --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_no_bag_gives_a_warning(name: str) -> None:
+    assert {finding.severity for finding in checked(name).findings} <= {"note"}
+    coverage = checked(name).coverage
+    assert coverage is not None and coverage.sliding is not None
+    assert coverage.sliding > 0.3
+
+
+def test_the_training_bag_lacks_nothing() -> None:
+    assert lacking(table_of(TRAIN)) == {}
+
+
+@pytest.mark.parametrize(("count", "severity"), [(7, "warning"), (20, "note")])
+def test_a_bag_cut_after_some_pushes_has_few(count: int, severity: str) -> None:
+    table = table_of(TRAIN)
+    finding = lacking(table.take(np.isin(table.push_id, table.pushes[:count])))["few_pushes"]
+    assert finding.severity == severity and f"{count} pushes" in finding.sentence
+
+
+def test_a_bag_without_windows_has_no_push() -> None:
+    table = table_of(TRAIN)
+    assert list(lacking(table.take(np.zeros(len(table), dtype=np.bool_)))) == ["no_pushes"]
+
+
+def test_a_bag_cut_to_one_side_names_the_others() -> None:
+    table = table_of(TRAIN)
+    finding = lacking(table.take(np.floor(4.0 * table.inputs[:, 1]) == 2.0))["few_sides"]
+    assert finding.severity == "note" and "Pushed: side 3 of 4" in finding.sentence
+    ellipse = table_of("ellipse_plywood")
+    quarter = ellipse.take(np.floor(4.0 * ellipse.inputs[:, 1]) == 0.0)
+    assert lacking(quarter, "ellipse_plywood")["few_sides"].severity == "warning"
+
+
+def test_a_bag_cut_to_one_speed_says_so() -> None:
+    table = table_of(TRAIN)
+    slow = table.take(np.abs(table.inputs[:, 0] - 0.02) < 0.004)
+    assert [(each.name, each.severity) for each in lacking(slow).values()] == [("one_speed", "note")]
+
+
+@pytest.mark.parametrize(("degrees", "severity"), [(12.0, "warning"), (25.0, "note")])
+def test_a_bag_cut_to_few_angles_is_found(degrees: float, severity: str) -> None:
+    table = table_of(TRAIN)
+    straight = table.take(np.abs(table.inputs[:, 2]) < np.radians(degrees))
+    assert lacking(straight)["few_angles"].severity == severity
+
+
+def test_a_bag_cut_to_contacts_that_stick_is_found() -> None:
+    """Of each push, the windows before the contact first slides."""
+    finding = lacking(table_of(TRAIN).take(sticking(table_of(TRAIN), rig_of(TRAIN))))["few_sliding"]
+    assert finding.severity == "warning"
+
+
+def sticking(table: PushTable, rig: Rig) -> BoolArray:
+    """Windows (n,) of pushes whose contact moves along the edge by less than 15 % of the tip's path."""
+    step = np.diff(table.inputs[:, 1], append=table.inputs[-1:, 1])
+    along = rig.outline.perimeter * (step - np.round(step)) + rig.pusher_radius * table.outcomes[:, 2]
+    slides = np.abs(along) > 0.15 * table.inputs[:, 0] * table.duration
+    last = np.append(table.push_id[1:] != table.push_id[:-1], True)
+    sliding = np.unique(table.push_id[slides & ~last])
+    return np.asarray(~np.isin(table.push_id, sliding))
+
+
+# --- signs -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize(
+    ("change", "finding"),
+    [
+        (lambda table: changed(table, dy=-1.0, dtheta=-1.0), "table_mirrored"),
+        (lambda table: changed(table, dy=-1.0), "dy_sign"),
+        (lambda table: changed(table, dtheta=-1.0), "dtheta_sign"),
+    ],
+)
+def test_a_mirrored_table_is_named(name: str, change: Change, finding: str) -> None:
+    (found,) = check_table(change(table_of(name)), rig_of(name))
+    assert (found.name, found.severity) == (finding, "warning")
+    assert all(value.value < -0.9 for value in found.values.values())
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_without_a_rig_the_sign_of_dy_is_checked(name: str) -> None:
+    assert check_table(table_of(name)) == ()
+    (found,) = check_table(changed(table_of(name), dy=-1.0, dtheta=-1.0))
+    assert found.name == "dy_sign"
+
+
+def test_clockwise_contacts_and_angles_are_named() -> None:
+    table, rig = table_of("square_abs_test"), rig_of("square_abs_test")
+    assert [each.name for each in check_table(clockwise_contacts(table), rig)] == ["dtheta_sign"]
+    assert "dy_sign" in [each.name for each in check_table(changed(table, angle=-1.0))]
+    seen_from_below = clockwise_contacts(changed(table, -1.0, -1.0, -1.0))
+    assert check_table(seen_from_below, rig) == ()  # consistent in itself, and the square is symmetric
+
+
+def test_few_rows_or_rows_in_the_friction_cone_decide_nothing() -> None:
+    wrong = changed(table_of(TRAIN), dy=-1.0)
+    steep = np.flatnonzero(np.abs(wrong.inputs[:, 2]) > np.radians(30.0))
+    assert check_table(wrong.take(steep[:9])) == () != check_table(wrong.take(steep[:10]))
+    assert check_table(wrong.take(np.abs(wrong.inputs[:, 2]) < np.radians(24.0))) == ()
+
+
+def test_outcomes_of_either_sign_are_no_finding() -> None:
+    """A sign is wrong only if most of dy is."""
+    table = table_of(TRAIN)
+    signs = np.where(np.arange(len(table)) % 10 < 6, -1.0, 1.0)
+    assert check_table(replace(table, outcomes=table.outcomes * np.column_stack([signs**2, signs, signs]))) == ()
+
+
+def test_the_heading_of_a_circle_is_checked_by_its_windows() -> None:
+    """Its contacts lie on the outline, whatever the heading is."""
+    recording = read_recording(REPOSITORY / "bags" / "circle_pu")
+    found = checked_recording(mirrored(recording, 1.0, -1.0)).findings
+    assert [each.name for each in found if each.severity == "warning"] == ["dtheta_sign"]
+
+
+# --- units -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize(
+    ("columns", "finding"),
+    [
+        (([1e3, 1.0, 1.0], 1.0, [1.0, 1.0, 1.0]), "units_velocity"),
+        (([1.0, 1.0, 1.0], 1e3, [1.0, 1.0, 1.0]), "units_duration"),
+        (([1.0, 1.0, 1.0], 1.0, [1e3, 1e3, 1.0]), "units_dx"),
+        (([1.0, 1.0, 1.0], 1.0, [1.0, 1.0, 180.0 / np.pi]), "units_dtheta"),
+    ],
+)
+def test_a_table_in_other_units_is_refused_by_column(
+    name: str, columns: tuple[list[float], float, list[float]], finding: str
+) -> None:
+    inputs, duration, outcomes = columns
+    table = table_of(name)
+    wrong = PushTable(
+        table.inputs * inputs, table.duration * duration, table.outcomes * outcomes, table.push_id, table.covariates
+    )
+    assert [(each.name, each.severity) for each in check_table(wrong, rig_of(name))] == [(finding, "refused")]
