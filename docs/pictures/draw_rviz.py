@@ -49,6 +49,7 @@ PUBLISHER = Path(__file__).with_name("publish_ros1.py")
 KIND = "off centre"  # of KINDS in examples/draw_markers.py
 POSES = ("slider/pose", "pusher/pose")
 DISPLAY, STARTUP, DRAWING = ":87", 4.0, 15.0  # X display; s
+IN_RVIZ_1 = {"rviz_default_plugins/Wrench": "rviz/WrenchStamped", "rviz_default_plugins": "rviz", "rviz_common": "rviz"}
 TOPIC_OF = {"rviz/MarkerArray": "Marker Topic"}  # its name in RViz 1; Topic for the others
 
 
@@ -174,7 +175,10 @@ def _renamed(value: Any) -> Any:
         return {name: _renamed(item) for name, item in value.items()}
     if isinstance(value, list):
         return [_renamed(item) for item in value]
-    return value.replace("rviz_default_plugins", "rviz").replace("rviz_common", "rviz") if type(value) is str else value
+    if isinstance(value, str):
+        for name, other in IN_RVIZ_1.items():
+            value = value.replace(name, other)
+    return value
 
 
 def _free_port() -> int:
