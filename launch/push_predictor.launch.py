@@ -14,7 +14,7 @@
 
 """Start predict_server, push_validator and, for a recording, push_replay; with rviz:=true also RViz2.
 
-ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
+ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=default
 
 docs/how_to/visualisation.md describes what RViz2 displays.
 """

@@ -51,6 +51,7 @@ def test_the_shell_parses_it_and_every_tool_is_one_that_jazzy_has():
     subprocess.run(["sh", "-n", str(SCRIPT)], check=True)
     assert {call[0] for call in CALLS} == TOOLS
     assert set(words_after("sudo", "apt", "install", "-y")) == OF_UBUNTU
+    assert words_after("export") == ["PIP_BREAK_SYSTEM_PACKAGES=1"]  # pip refuses Ubuntu's Python without it
     assert words_after("colcon", "build") == ["--packages-up-to", "push_predictor"]
 
 
@@ -88,3 +89,18 @@ def test_the_launch_file_takes_its_arguments(monkeypatch: pytest.MonkeyPatch):
     recording = Path(given["recording"].replace("$PWD", str(REPOSITORY)))
     assert (recording / "metadata.yaml").is_file() and float(given["rate"]) > 0.0
     assert given["model"] == SHIPPED  # nothing is trained before
+
+
+def test_every_documented_launch_names_a_file_and_its_arguments(monkeypatch: pytest.MonkeyPatch):
+    install_fake_launch(monkeypatch)
+    accepted = {
+        path.name: {argument for argument, _, _ in load_launch_file(path)["ARGUMENTS"]}
+        for path in (REPOSITORY / "launch").glob("*.launch.py")
+    }
+    documents = [*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")]
+    text = "\n".join(path.read_text().replace("\\\n", " ") for path in documents)
+    calls = re.findall(r"ros2 launch push_predictor (\w+\.launch\.py)([^`\n]*)", text)
+    assert len(calls) > 8
+    for name, words in calls:
+        given = set(re.findall(r"(\w+):=", words)) - {"recrding"}  # the example of what is refused
+        assert given <= accepted[name], words

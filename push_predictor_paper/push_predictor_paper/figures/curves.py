@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing
 
@@ -93,7 +93,7 @@ def paint_panels(figure: Figure, rows: Sequence[Sequence[Panel]]) -> None:
         ax.set_xticks(sizes, [str(n) for n in sizes])
         ax.xaxis.minorticks_off()
     handles, names = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=max(len(names), 1), handlelength=2.6)
+    outside_legend(figure, handles, names, side="above", ncols=max(len(names), 1), handlelength=2.6)
 
 
 def _paint(ax: Axes, panel: Panel) -> None:

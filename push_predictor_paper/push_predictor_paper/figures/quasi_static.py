@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.data.time_scaled import TURN
 from push_predictor_paper.estimate import Estimate
@@ -63,7 +63,7 @@ def paint_quasi_static(
         _paint_curves(ax, tops, curves)
         ax.set(title=title, xlabel="top speed of the training pushes (mm/s)", ylabel="NMSE, sum of 3")
     handles, labels = first.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=2.6)
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels), handlelength=2.6)
     _paint_map(figure, third, tops, single)
     _paint_departure(fourth, speeds, departures, levels)
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import grid
+from push_predictor.reporting.canvas import grid, outside_legend
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.figures.curves import KIND_LOOKS, TICKS
 
@@ -60,7 +60,7 @@ def paint_speed_error(figure: Figure, curves: Sequence[SpeedCurve], names: Mappi
     for ax in axes[1:]:
         ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=2.6)
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels), handlelength=2.6)
 
 
 def _paint(ax: Axes, curve: SpeedCurve, points: Sequence[Estimate], unit: float, name: str) -> None:
