@@ -22,10 +22,10 @@ from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
-import pyarrow
 import pytest
-from pyarrow import parquet
 
+pyarrow = pytest.importorskip("pyarrow", reason="rosdep has no key of pyarrow: pip install pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("rosbags")
 from lab_bags import pose_rows
 from test_lab_topics import assert_same_windows, original

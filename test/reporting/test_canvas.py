@@ -50,4 +50,4 @@ def test_no_axes_reach_into_the_legend(side: str, tmp_path: Path):
 def test_no_figure_uses_what_came_with_matplotlib_3_7():
     for room in ("push_predictor", "push_predictor_paper", "examples"):
         for path in (REPOSITORY / room).rglob("*.py"):
-            assert 'loc="outside' not in path.read_text() and "legend_handles" not in path.read_text(), path
+            assert 'loc="outside' not in path.read_text() and ".legend_handles" not in path.read_text(), path
