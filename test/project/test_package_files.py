@@ -200,7 +200,7 @@ def test_rosdep_knows_every_key_and_no_rule_is_left_over():
 # --- changelogs and headers ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.filterwarnings("ignore:nodes.Node.traverse:DeprecationWarning")  # of catkin_pkg
+@pytest.mark.filterwarnings("ignore:nodes.Node.traverse")  # of catkin_pkg
 @pytest.mark.parametrize("name", FOLDERS)
 def test_the_changelog_has_the_version_and_can_be_released(name: str):
     text = (FOLDERS[name] / "CHANGELOG.rst").read_text()
