@@ -104,16 +104,20 @@ def _lay_out(figure: Figure) -> None:
         figure.set_layout_engine("none")
 
 
-def outside_legend(figure: Figure, handles: Iterable[Any], labels: Iterable[str], side: str, **looks: float) -> Legend:
+def outside_legend(
+    figure: Figure, handles: Iterable[Any], labels: Iterable[str], *, side: str, **looks: float
+) -> Legend:
     """Add a legend next to all axes, and leave room for it. side: above, below or right of them.
 
     As the places "outside ..." of matplotlib 3.7 do; Ubuntu 24.04 has 3.6.
     """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     places = {"above": "upper center", "below": "lower center", "right": "upper right"}
     legend = figure.legend(list(handles), list(labels), loc=places[side], **looks)
     engine = figure.get_layout_engine()
-    if engine is not None:
-        box = legend.get_window_extent(figure.canvas.get_renderer())
+    if isinstance(engine, ConstrainedLayoutEngine):
+        box = legend.get_window_extent()
         pad = LEGEND_PAD * figure.dpi
         width, height = (box.width + pad) / figure.bbox.width, (box.height + pad) / figure.bbox.height
         rooms = {"above": (0, 0, 1, 1 - height), "below": (0, height, 1, 1 - height), "right": (0, 0, 1 - width, 1)}
