@@ -125,5 +125,5 @@ def _frame(ax: Axes, speeds: Sequence[float]) -> None:
     ax.set_xscale("log")
     ticks = [tick for tick in (10, 20, 50, 100, 200, 500) if tick <= 1.01e3 * max(speeds)]
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
-    ax.xaxis.minorticks_off()
+    ax.set_xticks([], minor=True)
     ax.axvspan(1e3 * TURN[0], 1e3 * TURN[1], color="0.88", linewidth=0.0, zorder=0)
