@@ -1,3 +1,17 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The ROS package push_predictor (ament_python), installable by pip and by colcon alike."""
 
 from glob import glob
@@ -36,7 +50,7 @@ setup(
         (f"share/{NAME}/config", glob("config/*")),
         (f"share/{NAME}/resource", glob("resource/*.pushmodel")),
         # pip puts the executables into bin/ only; `ros2 run` looks here
-        (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
+        (f"lib/{NAME}", [f"scripts/run/{executable}" for executable in (NAME, *NODES)]),
     ],
     install_requires=[
         "numpy>=1.24",
@@ -48,7 +62,7 @@ setup(
         "threadpoolctl>=3",
     ],
     extras_require={
-        "report": ["matplotlib>=3.8", "jinja2>=3.1", "rich>=13"],
+        "report": ["matplotlib>=3.6", "jinja2>=3.1", "rich>=13"],
         "live": ["rich>=13"],
         "completion": ["argcomplete>=3"],
         "parquet": ["pyarrow>=14"],
@@ -56,6 +70,7 @@ setup(
         "foreign": ["mujoco>=3.2", "mcap-ros2-support>=0.5", "rosbags>=0.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
+            "catkin_pkg>=1",
             "pytest>=8",
             "pytest-xdist>=3.5",
             "hypothesis>=6",

@@ -29,7 +29,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import rclpy
@@ -51,7 +51,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
 PICTURE, MODEL = ROOT / "docs" / "pictures" / "markers.png", LOGS / "vhgp.pushmodel"
-RATE, PATIENCE = 10.0, 180.0  # recorded seconds per second; s
+RATE, PATIENCE = 10.0, 300.0  # recorded seconds per second; s
+QUIET = 20.0  # s without a window after the replay: the validator may be behind on a busy machine
 SIDE, BELOW, ABOVE = 0.086, 0.092, 0.106  # m shown to the sides of, below and above the slider's centre
 COLUMNS, WIDTH = 3, 9.0  # inches
 CAPTION, FOOT = 0.25, 0.42  # inches
@@ -91,26 +92,35 @@ class Listener:
         self.finished = message.data == "finished"
 
 
+Heard = TypeVar("Heard", bound=Listener)
+
+
 def main(arguments: Sequence[str] = ()) -> int:
     """Record the markers of a replay and draw six of them."""
+    picture, model = (Path(text) for text in (*arguments, *map(str, (PICTURE, MODEL)[len(arguments) :])))
+    received = record_replay(model, Listener)
+    chosen = choose(received, load_rig_for([HELD_OUT]).outline)
+    draw_windows(picture, chosen)
+    print(picture)
+    return 0
+
+
+def record_replay(model: Path, listen: Callable[[rclpy.node.Node], Heard]) -> Heard:
+    """Replay the held-out recording for a model, which is trained if its file does not exist: all that was heard."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    picture, model = (Path(text) for text in (*arguments, *map(str, (PICTURE, MODEL)[len(arguments) :])))
     LOGS.mkdir(parents=True, exist_ok=True)
     if not model.exists():
         command = ["train", str(TRAINING), "--kind", "vhgp", "--mean", "zero", "--out", str(model)]
         subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
-    with _subscribed() as (received, spin), ExitStack() as running:
+    with _subscribed(listen) as (received, spin), ExitStack() as running:
         running.enter_context(node("predict_server", {"models": [str(model)]}))
         running.enter_context(node("push_validator", {"model": str(model)}))
         replay = {"recording": str(HELD_OUT), "play.rate": RATE, "wait_for_subscribers": 30.0}
         running.enter_context(node("push_replay", replay))
         _receive_all(received, spin)
     print(f"Received the markers of {len(received.markers)} windows.")
-    chosen = choose(received, load_rig_for([HELD_OUT]).outline)
-    draw_windows(picture, chosen)
-    print(picture)
-    return 0
+    return received
 
 
 def choose(received: Listener, outline: Outline) -> list[tuple[str, MarkerArray]]:
@@ -184,9 +194,9 @@ def _centre(array: MarkerArray) -> np.ndarray:
 
 
 def _receive_all(received: Listener, spin: Callable[[float], None]) -> None:
-    """Spin until the replay has finished and no window has arrived for two seconds."""
+    """Spin until the replay has finished and no window has arrived for QUIET seconds."""
     deadline, last, count = time.monotonic() + PATIENCE, time.monotonic(), 0
-    while not received.finished or time.monotonic() - last < 2.0:
+    while not received.finished or time.monotonic() - last < QUIET:
         spin(0.1)
         if len(received.markers) != count:
             last, count = time.monotonic(), len(received.markers)
@@ -195,13 +205,13 @@ def _receive_all(received: Listener, spin: Callable[[float], None]) -> None:
 
 
 @contextmanager
-def _subscribed() -> Iterator[tuple[Listener, Callable[[float], None]]]:
+def _subscribed(listen: Callable[[rclpy.node.Node], Heard]) -> Iterator[tuple[Heard, Callable[[float], None]]]:
     rclpy.init()
     subscriber_node = rclpy.create_node("draw_markers")
     executor = SingleThreadedExecutor()
     executor.add_node(subscriber_node)
     try:
-        yield Listener(subscriber_node), executor.spin_once
+        yield listen(subscriber_node), executor.spin_once
     finally:
         executor.shutdown()
         subscriber_node.destroy_node()

@@ -27,7 +27,7 @@ from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.planning.choose import Choice
 from push_predictor.planning.goal import Goal
-from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, draw
+from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, draw, outside_legend
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def draw_pushes(path: Path, steps: Sequence[Step], goal: Goal, outline: Outline)
         for axes in panels[len(steps) :]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), markerscale=4.0)
+        outside_legend(figure, handles, labels, side="below", ncols=len(labels), markerscale=4.0)
 
     return draw(path, (3.6 * columns, 3.0 * rows + 0.5), paint)
 

@@ -14,7 +14,7 @@
 
 """Start predict_server, push_validator and, for a recording, push_replay; with rviz:=true also RViz2.
 
-ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
+ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=default
 
 docs/how_to/visualisation.md describes what RViz2 displays.
 """
@@ -37,6 +37,7 @@ from push_predictor.nodes.launch_checks import (
     is_true,
     start_or_refuse,
 )
+from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
 FRAMES = ("wrench_frame", "world_frame")
 TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
@@ -52,7 +53,7 @@ ARGUMENTS = (
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
     ("recording", "", "Recording to replay: a folder, .mcap, .db3 or .bag file. Empty: none, the sensors are live."),
     ("bag", "", "Another name of the argument recording."),
-    ("model", "", "Model file to load and to validate."),
+    ("model", "", "Model file to load and to validate, or default: the simulated one that ships with the package."),
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
     ("output", "", "Folder for the validator's results. Empty: nothing is written."),
     ("rig", "", "push_rig YAML file, for a recording without a push_rig record."),
@@ -109,12 +110,15 @@ def _started(given: dict[str, str]) -> list[Node]:
 
 
 def _server(given: dict[str, str]) -> dict[str, Any]:
-    models = {"models": [_path(given["model"])]} if given["model"] else {}
+    model = given["model"]
+    models = {"models": [SHIPPED if model == SHIPPED else _path(model)]} if model else {}
     return {**models, **_switch(given, "autostart", default=True)}
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
+    if given["model"] == SHIPPED:
+        paths["model"] = Path(DEFAULT_MODEL[-1]).stem  # its name at predict_server
     scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
     found: dict[str, Any] = {**paths, **_streams(given), **_qos(given)}
     return {**found, "scalar_topics": scalars} if scalars else found

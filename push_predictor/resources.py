@@ -22,6 +22,7 @@ from pathlib import Path
 
 from push_predictor.errors import PushPredictorError
 
+SHIPPED = "default"  # in place of the path of a model: the one that ships with the package
 DEFAULT_MODEL = ("resource", "simulated_square_abs.pushmodel")  # of a simulated rig; used unless another model is given
 
 

@@ -35,7 +35,7 @@ from push_predictor.geometry.frames import to_world
 from push_predictor.models.store.model_file import load_model
 from push_predictor.planning.obstacles.around_obstacles import PlannedPushes
 from push_predictor.planning.obstacles.targets import PoseTarget
-from push_predictor.reporting.canvas import OBSERVED, PREDICTED, draw
+from push_predictor.reporting.canvas import OBSERVED, PREDICTED, draw, outside_legend
 from push_predictor.simulation.interactive_rig import push_motion
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
@@ -113,7 +113,7 @@ def _paint(figure: Figure, shown: Problem, pair: list[Repeats]) -> None:
     named = {
         label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    legend = figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=3, markerscale=1.5)
+    legend = outside_legend(figure, named.values(), named.keys(), side="below", ncols=3, markerscale=1.5)
     for handle in legend.legend_handles:
         if handle is not None:
             handle.set_alpha(0.4 if handle.get_label() == "region for the slider's centre" else 1.0)

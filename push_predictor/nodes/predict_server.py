@@ -37,7 +37,7 @@ from msg_adapters.predictions import refuse
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import InactiveError, PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_registry import SHIPPED, ModelRegistry
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server.model_services import handle_list_models, handle_load_model
@@ -52,6 +52,7 @@ from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor.nodes.server.trace_action import TraceAction
 from push_predictor.online.periodic_thread import PeriodicThread
 from push_predictor.online.request_statistics import RequestStatistics
+from push_predictor.resources import SHIPPED
 from push_predictor_interfaces.srv import (
     ListModels,
     LoadModel,

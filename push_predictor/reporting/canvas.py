@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,8 +30,10 @@ from push_predictor.recordings.atomic import write_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
 DPI = 160
+LEGEND_PAD = 0.12  # inches around a legend outside the axes
 LAYOUTS = 2  # the first moves colour bars, which changes their ticks: the second fits
 UNITS = (1e3, 1e3, 180.0 / np.pi)  # factors from m, m, rad to mm, mm, deg
 UNIT_NAMES = ("mm", "mm", "deg")
@@ -100,6 +102,27 @@ def _lay_out(figure: Figure) -> None:
         for _ in range(LAYOUTS):
             engine.execute(figure)
         figure.set_layout_engine("none")
+
+
+def outside_legend(
+    figure: Figure, handles: Iterable[Any], labels: Iterable[str], *, side: str, **looks: float
+) -> Legend:
+    """Add a legend next to all axes, and leave room for it. side: above, below or right of them.
+
+    As the places "outside ..." of matplotlib 3.7 do; Ubuntu 24.04 has 3.6.
+    """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    places = {"above": "upper center", "below": "lower center", "right": "upper right"}
+    legend = figure.legend(list(handles), list(labels), loc=places[side], **looks)
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        box = legend.get_window_extent()
+        pad = LEGEND_PAD * figure.dpi
+        width, height = (box.width + pad) / figure.bbox.width, (box.height + pad) / figure.bbox.height
+        rooms = {"above": (0, 0, 1, 1 - height), "below": (0, height, 1, 1 - height), "right": (0, 0, 1 - width, 1)}
+        engine.set(rect=rooms[side])
+    return legend
 
 
 def output_label(index: int) -> str:

@@ -166,7 +166,10 @@ def test_given_recording_is_checked(tmp_path: Path):
     assert found.state == "missing" and "bad.mcap" in found.found
 
 
-def test_proposed_path_finds_the_executables(monkeypatch: pytest.MonkeyPatch):
+def test_proposed_path_finds_the_executables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in doctor_checks.NODES:  # where pip installs them; colcon has another place
+        (tmp_path / name).touch(mode=0o755)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     note = executables()

@@ -31,6 +31,7 @@ from push_predictor.nodes import predict_server
 from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
+from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 
 FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
 RECORD = REPOSITORY / "launch" / "record.launch.py"
@@ -139,6 +140,12 @@ def test_three_nodes_start_with_their_parameters(launch_file):
         "play.rate": 10.0,
         "wait_for_subscribers": 30.0,
     }
+
+
+def test_default_is_the_shipped_model_for_server_and_validator(launch_file):
+    running = nodes(launch_file, model="default")
+    assert parameters(running["predict_server"]) == {"models": [SHIPPED]}
+    assert parameters(running["push_validator"]) == {"model": share_path(*DEFAULT_MODEL).stem}
 
 
 def test_nodes_declare_and_accept_every_parameter(launch_file):

@@ -22,12 +22,13 @@ from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
-import pyarrow
 import pytest
-from pyarrow import parquet
 
+pytest.importorskip("pyarrow", reason="rosdep has no key of pyarrow: pip install pyarrow")
 pytest.importorskip("rosbags")
+import pyarrow
 from lab_bags import pose_rows
+from pyarrow import parquet
 from test_lab_topics import assert_same_windows, original
 
 from push_predictor.errors import RecordingError

@@ -23,10 +23,8 @@ from push_predictor.errors import ModelFileError, PushPredictorError, UnknownMod
 from push_predictor.models.store.model_file import is_model_file
 from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.resources import DEFAULT_MODEL, share_path
+from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 from push_predictor.types import Array
-
-SHIPPED = "default"  # in place of a path: the model that ships with the package
 
 
 class ModelRegistry:

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from rclpy.service_introspection import ServiceIntrospectionState
 
-from push_predictor.models.store.model_registry import SHIPPED
 from push_predictor.nodes.parameters import Param
+from push_predictor.resources import SHIPPED
 
 INTROSPECTION = {
     "disabled": ServiceIntrospectionState.OFF,

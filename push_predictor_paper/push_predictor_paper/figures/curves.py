@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing
 
@@ -91,9 +91,9 @@ def paint_panels(figure: Figure, rows: Sequence[Sequence[Panel]]) -> None:
     for ax in axes[-1]:
         ax.set_xlabel("training windows n")
         ax.set_xticks(sizes, [str(n) for n in sizes])
-        ax.xaxis.minorticks_off()
+        ax.set_xticks([], minor=True)
     handles, names = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=max(len(names), 1), handlelength=2.6)
+    outside_legend(figure, handles, names, side="above", ncols=max(len(names), 1), handlelength=2.6)
 
 
 def _paint(ax: Axes, panel: Panel) -> None:
@@ -102,7 +102,7 @@ def _paint(ax: Axes, panel: Panel) -> None:
     if panel.ratio:
         ax.set_yscale("log")
         ax.set_yticks(TICKS, [f"{tick:g}" for tick in TICKS])
-        ax.yaxis.minorticks_off()
+        ax.set_yticks([], minor=True)
     if panel.zero:
         ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     for line in panel.lines:

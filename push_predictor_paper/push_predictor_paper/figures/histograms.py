@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, NEARBY, UNIT_NAMES, UNITS, output_label
+from push_predictor.reporting.canvas import COLOURS, NEARBY, UNIT_NAMES, UNITS, output_label, outside_legend
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def paint_histograms(figure: Figure, rows: Sequence[Sequence[Histogram]]) -> Non
         for ax, histogram in zip(axes, histograms, strict=True):
             _paint(ax, histogram)
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    outside_legend(figure, handles, labels, side="above", ncols=3)
 
 
 def shown_values(outcomes: Array) -> Array:

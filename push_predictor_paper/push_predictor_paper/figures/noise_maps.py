@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from push_predictor.evaluation.report.figures.push_maps import ColourScale
-from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
+from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.figures.repetition_maps import paint_map
@@ -75,7 +75,7 @@ def paint_scatter(figure: Figure, reference: RepeatedGrid, others: Mapping[str, 
         ax.set(xlim=ends, ylim=ends, aspect="equal")
     axes[0].set_ylabel("other surface (sd / median)")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), markerscale=2.0)
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels), markerscale=2.0)
 
 
 def paint_ratios(figure: Figure, ratios: Sequence[tuple[str, Array]]) -> None:
@@ -92,7 +92,7 @@ def paint_ratios(figure: Figure, ratios: Sequence[tuple[str, Array]]) -> None:
     ax.set_xticks([1, 3, 10, 30, 100, 300, 1000], ["1", "3", "10", "30", "100", "300", "1000"])
     ax.minorticks_off()
     ax.set_ylabel("cumulative share of pushes (%)")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
+    outside_legend(figure, *ax.get_legend_handles_labels(), side="right")
 
 
 def _standardised(shown: RepeatedGrid, k: int) -> Array:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
+from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.statistics.pit import BARS, EDGES, Histogram
@@ -49,7 +49,7 @@ def paint_pits(figure: Figure, rows: Mapping[str, tuple[Histogram, Histogram]]) 
     for ax in axes[-1]:
         ax.set_xlabel("predicted cumulative probability")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    outside_legend(figure, handles, labels, side="above", ncols=4)
 
 
 def paint_by_speed(figure: Figure, groups: Sequence[str], models: Mapping[str, Sequence[Sequence[Estimate]]]) -> None:
@@ -68,7 +68,7 @@ def paint_by_speed(figure: Figure, groups: Sequence[str], models: Mapping[str, S
         ax.set_xlabel("speed of the push (mm/s)")
     axes[0].set_ylabel("coverage of the 95 % interval")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels))
 
 
 def _paint_bars(ax: Axes, by_push: Histogram, random: Histogram, k: int) -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.data.time_scaled import TURN
 from push_predictor_paper.estimate import Estimate
@@ -63,7 +63,7 @@ def paint_quasi_static(
         _paint_curves(ax, tops, curves)
         ax.set(title=title, xlabel="top speed of the training pushes (mm/s)", ylabel="NMSE, sum of 3")
     handles, labels = first.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=2.6)
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels), handlelength=2.6)
     _paint_map(figure, third, tops, single)
     _paint_departure(fourth, speeds, departures, levels)
 
@@ -125,5 +125,5 @@ def _frame(ax: Axes, speeds: Sequence[float]) -> None:
     ax.set_xscale("log")
     ticks = [tick for tick in (10, 20, 50, 100, 200, 500) if tick <= 1.01e3 * max(speeds)]
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
-    ax.xaxis.minorticks_off()
+    ax.set_xticks([], minor=True)
     ax.axvspan(1e3 * TURN[0], 1e3 * TURN[1], color="0.88", linewidth=0.0, zorder=0)

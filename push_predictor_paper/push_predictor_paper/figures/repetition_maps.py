@@ -25,7 +25,7 @@ from push_predictor.evaluation.report.figures.push_maps import ColourScale, colo
 from push_predictor.evaluation.report.figures.slider import magnification, paint_slider, start_pose
 from push_predictor.geometry.frames import to_world
 from push_predictor.recordings.rig import Rig
-from push_predictor.reporting.canvas import EMPTY, OBSERVED, SYMBOLS, UNIT_NAMES, UNITS
+from push_predictor.reporting.canvas import EMPTY, OBSERVED, SYMBOLS, UNIT_NAMES, UNITS, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.statistics.grid_maps import place_text
@@ -70,8 +70,8 @@ def paint_map_figure(
     for ax in axes[2]:
         ax.set_xlabel("contact, fraction of the side")
     marked = figure.axes[0].plot([], [], "o", markersize=9, markerfacecolor="none", markeredgecolor=OBSERVED)
-    figure.legend(
-        marked, [f"{NAMED[quantity]} by repetitions: the push shown in the middle row"], loc="outside upper center"
+    outside_legend(
+        figure, marked, [f"{NAMED[quantity]} by repetitions: the push shown in the middle row"], side="above"
     )
 
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import grid
+from push_predictor.reporting.canvas import grid, outside_legend
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.figures.curves import KIND_LOOKS, TICKS
 
@@ -56,11 +56,11 @@ def paint_speed_error(figure: Figure, curves: Sequence[SpeedCurve], names: Mappi
     _frame(axes[2], speeds, "bias across the push", "observed − predicted (% of travel)")
     values = [v for curve in curves for e in curve.nmse for v in (e.value, e.low, e.high) if np.isfinite(v) and v > 0]
     axes[0].set_ylim(min(values) / 1.2, max(values) * 1.2)
-    axes[0].yaxis.minorticks_off()
+    axes[0].set_yticks([], minor=True)
     for ax in axes[1:]:
         ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=2.6)
+    outside_legend(figure, handles, labels, side="above", ncols=len(labels), handlelength=2.6)
 
 
 def _paint(ax: Axes, curve: SpeedCurve, points: Sequence[Estimate], unit: float, name: str) -> None:
@@ -77,7 +77,7 @@ def speed_axis(ax: Axes, speeds: Sequence[float]) -> None:
     ticks = [tick for tick in (10, 20, 50, 100, 200, 500) if low <= tick <= high]
     ax.set_xscale("log")
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
-    ax.xaxis.minorticks_off()
+    ax.set_xticks([], minor=True)
     ax.set_xlim(low, high)
 
 

@@ -26,7 +26,7 @@ from push_predictor.evaluation.report.figures.ellipses import ellipse
 from push_predictor.evaluation.report.figures.slider import start_pose
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.recordings.rig import Rig
-from push_predictor.reporting.canvas import COLOURS, START, grid
+from push_predictor.reporting.canvas import COLOURS, START, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.plan import GRID_TRAVEL
 
@@ -59,7 +59,7 @@ def paint_trajectories(figure: Figure, rig: Rig, shown: Sequence[Trajectories]) 
         _alike(row)
         row[0].set_ylabel(name)
     marks = {n: mark for ax in rows[:, 0] for mark, n in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(list(marks.values()), list(marks), loc="outside upper center", ncols=len(marks))
+    outside_legend(figure, list(marks.values()), list(marks), side="above", ncols=len(marks))
 
 
 def _alike(axes: Sequence[Axes]) -> None:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor_paper.estimate import Estimate
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def paint_variants(figure: Figure, sizes: Sequence[int], panels: Mapping[tuple[s
         ax.set_xticks(np.arange(len(sizes)), [str(n) for n in sizes])
         ax.set_xlim(-0.5, len(sizes) - 0.5)
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    outside_legend(figure, handles, labels, side="above", ncols=2)
 
 
 def _paint_curve(ax: Axes, k: int, variant: str, estimates: Sequence[Estimate]) -> None:

@@ -36,6 +36,7 @@ from push_predictor.reporting.canvas import (
     UNITS,
     grid,
     output_label,
+    outside_legend,
 )
 from push_predictor.types import Array, BoolArray
 
@@ -58,7 +59,7 @@ def paint_examples(
     for number, (part, example) in enumerate(zip(parts.ravel(), shown, strict=False)):
         middle: Axes = _paint_example(part, rig, table, comparison, example)
         if number == 0:
-            figure.legend(*middle.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+            outside_legend(figure, *middle.get_legend_handles_labels(), side="below", ncols=3)
 
 
 def paint_ellipse(

@@ -25,7 +25,7 @@ from push_predictor.evaluation.report.figures.ellipses import inside, paint_elli
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.reporting.canvas import OBSERVED, UNITS, grid
+from push_predictor.reporting.canvas import OBSERVED, UNITS, grid, outside_legend
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def paint_tracks(figure: Figure, windows: Sequence[PushWindow], comparison: Comp
     for number, (ax, rows) in enumerate(zip(axes, pushes, strict=True)):
         _paint_track(ax, [windows[row] for row in rows], comparison, rows)
         if number == 0:
-            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+            outside_legend(figure, *ax.get_legend_handles_labels(), side="below", ncols=2)
 
 
 def _paint_track(ax: Axes, windows: Sequence[PushWindow], comparison: Comparison, rows: Sequence[int]) -> None:
