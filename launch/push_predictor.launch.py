@@ -58,7 +58,8 @@ ARGUMENTS = (
     ("slider_topic", "", "The slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. Empty: slider/pose."),
     ("pusher_topic", "", "The pose of the pusher's tip, in the same manner. Empty: pusher/pose."),
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
-    ("wrench_frame", "", "Axes of the wrench: world, or tip for those of the tip's pose. Empty: world."),
+    ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
+    ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
     ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
     ("scalar_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
@@ -113,7 +114,7 @@ def _server(given: dict[str, str]) -> dict[str, Any]:
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
-    texts = (*TOPICS, "wrench_frame", "world_frame")
+    texts = (*TOPICS, "wrench_frame", "wrench_bias", "world_frame")
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
     scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
     found: dict[str, Any] = {**paths, **{name: given[name] for name in texts if given[name]}, **_qos(given)}

@@ -28,13 +28,15 @@ import pytest
 
 pytest.importorskip("rosbags")
 from diagnostic_msgs.msg import DiagnosticStatus
-from lab_bags import Lab, robot_in_tf, short_recording
+from lab_bags import Lab, pose_rows, robot_in_tf, short_recording
 from ros_harness import free_domain, node_process, ros_context
 from sensor_msgs.msg import JointState
+from turning_sensor import MOUNT, add_wrench, measured_at
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
+from push_predictor.recordings.fields.pose_rows import poses_at
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.topics import Topics, save_topics
 from push_predictor.recordings.windows.finder import find_windows
@@ -56,15 +58,22 @@ class Rig:
 
 
 def recorded(folder: Path, tip: str) -> Rig:
-    """Eight seconds of pushes: block as TransformStamped and tip as PoseStamped, or both in tf; and the wrench."""
+    """Eight seconds of pushes: block as TransformStamped and tip as PoseStamped, or both and a sensor in tf."""
     recording = short_recording()
     assert recording.wrench is not None and recording.rig is not None
     lab = robot_in_tf(recording) if tip == TIP else Lab()
     if tip == UR:
         lab.pose(VICON, TRANSFORM, recording.slider, "transform")
         lab.pose(UR, "geometry_msgs/msg/PoseStamped", recording.pusher, "pose")
-    lab.wrench(FORCE, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
-    bag, topics = lab.mcap(folder / "lab", recording.rig), Topics(VICON if tip == UR else "/tf:block", tip, FORCE)
+        lab.wrench(FORCE, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+        topics = Topics(VICON, tip, FORCE)
+    else:
+        stamp, poses = recording.wrench.stamp, pose_rows(recording.pusher)
+        mounted = measured_at(recording.wrench, poses_at(stamp, recording.pusher.stamp, poses))
+        lab.transform("/tf_static", "tip", "ft", stamp[:1], MOUNT)
+        add_wrench(lab, FORCE, stamp, mounted, "ft")
+        topics = Topics("/tf:block", tip, FORCE, wrench_frame="ft")
+    bag = lab.mcap(folder / "lab", recording.rig)
     save_topics(bag, topics)
     (folder / "qos.yaml").write_text("".join(f"{topic}: {{reliability: best_effort}}\n" for topic in (VICON, UR)))
     model = folder / "square.pushmodel"
@@ -74,6 +83,7 @@ def recorded(folder: Path, tip: str) -> Rig:
 
 def parameters(rig: Rig, output: Path) -> dict[str, object]:
     topics = {f"{name}_topic": getattr(rig.topics, name) for name in ("slider", "pusher", "wrench")}
+    topics["wrench_frame"] = rig.topics.wrench_frame
     return {**topics, "model": rig.model, "output": output, "report": False, "diagnostics_period": 0.2}
 
 
@@ -128,6 +138,7 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
         status.wait_for_server()
         with replaying(domain, recording=rig.bag, rate=2.0, **{"play.qos_profile_overrides_path": rig.overrides}):
             process.wait_for_text(WRITTEN, 60.0)
+        assert "Its axes are turned from 'ft' by tf." in process.text()
         assert f"pusher: {TIP}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert process.stop() == 0, process.text()
     assert_same_as_offline(output, rig.model, rig.bag)

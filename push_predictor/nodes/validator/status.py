@@ -117,7 +117,7 @@ def validator_status(
     values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
-        values |= _stream_figures(run) | _scores(run) | {"data check": run.checks.check.result}
+        values |= _stream_figures(run, sensors) | _scores(run) | {"data check": run.checks.check.result}
         values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     return diagnostic_status(name, level, _paragraph([failure, *warnings]) or state, values)
 
@@ -127,10 +127,11 @@ def _paragraph(texts: Sequence[str]) -> str:
     return " ".join(text if text.endswith((".", "?")) else f"{text}." for text in texts if text)
 
 
-def _stream_figures(run: ValidationRun) -> dict[str, object]:
+def _stream_figures(run: ValidationRun, sensors: SensorSubscriber) -> dict[str, object]:
     """Faults by kind, "streams KIND" of all streams and "slider KIND" of one."""
     found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
-    found["contact from"] = "geometry and force" if run.sync.with_wrench else "geometry alone: no wrench received"
+    without = "the wrench waits for its bias" if sensors.waits_for_bias else "no wrench received"
+    found["contact from"] = "geometry and force" if run.sync.with_wrench else f"geometry alone: {without}"
     apart = run.sync.apart()
     found["streams clocks_apart"] = len(apart)
     return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}

@@ -110,7 +110,7 @@ class TopicStream:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
         if self._frame_id and (others := [frame for frame in frames if frame != self._frame_id]):
             names = " and ".join(map(repr, others))
-            wrench = ", or wrench_frame to tip" if self._name == "wrench" else ""
+            wrench = ", or wrench_frame to tip or a frame of tf" if self._name == "wrench" else ""
             return f"frame_id {names} is not accepted, give {self._frame_id!r}, or set world_frame or frame_id{wrench}."
         if monotonic() - self._heard > SILENT:
             return f"No message for over {SILENT:g} s."
