@@ -132,6 +132,8 @@ def _stream_figures(run: ValidationRun, sensors: SensorSubscriber) -> dict[str, 
     found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
     without = "the wrench waits for its bias" if sensors.waits_for_bias else "no wrench received"
     found["contact from"] = "geometry and force" if run.sync.with_wrench else f"geometry alone: {without}"
+    jitter = "regular, in place of stamps with a jitter of {:.2g} ms"
+    found |= {f"{name} stamps": jitter.format(1e3 * value) for name, value in run.stamp_jitter.items()}
     apart = run.sync.apart()
     found["streams clocks_apart"] = len(apart)
     return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}

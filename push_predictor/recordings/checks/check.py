@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import frame_findings
+from push_predictor.recordings.checks.stamps import stamp_findings
 from push_predictor.recordings.checks.units import quaternion_order, stream_units, table_units
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.rig import Rig
@@ -35,7 +36,7 @@ def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
         return tuple(frames) if any(finding.name == "topics_swapped" for finding in frames) else (turned,)
     if any(finding.severity == "refused" for finding in frames):
         return tuple(frames)
-    return (*frames, *wrench_findings(recording, rig))
+    return (*frames, *wrench_findings(recording, rig), *stamp_findings(recording))
 
 
 def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:
