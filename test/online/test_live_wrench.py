@@ -116,6 +116,17 @@ def test_a_sensor_at_a_frame_of_tf_gives_the_wrench_of_the_recording(tmp_path: P
     assert not state.problems and "wrench without pose" not in state.figures()
 
 
+def test_a_sensor_whose_transforms_are_ahead_of_the_tip_waits_for_it(tmp_path: Path) -> None:
+    topics = replace(NAMES, wrench_frame="ft")
+    made = lab(measured_at_mount(wrench(), original().pusher), "ft", True)
+    messages = made.in_order()
+    tips = [message for message in messages if message[1] == TIP]
+    first = [message for message in messages if message[1] != TIP] + tips[: len(tips) // 2]
+    found, _, counts = live([*first, *tips[len(tips) // 2 :]], topics, len(first))
+    assert counts[0] > 50 and counts[1] > 50
+    assert_same(found, read_recording(made.mcap(tmp_path / "lab"), topics=topics).wrench)
+
+
 def test_a_frame_that_tf_does_not_have_is_named_and_its_wrenches_wait() -> None:
     messages = lab(measured_at_mount(wrench(), original().pusher), "ft", True).in_order()
     buffer = TransformBuffer([], "world", "other")
