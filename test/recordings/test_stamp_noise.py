@@ -35,6 +35,7 @@ from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.windows.regular_stamps import AROUND, RegularStamps
@@ -187,6 +188,13 @@ def test_the_stamps_do_not_depend_on_the_portions(sd: float, portion: int) -> No
     assert np.array_equal(regular(stamp, portion), regular(stamp))
 
 
+def test_the_stamps_do_not_depend_on_how_many_are_fitted_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    stamp = noisy(grid(700), 1.0)
+    whole = regular(stamp)
+    monkeypatch.setattr(regular_stamps, "ROWS", 90)
+    assert np.array_equal(regular(stamp), whole)
+
+
 @settings(max_examples=30, deadline=None)
 @given(sd=st.floats(0.0, 6.0), seed=st.integers(0, 9), missing=st.lists(st.integers(0, 699), max_size=60))
 def test_regular_stamps_increase(sd: float, seed: int, missing: list[int]) -> None:
@@ -268,6 +276,7 @@ def scored(sd: float, kind: str = "gaussian") -> tuple[PushTable, Comparison, di
     return table, comparison, metrics_json(comparison)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gaussian", "delay"])
 def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percent(kind: str) -> None:
     clean, (table, _, found) = scored(0.0)[2], scored(2.0, kind)
@@ -276,6 +285,7 @@ def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percen
     assert found["nlpd"]["total"] == pytest.approx(clean["nlpd"]["total"], abs=0.15)
 
 
+@pytest.mark.slow
 def test_the_alarm_stays_silent_with_jitter() -> None:
     calibration = calibrate(model())
     table, comparison, _ = scored(2.0)

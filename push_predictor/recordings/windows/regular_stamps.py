@@ -35,6 +35,7 @@ from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.types import BoolArray, IntArray
 
 AROUND = 50  # samples before and after one that determine its stamp
+ROWS = 4096  # stamps that are fitted at once: each needs its neighbours' in memory, 1 kB a time
 KEPT = max(AROUND, 5 * MOST_WIDTH)  # samples that are kept before those that were not returned yet
 
 
@@ -130,7 +131,9 @@ class _Segment:
         self._count(closed)
         begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
         found = _rows(self._samples, slice(begin, end))
-        regular = self._increasing(_line_at(self._samples.stamp[: len(self._number)], self._number, begin, end))
+        stamp = self._samples.stamp[: len(self._number)]
+        parts = [_line_at(stamp, self._number, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
+        regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
         self._returned = end
         self._forget()
         return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
