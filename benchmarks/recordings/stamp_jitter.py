@@ -91,7 +91,7 @@ def main() -> None:
     parser.add_argument("--no-alarm", action="store_true")
     given = parser.parse_args()
     model = (
-        load_model(given.model) if given.model else train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp")
+        load_model(given.model) if given.model else train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
     )
     calibration = None if given.no_alarm else calibrate(model)
     recording = read_recording(TEST)

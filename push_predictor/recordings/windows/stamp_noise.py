@@ -28,6 +28,7 @@ from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.types import Array, IntArray
 
 SHARE = 0.05  # of the period: less jitter stays, as a window hardly feels it
+LEAST = 0.7e-3  # s; less jitter stays: it moves a tip at 50 mm/s by no more than a tracker's noise
 LARGEST_SHARE = 1.0  # of the period: with more, the order of samples is lost
 FEWEST = 10  # stamps from which jitter is estimated
 DECIDING = 101  # stamps that decide whether a stream has noise
@@ -55,7 +56,7 @@ def stamp_noise(stamp: IntArray) -> StampNoise | None:
     usual = float(np.median(interval[interval > 0.0]))
     # The median ignores gaps. An interval has the noise of two stamps.
     jitter = float(SD * np.median(np.abs(interval - usual)) / np.sqrt(2.0))
-    large = SHARE * usual < jitter <= LARGEST_SHARE * usual
+    large = max(SHARE * usual, LEAST) < jitter <= LARGEST_SHARE * usual
     return StampNoise(usual, jitter, bool(large and _is_regular(interval - usual, LIMIT * jitter)))
 
 
