@@ -17,8 +17,8 @@
 
 The model is trained on bags/square_abs_train unless a file is given, and validated on bags/square_abs_test. Each stream
 gets jitter of its own, independent from sample to sample: Gaussian, or a delay (half-normal) with the same scale.
-Prints, for each jitter, the mean over the seeds of pushes, windows, NMSE and exact NLPD, and the largest
-evidence and how often it fired.
+Prints, for each jitter, the mean over the seeds of pushes, windows, NMSE and exact NLPD, the
+alarm's largest log10 evidence at the end, and how often it fired.
 """
 
 from __future__ import annotations
@@ -91,7 +91,9 @@ def main() -> None:
     parser.add_argument("--no-alarm", action="store_true")
     given = parser.parse_args()
     model = (
-        load_model(given.model) if given.model else train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
+        load_model(given.model)
+        if given.model
+        else train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
     )
     calibration = None if given.no_alarm else calibrate(model)
     recording = read_recording(TEST)
