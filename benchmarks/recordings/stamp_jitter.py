@@ -90,11 +90,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--no-alarm", action="store_true")
     given = parser.parse_args()
-    model = (
-        load_model(given.model)
-        if given.model
-        else train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
-    )
+    model = load_model(given.model) if given.model else _trained()
     calibration = None if given.no_alarm else calibrate(model)
     recording = read_recording(TEST)
     print("jitter ms, stamps, pushes, windows, NMSE, NLPD, largest log10 evidence, alarms")
@@ -115,6 +111,10 @@ def _line(jitter: str, stamps: str, found: list[list[float]]) -> None:
         f"{jitter}, {stamps}, {pushes.mean():.0f}, {windows.mean():.0f}, {spread}, {nlpd.mean():.3f}, {alarm}",
         flush=True,
     )
+
+
+def _trained() -> PushModel:
+    return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
 
 
 if __name__ == "__main__":
