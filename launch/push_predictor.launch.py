@@ -60,7 +60,8 @@ ARGUMENTS = (
     ("slider_topic", "", "The slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. Empty: slider/pose."),
     ("pusher_topic", "", "The pose of the pusher's tip, in the same manner. Empty: pusher/pose."),
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
-    ("wrench_frame", "", "Axes of the wrench: world, or tip for those of the tip's pose. Empty: world."),
+    ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
+    ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
     ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
     ("scalar_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
@@ -120,7 +121,8 @@ def _validator(given: dict[str, str]) -> dict[str, Any]:
     if given["model"] == SHIPPED:
         paths["model"] = Path(DEFAULT_MODEL[-1]).stem  # its name at predict_server
     scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
-    found: dict[str, Any] = {**paths, **_streams(given), **_qos(given)}
+    bias = {"wrench_bias": given["wrench_bias"]} if given["wrench_bias"] else {}
+    found: dict[str, Any] = {**paths, **_streams(given), **bias, **_qos(given)}
     return {**found, "scalar_topics": scalars} if scalars else found
 
 

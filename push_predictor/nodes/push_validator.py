@@ -65,7 +65,8 @@ class PushValidator(Node):
         self._rigs = RigSource(self, values["rig"])
         self._writer = ResultWriter(values["output"], self.get_logger())
         given = {name: values[f"{name}_topic"] for name in STREAMS}
-        topics = Topics(**given, world=values["world_frame"], wrench_frame=values["wrench_frame"])
+        wrench = {key: values[key] for key in ("wrench_frame", "wrench_bias")}
+        topics = Topics(**given, **wrench, world=values["world_frame"])
         self._sensors = SensorSubscriber(self, topics, values["frame_id"], values["scalar_topics"])
         self._client = PredictionClient(self, values["request_timeout"])
         self._session = Session(values["last_answers"], values["report"])
@@ -148,6 +149,7 @@ class PushValidator(Node):
             output, scalars = self._writer.folder, self._sensors.scalar_names
             if self._run is not None:
                 self._run.checks.check.stop()
+            self._sensors.begin(rig)
             publish, strict = self._results.publish, self._strict
             self._run = ValidationRun(rig, models, self._client, publish, self._alarm, output, scalars, strict)
             self._session.open(monotonic())

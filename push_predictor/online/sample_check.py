@@ -16,22 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields
-from typing import TypeVar
-
-import numpy as np
-
 from push_predictor.online.check_process import CheckProcess
+from push_predictor.online.sensors.portions import joined, set_back
 from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import Recording
 
 FIRST = 1000  # samples of the slider's pose before the first check
 MOST = 50_000  # samples of a stream that are kept: 200 s at 250 Hz, 2 MB
-CLOCK_SET = 1_000_000_000  # ns by which stamps go back where a replay loops
-
-Stream = TypeVar("Stream", PoseStream, WrenchStream)
 
 
 class SampleCheck:
@@ -47,7 +39,7 @@ class SampleCheck:
         """Add a portion of the streams."""
         if not len(samples):
             return
-        if self._portions and _set_back(self._portions[-1].slider, samples.slider):
+        if self._portions and set_back(self._portions[-1].slider, samples.slider):
             self._portions, self._kept = [], 0
         self._portions.append(samples)
         self._kept += len(samples.slider)
@@ -64,16 +56,7 @@ class SampleCheck:
         self.check.start(self._recording(), self._rig)
 
     def _recording(self) -> Recording:
-        slider = _joined([portion.slider for portion in self._portions])
-        pusher = _joined([portion.pusher for portion in self._portions])
-        wrench = _joined([portion.wrench for portion in self._portions])
+        slider = joined([portion.slider for portion in self._portions])
+        pusher = joined([portion.pusher for portion in self._portions])
+        wrench = joined([portion.wrench for portion in self._portions])
         return Recording("samples so far", self._rig, slider, pusher, wrench if len(wrench) else None)
-
-
-def _set_back(before: PoseStream, after: PoseStream) -> bool:
-    return len(before) > 0 and len(after) > 0 and int(before.stamp[-1]) - int(after.stamp[0]) > CLOCK_SET
-
-
-def _joined(streams: Sequence[Stream]) -> Stream:
-    first = streams[0]
-    return type(first)(*(np.concatenate([getattr(s, field.name) for s in streams]) for field in fields(first)))

@@ -20,11 +20,12 @@ import struct
 import threading
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from push_predictor.online.message_buffer import LIMIT
+from push_predictor.recordings.fields.sources import FieldReader
 from push_predictor.recordings.samples import check_samples, scalar_rules
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.types import BoolArray
@@ -63,14 +64,16 @@ class ClockHistory:
 class ScalarBuffer:
     """Serialized messages of one scalar topic until they are taken; unusable ones are counted by kind.
 
-    kind: one of the types that a recording's scalars have. Beyond LIMIT the oldest messages are dropped and counted.
+    kind: one of the types that a recording's scalars have; another type needs the reader of a field. Beyond LIMIT the
+    oldest messages are dropped and counted.
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, reader: FieldReader | None = None) -> None:
         self.kind = kind
         self.received = 0
         self.rejected: Counter[str] = Counter()
-        self._rules = scalar_rules(kind)
+        self._reader = reader
+        self._rules = scalar_rules(kind if reader is None else reader.target.type)
         self._waiting: list[tuple[bytes, int]] = []
         self._lock = threading.Lock()
 
@@ -80,7 +83,7 @@ class ScalarBuffer:
     @property
     def timed(self) -> bool:
         """Whether messages contain their time."""
-        return self._rules.layout.header
+        return self._rules.layout.header if self._reader is None else self._reader.timed
 
     def put(self, data: bytes, sent: int) -> None:
         """Add a message and the time (ns) at which it was sent, from any thread."""
@@ -100,7 +103,10 @@ class ScalarBuffer:
         with self._lock:
             count = len(self._waiting) if self.timed else sum(sent < until for _, sent in self._waiting)
             taken, self._waiting = self._waiting[:count], self._waiting[count:]
-        checked = check_samples([data for data, _ in taken], self._rules)
+        messages: Sequence[bytes] = [data for data, _ in taken]
+        if self._reader is not None:
+            messages = self._reader.read(messages, [sent for _, sent in taken])
+        checked = check_samples(messages, self._rules)
         self.rejected.update(checked.rejected)
         dated = [NEVER if (time := time_of(sent)) is None else time for _, sent in taken] if not self.timed else ()
         stamp = checked.stamp if self.timed else np.array(dated, dtype=np.int64)

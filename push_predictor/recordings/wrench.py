@@ -25,8 +25,8 @@ import numpy as np
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.fields.pose_rows import normalised, poses_at
 from push_predictor.recordings.fields.transforms import WORLD, TransformError, TransformTree
-from push_predictor.recordings.fields.wrench_axes import about_points, in_world_axes
-from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias
+from push_predictor.recordings.fields.wrench_axes import at_tip
+from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.samples import UsableSamples, has_orientation, upright, wrench_stream
 from push_predictor.recordings.streams import WrenchStream
 from push_predictor.recordings.topics import FREE_MOTION, NO_BIAS, TIP_AXES, WORLD_AXES, Topics
@@ -84,8 +84,7 @@ def read_wrench(
         notes.append(f"{wrench.topic}: {without} samples outside the time, or in a dropout, of their frame; discarded")
     kept = wrench._replace(stamp=wrench.stamp[known], values=wrench.values[known])
     values, bias = _without_bias(kept, sensor[known], context, notes)
-    turned = in_world_axes(values, sensor[known])
-    return wrench_stream(kept.stamp, about_points(turned, sensor[known, :3], tip[known, :3])), bias
+    return wrench_stream(kept.stamp, at_tip(values, sensor[known], tip[known])), bias
 
 
 def _without_bias(
@@ -97,8 +96,7 @@ def _without_bias(
     if context.free is None:
         notes.append(f"{wrench.topic}: the bias is not subtracted: free motion is found with a rig, and there is none")
         return wrench.values, None
-    # A planar sensor may report no other numbers.
-    values = wrench.values if poses is not None else np.where(np.isfinite(wrench.values), wrench.values, 0.0)
+    values = wrench.values if poses is not None else with_planar_numbers(wrench.values)
     try:
         bias = estimate_bias(wrench.stamp, values, context.free(wrench.stamp), poses)
     except BiasError as error:

@@ -24,14 +24,16 @@ import pytest
 
 pytest.importorskip("rosbags")
 from diagnostic_msgs.msg import DiagnosticStatus
-from lab_bags import LABORATORY, Lab, laboratory, robot_in_tf, short_recording, write_db3
+from lab_bags import LABORATORY, Lab, laboratory, pose_rows, robot_in_tf, short_recording, write_db3
 from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from standard_interfaces import provide_interfaces
+from turning_sensor import MOUNT, add_wrench, measured_at
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
+from push_predictor.recordings.fields.pose_rows import poses_at
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.topics import STREAMS, Topics, save_topics
 from push_predictor.recordings.windows.finder import find_windows
@@ -39,7 +41,7 @@ from push_predictor.recordings.windows.finder import find_windows
 pytestmark = pytest.mark.slow
 
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
-IN_TF = Topics("/tf:block", "/tf:tip", "/force_torque_sensor_broadcaster/wrench")
+IN_TF = Topics("/tf:block", "/tf:tip", "/force_torque_sensor_broadcaster/wrench", wrench_frame="ft")
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,19 @@ def recorded(folder: Path, lab: Lab, topics: Topics) -> Rig:
 
 
 def robot_with_force() -> Lab:
-    """Block and tip below moving frames of tf, and the wrench."""
+    """Block and tip below moving frames of tf, and a force sensor that is mounted askew on the tip."""
     recording = short_recording()
     assert recording.wrench is not None
-    lab = robot_in_tf(recording)
-    lab.wrench(IN_TF.wrench, recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    lab, stamp = robot_in_tf(recording), recording.wrench.stamp
+    mounted = measured_at(recording.wrench, poses_at(stamp, recording.pusher.stamp, pose_rows(recording.pusher)))
+    lab.transform("/tf_static", "tip", "ft", stamp[:1], MOUNT)
+    add_wrench(lab, IN_TF.wrench, stamp, mounted, "ft")
     return lab
 
 
 def parameters(rig: Rig, output: Path) -> dict[str, object]:
     topics = {f"{name}_topic": getattr(rig.topics, name) for name in STREAMS}
+    topics["wrench_frame"] = rig.topics.wrench_frame
     return {**topics, "model": rig.model, "output": output, "report": False, "diagnostics_period": 0.2}
 
 
@@ -140,6 +145,7 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
         status.wait_for_server()
         with replaying(domain, recording=rig.bag, rate=2.0):
             process.wait_for_text(WRITTEN, 60.0)
+        assert "Its axes are turned from 'ft' by tf." in process.text()
         assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert process.stop() == 0, process.text()
     assert_same_as_offline(output, rig.model, rig.bag)

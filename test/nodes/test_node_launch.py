@@ -88,6 +88,7 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "pusher_topic",
         "wrench_topic",
         "wrench_frame",
+        "wrench_bias",
         "world_frame",
         "scalar_topics",
         "reliability",

@@ -30,14 +30,15 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from replay_bags import stamped, write_bag
+from replay_bags import WRENCH, stamped, write_bag
 from ros_harness import free_domain, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Temperature
-from std_msgs.msg import Float32, Float64, String
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float32, Float64, Float64MultiArray, String
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from msg_adapters.residual_schema import RESIDUAL_TYPE
+from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
@@ -49,6 +50,7 @@ from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import load_evidence
@@ -58,7 +60,9 @@ pytestmark = pytest.mark.slow
 
 WARMTH, ROD, HUMIDITY, NAME = "/surface/warmth", "/rod/temperature", "/room/humidity", "/rod/name"
 OURS = (WARMTH, ROD, HUMIDITY)
-ASKED = ["surface/warmth", "/rod/temperature", "room/humidity", "rod/name", "nowhere"]
+FIELD = "/fan/load.wrench.torque.y"  # of a type that is no scalar's
+PLAYED = "/fan/load/wrench/torque/y"  # what a player can publish
+ASKED = ["surface/warmth", "/rod/temperature", "room/humidity", "rod/name", "nowhere", "fan/load.wrench.torque.y"]
 SECOND = 10**9
 
 
@@ -89,6 +93,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         messages.append((ROD, "sensor_msgs/msg/Temperature", time + 10**6, stamped(time, [20.0 + rng.normal(), 0.0])))
     for at in np.arange(0.3, lasts, 7.0):
         messages.append((HUMIDITY, "std_msgs/msg/Float32", begin + int(at * SECOND), float32(rng.normal())))
+    for at in np.arange(0.2, lasts, 0.13):
+        time, load = begin + int(at * SECOND), [0.0, 0.0, 0.0, 0.0, rng.normal(), 0.0]
+        messages.append(("/fan/load", WRENCH, time + 10**6, stamped(time, load)))
     name = b"\0\1\0\0" + struct.pack("<I", 4) + b"rod\0"
     messages.append((NAME, "std_msgs/msg/String", begin + SECOND, name))
     messages.sort(key=lambda message: message[2])
@@ -138,9 +145,10 @@ def watched(recording: Path, model: Path, tmp_path_factory: pytest.TempPathFacto
 
 
 def test_windows_have_the_scalar_values_of_reading_the_recording(watched: Watched, recording: Path) -> None:
-    online, offline = load_data([watched.output / "pushes.csv"]), load_data([recording])
+    online = load_data([watched.output / "pushes.csv"])
+    offline = load_data([recording], topics=Topics(covariates=(FIELD,)))
     assert online.push_id.tolist() == offline.push_id.tolist()
-    for topic in OURS:
+    for topic in (*OURS, FIELD):
         found, expected = online.covariates[f"topic:{topic}"], offline.covariates[f"topic:{topic}"]
         assert np.ptp(expected) > 0.1
         assert np.max(np.abs(found - expected)) < 1e-9, topic
@@ -162,7 +170,7 @@ def test_a_model_that_needs_a_topic_scores_as_offline(watched: Watched, model: P
 def test_the_bag_of_residuals_has_the_scalar_values_at_the_windows_starts(watched: Watched, recording: Path) -> None:
     windows = find_windows(read_recording(recording), load_rig_for([recording]))
     topics = open_bag(watched.output / "residuals").topics
-    assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys(OURS, "std_msgs/msg/Float64")}
+    assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys((*OURS, PLAYED), "std_msgs/msg/Float64")}
     for topic in (WARMTH, HUMIDITY):
         written = [m for m in open_bag(watched.output / "residuals").messages() if m.topic == topic]
         assert [m.log_time for m in written] == [window.start for window in windows]
@@ -174,7 +182,7 @@ def test_topics_without_samples_are_named(watched: Watched) -> None:
     for topic in (*OURS, "/nowhere"):
         assert f"Scalar topic {topic} has no publisher." in watched.before
     assert "Scalar topic /nowhere has no publisher." in watched.message
-    wrong = f"Scalar topic {NAME} has type std_msgs/msg/String. Accepted: std_msgs/msg/Float64"
+    wrong = "scalar_topics 'rod/name': rod/name is of type 'std_msgs/msg/String'; no field of it is a number"
     assert any(wrong in message for message in watched.messages), "while it was published"
     assert not any(f"Scalar topic {topic}" in watched.message for topic in OURS)
     counts = [int(watched.values[f"topic:{topic} samples"]) for topic in OURS]
@@ -182,11 +190,11 @@ def test_topics_without_samples_are_named(watched: Watched) -> None:
     assert not any("rejected" in key and key.startswith("topic:") for key in watched.values)
 
 
-@pytest.mark.parametrize("names", [["warmth", "/warmth"], ["~/warmth"], ["1 warmth"]])
+@pytest.mark.parametrize("names", [["warmth", "/warmth"], ["~/warmth"], ["1 warmth"], ["/tf:tip"], ["warmth."]])
 def test_rejects_invalid_topic_names(names: list[str]) -> None:
-    with node_process("push_validator", domain=free_domain(), params={"scalar_topics": names}) as process:
-        assert process.wait(30.0) == 1
-        assert f"scalar_topics: {names[0]!r} is not accepted" in process.text()
+    with ros_context(free_domain()) as node, pytest.raises(RequestError, match="is not accepted, give") as raised:
+        ScalarSubscriber(node, names)
+    assert f"scalar_topics: {names[0]!r}" in str(raised.value)
 
 
 # --- the subscriber alone --------------------------------------------------------------------------------------------
@@ -249,6 +257,7 @@ def test_subscribes_to_a_later_topic_with_the_qos_of_its_publisher(
     gathered = Gathered(subscriber, "/warmth")
     with offered(talker, String, QoSProfile(depth=10)):
         assert gathered.has(lambda _: "std_msgs/msg/String" in subscriber.problems()[0])
+        assert "scalar_topics 'warmth': " in subscriber.problems()[0]
     message = Temperature(temperature=21.5)
     message.header.stamp.sec = 7
     with offered(talker, Temperature, profile) as publisher:
@@ -278,6 +287,31 @@ def publishing(publisher: Any, message: Any, value: float) -> Callable[[Gathered
         return value in so_far.value
 
     return received
+
+
+def test_a_field_of_any_type_is_a_scalar(listener: Node, talker: Node) -> None:
+    subscriber = ScalarSubscriber(listener, ["warmth.position[1]"])
+    gathered = Gathered(subscriber, "/warmth.position[1]")
+    with offered(talker, Temperature, QoSProfile(depth=10)):
+        assert gathered.has(
+            lambda _: "and has no number in field 'position[1]', give one of" in subscriber.problems()[0]
+        )
+    message = JointState(position=[0.5, 1.5])
+    message.header.stamp.sec = 7
+    with offered(talker, JointState, QoSProfile(depth=10)) as publisher:
+        assert gathered.has(publishing(publisher, message, 1.5))
+        assert {*gathered.value} == {1.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problems()
+
+
+def test_a_field_without_a_header_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
+    subscriber = ScalarSubscriber(listener, ["warmth.data[0]"])
+    publisher = talker.create_publisher(Float64MultiArray, "warmth", kept())
+    begin = talker.get_clock().now().nanoseconds
+    publisher.publish(Float64MultiArray(data=[1.0, 2.0]))
+    end = talker.get_clock().now().nanoseconds
+    gathered = Gathered(subscriber, "/warmth.data[0]")
+    assert gathered.has(lambda so_far: bool(so_far.value))
+    assert gathered.value == [1.0] and begin <= gathered.stamp[0] <= end
 
 
 def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:

@@ -23,7 +23,7 @@ from time import time_ns
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import PoseStamped, PoseWithCovariance, TransformStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovariance, TransformStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from planar_messages import pose_message
 from rclpy.event_handler import PublisherEventCallbacks
@@ -214,7 +214,9 @@ def test_rejects_what_is_no_source(listener: Node, topics: Topics) -> None:
         SensorSubscriber(listener, topics, "world")
 
 
-def test_tf_without_its_package_is_refused_by_name(listener: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tf_without_its_package_is_refused_by_name(
+    listener: Node, talker: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("tf2_msgs", "tf2_msgs.msg"):
         monkeypatch.setitem(sys.modules, name, None)
     with subscriber(listener, Topics(slider="/tf:block", pusher="/tf:tool0"), "world") as sensors:
@@ -223,3 +225,14 @@ def test_tf_without_its_package_is_refused_by_name(listener: Node, monkeypatch: 
         assert sensors._tf["/tf"].buffer.world == sensors.world == "world", "as the headers of the slider"
         sensors.inspect()
         assert sensors.refused and any("/tf:tool0: type tf2_msgs/msg/TFMessage is not" in t for t in sensors.problems())
+    topics = Topics(wrench_frame="ft", wrench_bias="free_motion")
+    with subscriber(listener, topics, "world") as sensors, offered(talker, "pusher/wrench", RELIABLE, WrenchStamped):
+
+        def refused() -> bool:
+            sensors.look()
+            sensors.inspect()
+            return sensors.refused
+
+        assert wait_until(refused) and "type tf2_msgs/msg/TFMessage is not" in str(sensors.figures()["wrench topic"])
+        assert sensors.world == "world" and not sensors.waits_for_bias
+        assert sensors.figures()["wrench bias"] == "not known yet: too few samples"

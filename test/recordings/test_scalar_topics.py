@@ -21,11 +21,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from replay_bags import stamped
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.online import scalar_buffer, stream_sync
 from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.online.stream_sync import Samples, StreamSync
+from push_predictor.recordings.fields.message_text import STANDARD
+from push_predictor.recordings.fields.sources import SCALAR_TARGET, FieldReader
 from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
@@ -187,6 +190,23 @@ def test_messages_wait_until_their_time_is_known() -> None:
     assert dict(buffer.rejected) == {"without time": 1} and len(buffer) == 2
     assert buffer.take(10**9, lambda sent: sent, None).value.tolist() == [2.0, 3.0]
     assert len(buffer.take(10**9, lambda sent: sent, None)) == 0
+
+
+@pytest.mark.parametrize("kind", ["geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/Wrench"])
+def test_a_field_of_another_type_has_the_stamp_of_its_header_or_the_time_of_its_sending(kind: str) -> None:
+    field = "wrench.torque.y" if kind.endswith("Stamped") else "torque.y"
+    buffer = ScalarBuffer(kind, FieldReader(SCALAR_TARGET, kind, field, STANDARD))
+    numbers = [0.0, 0.0, 0.0, 0.0, 5.0, 0.0]
+    plain = b"\0\1\0\0" + struct.pack("<6d", *numbers)
+    for sent in (10, 30):
+        buffer.put(stamped(7 * SECOND, numbers) if buffer.timed else plain, sent)
+    taken = buffer.take(20, lambda sent: 1000 + sent, None)
+    assert (taken.stamp.tolist(), taken.value.tolist()) == (
+        ([7 * SECOND] * 2, [5.0] * 2) if buffer.timed else ([1010], [5.0])
+    )
+    buffer.put(b"\0\1", 31)
+    buffer.take(40, lambda sent: sent, None)
+    assert dict(buffer.rejected) == {"unreadable": 1}
 
 
 def test_unusable_messages_are_counted_by_kind() -> None:

@@ -75,7 +75,11 @@ def measured_at_tip(wrench: WrenchStream, pusher: PoseStream, tilt: float = TILT
 
 def measured_at_mount(wrench: WrenchStream, pusher: PoseStream) -> Array:
     """What a sensor at MOUNT above the tip measures (n, 6), its torque about its own origin."""
-    tip = tip_rows(pusher, wrench.stamp)
+    return measured_at(wrench, tip_rows(pusher, wrench.stamp))
+
+
+def measured_at(wrench: WrenchStream, tip: Array) -> Array:
+    """What a sensor at MOUNT above a tip with poses (n, 7) measures (n, 6)."""
     sensor = composed(tip, np.repeat(MOUNT, len(tip), axis=0))
     return in_sensor_axes(about_points(wrench_rows(wrench), tip[:, :3], sensor[:, :3]), sensor)
 

@@ -33,6 +33,7 @@ from push_predictor.nodes.qos import overridden, replay_profile
 from push_predictor.nodes.replay.topic_sender import TopicSender
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.bag.reader import RawMessage
+from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.replay.flow_control import FlowControl
 from push_predictor.replay.restamper import Restamper
 
@@ -55,8 +56,9 @@ class ReplayTopics:
     """The publishers of a replay.
 
     senders: {recorded topic: sender}. skipped: {recorded topic: why it is not published}. unstamped: topics without a
-    header in front, which restamping does not change. untimed: scalar topics without a stamp, whose time only /clock
-    gives. Publishers of scalars keep their messages for late subscribers, which learn the type only from the publisher.
+    header in front, which restamping does not change. untimed: topics without a stamp that may contain a scalar: only
+    /clock gives their time. Publishers of scalars keep their messages for late subscribers, which learn the type only
+    from the publisher.
     """
 
     def __init__(
@@ -73,7 +75,7 @@ class ReplayTopics:
         self.senders: dict[str, TopicSender] = {}
         self.skipped: dict[str, str] = {}
         self.unstamped: list[str] = []
-        self.untimed = frozenset(t for t, k in topics.items() if k in SCALAR_LAYOUTS and not SCALAR_LAYOUTS[k].header)
+        self.untimed: set[str] = set()
         for topic, kind in topics.items():
             self._open(topic, kind)
 
@@ -114,6 +116,8 @@ class ReplayTopics:
             return
         fields = found.get_fields_and_field_types()  # type: ignore[attr-defined]  # every message class has it
         stamped = list(fields.values())[:1] == ["std_msgs/Header"]
+        if not stamped and kind not in TF_TYPES:
+            self.untimed.add(topic)
         if self._restamper is not None and not stamped:
             self.unstamped.append(topic)
         try:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import heapq
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def write_residuals(validation: LiveValidation, folder: Path) -> Path:
     with BagWriter(path) as bag:
         bag.add_topic(TOPIC, RESIDUAL_TYPE, RESIDUAL_DEFINITION)
         for name in names:
-            bag.add_topic(name.removeprefix(SCALAR), FLOAT64.name, FLOAT64.definition, type_hash=FLOAT64.type_hash)
+            bag.add_topic(_topic(name), FLOAT64.name, FLOAT64.definition, type_hash=FLOAT64.type_hash)
         by_time = heapq.merge(_residuals(validation), _scalars(validation), key=lambda message: message[0])
         for time, topic, data in by_time:
             bag.write(topic, time, data)
@@ -92,4 +93,9 @@ def _scalars(validation: LiveValidation) -> Iterator[tuple[int, str, bytes]]:
             if name.startswith(SCALAR):
                 row = np.array([[value]])
                 (data,) = encode(np.array([window.start]), row, SCALAR_LAYOUTS[FLOAT64.name])
-                yield window.start, name.removeprefix(SCALAR), data
+                yield window.start, _topic(name), data
+
+
+def _topic(covariate: str) -> str:
+    """The topic of a scalar: a player cannot publish /state.volts[0], so this becomes /state/volts_0."""
+    return re.sub(r"\[(\d+)\]", r"_\1", covariate.removeprefix(SCALAR)).replace(".", "/")

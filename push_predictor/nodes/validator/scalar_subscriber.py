@@ -24,17 +24,25 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic, time_ns
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
 
-from push_predictor.errors import RequestError
+from push_predictor.errors import PushPredictorError, RecordingError, RequestError
 from push_predictor.nodes.following import FollowingSubscription
+from push_predictor.nodes.message_text import definition_of
 from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
+from push_predictor.recordings.fields.sources import (
+    SCALAR_TARGET,
+    FieldReader,
+    Source,
+    definitions_of,
+    field_to_read,
+)
 from push_predictor.recordings.streams import ScalarStream
 
 LOOK = 0.05  # s between two looks at the publishers
@@ -45,17 +53,41 @@ CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 
 @dataclass(eq=False)
 class _Topic:
-    """A requested topic. name: as in the covariate; problem: why there are no samples, empty if there are."""
+    """A requested topic. name: as in the covariate; problem: why there are no samples, empty if there are.
 
-    requested: str
+    fields: by message type, what reads the field that was named; None where the type is a scalar's and needs none.
+    """
+
+    source: Source
     name: str
     reader: FollowingSubscription
     problem: str = ""
     buffer: ScalarBuffer | None = None
+    fields: dict[str, FieldReader | None] = field(default_factory=dict)
+    refusals: dict[str, str] = field(default_factory=dict)  # by message type
+
+    def understands(self, kind: str) -> bool:
+        """Whether messages of a type have the number; remembers why not."""
+        if kind in self.fields or kind in self.refusals:
+            return kind in self.fields
+        if kind in SCALAR_LAYOUTS and not self.source.field:
+            self.fields[kind] = None
+            return True
+        try:
+            schemas = {kind: definition_of(kind)}
+            path = field_to_read(self.source, kind, SCALAR_TARGET, schemas, "")
+            self.fields[kind] = FieldReader(SCALAR_TARGET, kind, path, definitions_of(kind, schemas))
+        except RecordingError as error:
+            self.refusals[kind] = str(error)
+        except PushPredictorError as error:
+            self.refusals[kind] = str(self.source.error("", str(error)))
+        return kind in self.fields
 
 
 class ScalarSubscriber:
-    """Subscribes to scalar topics. names: relative or absolute; topic:/NAME is the covariate, as the name was given.
+    """Subscribes to scalar topics: each a topic of a scalar type, or TOPIC.FIELD of any type with a number.
+
+    names: relative or absolute; topic:/NAME is the covariate, as the name was given.
 
     Call `look` and `take` in the executor's thread, `drain` in any. Raises RequestError for an invalid name.
     """
@@ -63,7 +95,8 @@ class ScalarSubscriber:
     def __init__(self, node: Node, names: Sequence[str]) -> None:
         _check(names)
         self._node = node
-        self._topics = [_Topic(text, _name(text), FollowingSubscription(node, text)) for text in names]
+        sources = [Source("scalar_topics", "", text) for text in names]
+        self._topics = [_Topic(each, _name(each.text), FollowingSubscription(node, each.topic)) for each in sources]
         self._ticks, self._clock = FollowingSubscription(node, CLOCK), ClockHistory()
         self._clock_published = False
         self._looked = 0.0
@@ -136,14 +169,13 @@ class ScalarSubscriber:
         """Subscribe to a published topic, or note why not; one that has lost its publishers stays as it is."""
         publishers = topic.reader.publishers()
         kinds = sorted({publisher.topic_type for publisher in publishers})
-        usable = [kind for kind in kinds if kind in SCALAR_LAYOUTS]
+        usable = [kind for kind in kinds if topic.understands(kind)]
         if len(usable) == 1:
             if topic.buffer is None or topic.buffer.kind != usable[0]:
-                topic.buffer, topic.problem = ScalarBuffer(usable[0]), ""
+                topic.buffer, topic.problem = ScalarBuffer(usable[0], topic.fields[usable[0]]), ""
             topic.reader.follow(usable[0], [p for p in publishers if p.topic_type == usable[0]])
         elif kinds:
-            accepted = ", ".join(SCALAR_LAYOUTS)
-            topic.problem = f"Scalar topic {topic.name} has type {', '.join(kinds)}. Accepted: {accepted}."
+            topic.problem = _refusal(topic, kinds)
         elif topic.buffer is None:
             topic.problem = f"Scalar topic {topic.name} has no publisher."
 
@@ -156,14 +188,26 @@ class ScalarSubscriber:
         return time_ns() - CLOCK_DELAY, lambda sent: sent if sent > expired else at(sent)
 
 
+def _refusal(topic: _Topic, kinds: Sequence[str]) -> str:
+    """Why a topic with publishers of these types is not subscribed to."""
+    if len(kinds) > 1:
+        return f"Scalar topic {topic.name} has publishers of the types {', '.join(kinds)}. One type is accepted."
+    reason = topic.refusals[kinds[0]]
+    return f"{reason}; without a field {', '.join(SCALAR_LAYOUTS)} are accepted."
+
+
 def _check(names: Sequence[str]) -> None:
     for text in names:
+        source = Source("scalar_topics", "", text)
         try:
-            validate_topic_name(text)
+            validate_topic_name(source.topic)
         except InvalidTopicNameException as error:
-            raise RequestError("scalar_topics", text, f"a topic's name ({' '.join(str(error).split())})") from None
+            accepted = f"a topic's name, or TOPIC.FIELD ({' '.join(str(error).split())})"
+            raise RequestError("scalar_topics", text, accepted) from None
+        if ":" in text or text.endswith("."):
+            raise RequestError("scalar_topics", text, "a topic's name, or TOPIC.FIELD")
         if text.startswith("~") or [_name(other) for other in names].count(_name(text)) > 1:
-            raise RequestError("scalar_topics", text, "relative or absolute names, each topic once")
+            raise RequestError("scalar_topics", text, "relative or absolute names, each topic or field once")
 
 
 def _name(requested: str) -> str:

@@ -24,15 +24,16 @@ from typing import TypeAlias
 import numpy as np
 from rclpy.node import Node
 
-from push_predictor.errors import RequestError
 from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
 from push_predictor.nodes.validator.sensors.frame_stream import FrameStream, TransformTopics
 from push_predictor.nodes.validator.sensors.stream_source import sources_of
 from push_predictor.nodes.validator.sensors.topic_stream import TopicStream
+from push_predictor.nodes.validator.sensors.wrench_axes import WrenchAxes
+from push_predictor.online.sensors.live_wrench import LiveWrench
 from push_predictor.online.sensors.topic_report import ReportLog, TopicReport
-from push_predictor.online.sensors.turned_wrench import TurnedWrench
 from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.fields.sources import Source
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.samples import (
     PUSHER,
     SLIDER,
@@ -40,11 +41,10 @@ from push_predictor.recordings.samples import (
     WRENCH,
     pusher_stream,
     slider_stream,
-    wrench_stream,
 )
-from push_predictor.recordings.select import STREAMS
+from push_predictor.recordings.select import STREAMS, TF
 from push_predictor.recordings.streams import ScalarStream
-from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
+from push_predictor.recordings.topics import Topics
 
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last messages only
 LOOK = 0.05  # s between two looks at the publishers
@@ -69,8 +69,9 @@ class SensorSubscriber:
         self._scalars = ScalarSubscriber(node, scalars)
         self._newest: int | None = None  # stamp (ns) of the poses
         self._frame_id = topics.world or frame_id
-        self._turned = _turned(topics)
-        self._tf = _transform_topics(node, sources, topics.world, self._frame_id)
+        self._tf = _transform_topics(node, sources, topics, self._frame_id)
+        self._wrench_axes = WrenchAxes(topics, next(iter(self._tf.values()), None))
+        self._wrench = LiveWrench(topics, self._wrench_axes.buffer)
         self._streams = {name: self._stream(node, name, source) for name, source in sources.items()}
         self._buffers = {name: stream.buffer for name, stream in self._streams.items()}
         self._log = ReportLog()
@@ -139,7 +140,7 @@ class SensorSubscriber:
     def _stream(self, node: Node, name: str, source: Source) -> Stream:
         if source.frame:
             return FrameStream(node, name, source, self._tf[source.topic], RULES[name])
-        if name == "wrench" and self._turned is not None:  # its headers name the tip's frame
+        if name == "wrench" and self._wrench_axes.turned:  # its headers name the sensor's frame
             return TopicStream(node, name, source, STREAMS[name], SPATIAL_WRENCH, "")
         return TopicStream(node, name, source, STREAMS[name], RULES[name], self._frame_id)
 
@@ -147,16 +148,24 @@ class SensorSubscriber:
         while not self._ending.wait(PERIOD):
             self.drain()
 
+    def begin(self, rig: Rig) -> None:
+        """Begin a run: the samples that are taken from now on are of this rig."""
+        self._wrench.begin(rig)
+
+    @property
+    def waits_for_bias(self) -> bool:
+        """Whether the wrench is held back because its bias is not known yet."""
+        return self._wrench.waits_for_bias
+
     def take(self) -> Samples:
         """The usable samples since the last call."""
         self._empty = monotonic()
         slider, pusher, wrench = (self._buffers[name].take() for name in STREAMS)
-        if self._turned is not None:
-            wrench = self._turned.put(*wrench, *pusher)
+        turned = self._wrench.put(wrench, slider, pusher)
         for stamp, _ in (slider, pusher):
             self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # a single stamp may be wrong
         scalars = self._scalars.take(self._newest)
-        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench_stream(*wrench), scalars)
+        return Samples(slider_stream(*slider), pusher_stream(*pusher), turned, scalars)
 
     def last_scalars(self) -> dict[str, ScalarStream]:
         """The scalars since the last sample of a sensor."""
@@ -165,7 +174,8 @@ class SensorSubscriber:
     def inspect(self) -> list[TopicReport]:
         """Make the reports about the topics anew, and return those to log."""
         with self._draining:
-            self._reports = [stream.report() for stream in self._streams.values()]
+            reports = [stream.report() for stream in self._streams.values()]
+        self._reports = [self._wrench_axes.amended(each) if each.stream == "wrench" else each for each in reports]
         return self._log.news(self._reports)
 
     @property
@@ -185,9 +195,7 @@ class SensorSubscriber:
                 found[f"{name} dropped"] = buffer.dropped
             if stream.lost:
                 found[f"{name} lost"] = stream.lost
-        if self._turned is not None and self._turned.without_pose:
-            found["wrench without pose"] = self._turned.without_pose
-        return found | self._scalars.figures()
+        return found | self._wrench.figures() | self._scalars.figures()
 
     def problems(self) -> list[str]:
         """What keeps pushes from being found, in words; about the topics by the last inspection."""
@@ -204,27 +212,31 @@ class SensorSubscriber:
                 found.append(f"{topic}: {lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
             if buffer.dropped:
                 found.append(f"{topic}: {buffer.dropped} samples were dropped before they could be used.")
-        return found + self._scalars.problems()
+        return found + self._wrench.problems + self._scalars.problems()
 
 
-def _turned(topics: Topics) -> TurnedWrench | None:
-    """What turns the wrench, None for the world's axes. Raises RequestError for axes of a frame in tf."""
-    if topics.wrench_axes == TIP_AXES:
-        return TurnedWrench()
-    if topics.wrench_axes != WORLD_AXES:
-        raise RequestError("wrench_frame", topics.wrench_frame, f"{WORLD_AXES} or {TIP_AXES}")
-    return None
+def _transform_topics(
+    node: Node, sources: dict[str, Source], topics: Topics, frame_id: str
+) -> dict[str, TransformTopics]:
+    """The tf topics of all sources that are frames and of the wrench's axes, by their name as given.
 
-
-def _transform_topics(node: Node, sources: dict[str, Source], world: str, frame_id: str) -> dict[str, TransformTopics]:
-    """The tf topics of all sources that are frames, by their name as given.
-
-    Where the other pose comes from a topic, poses from tf are given in the frame that its headers must name.
+    Where the other pose comes from a topic, poses from tf are given in the frame that its headers must name. The
+    frame of the wrench is in the first tf topic.
     """
     poses = [source for name, source in sources.items() if name != "wrench"]
     frames = [source for source in poses if source.frame]
-    common = world if len(frames) == len(poses) else frame_id
+    common = topics.world if len(frames) == len(poses) else frame_id
+    names = [*dict.fromkeys(source.topic for source in frames)]
+    turned = topics.wrench_tf_frame
+    if turned and not names:
+        names = [TF]
     return {
-        topic: TransformTopics(node, [source for source in frames if source.topic == topic], common)
-        for topic in dict.fromkeys(source.topic for source in frames)
+        name: TransformTopics(
+            node,
+            name,
+            [source.frame for source in frames if source.topic == name],
+            common,
+            turned if name == names[0] else "",
+        )
+        for name in names
     }

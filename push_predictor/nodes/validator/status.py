@@ -120,7 +120,7 @@ def validator_status(
     values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
-        values |= _stream_figures(run) | _scores(run) | _checks(run)
+        values |= _stream_figures(run, sensors) | _scores(run) | _checks(run)
         values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     message = _paragraph([failure, *warnings]) or state
     return diagnostic_status(node_name, "validation", level, message, values, rig.shape if rig else "")
@@ -131,10 +131,13 @@ def _paragraph(texts: Sequence[str]) -> str:
     return " ".join(text if text.endswith((".", "?")) else f"{text}." for text in texts if text)
 
 
-def _stream_figures(run: ValidationRun) -> dict[str, object]:
+def _stream_figures(run: ValidationRun, sensors: SensorSubscriber) -> dict[str, object]:
     """Faults by kind, "streams KIND" of all streams and "slider KIND" of one."""
     found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
-    found["contact from"] = "geometry and force" if run.sync.with_wrench else "geometry alone: no wrench received"
+    without = "the wrench waits for its bias" if sensors.waits_for_bias else "no wrench received"
+    found["contact from"] = "geometry and force" if run.sync.with_wrench else f"geometry alone: {without}"
+    jitter = "regular, in place of stamps with a jitter of {:.2g} ms"
+    found |= {f"{name} stamps": jitter.format(1e3 * value) for name, value in run.stamp_jitter.items()}
     apart = run.sync.apart()
     found["streams clocks_apart"] = len(apart)
     return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}

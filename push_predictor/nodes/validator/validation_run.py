@@ -93,6 +93,11 @@ class ValidationRun:
         """Faults of the streams that the window finder has met, by kind."""
         return self._finder.counts
 
+    @property
+    def stamp_jitter(self) -> dict[str, float]:
+        """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
+        return self._finder.stamp_jitter
+
     def feed(self, samples: Samples) -> None:
         """Take a portion of the streams."""
         self._add_scalars(samples.scalars)

@@ -21,11 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.recordings.windows.stamp_noise import stamp_noise
 from push_predictor.types import IntArray
 
-FEWEST = 10  # stamps from which rate and jitter are computed
 SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another clock
-SD = 1.4826  # standard deviations of a Gaussian in one median absolute deviation
 
 
 @dataclass(frozen=True)
@@ -81,19 +80,14 @@ def stamp_figures(stamp: IntArray, received: IntArray | None) -> StampFigures | 
 
     received: None if it is not known.
     """
-    if len(stamp) < FEWEST:
+    if (noise := stamp_noise(stamp)) is None:
         return None
-    period = np.diff(stamp) * 1e-9
-    usual = float(np.median(period[period > 0.0])) if np.any(period > 0.0) else 0.0
-    if not usual:
-        return None
-    # The median ignores gaps. A difference has the noise of two stamps.
-    jitter = SD * float(np.median(np.abs(period - usual))) / np.sqrt(2.0)
+    rate, jitter = 1.0 / noise.period, noise.jitter
     if received is None:
-        return StampFigures(1.0 / usual, float(jitter))
+        return StampFigures(rate, jitter)
     latency = 1e-9 * float(np.median(received - stamp))
     other = abs(latency) > SAME_CLOCK
-    return StampFigures(1.0 / usual, float(jitter), None if other else latency, other)
+    return StampFigures(rate, jitter, None if other else latency, other)
 
 
 class ReportLog:

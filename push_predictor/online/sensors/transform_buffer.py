@@ -26,7 +26,7 @@ import numpy as np
 from push_predictor.online.message_buffer import LIMIT
 from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree, joined, read_tree
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 NO_TRANSFORM, SET_BACK = "without transform", "clock set back"
 KEPT = 5_000_000_000  # ns of samples that are kept after their pose was returned
@@ -75,14 +75,18 @@ class TransformBuffer:
     """Messages of /tf and /tf_static until they are taken as poses of frames.
 
     frames: those whose poses are wanted. world: the frame in which poses are given; empty: the root of the tree above
-    the first frame, once it is known. Call `put` in any thread, the others in one.
+    the first frame, once it is known. turned: a frame whose poses are wanted at given stamps, '' for none. Call `put`
+    in any thread, the others in one.
     """
 
-    def __init__(self, frames: Sequence[str], world: str = "") -> None:
+    def __init__(self, frames: Sequence[str], world: str = "", turned: str = "") -> None:
         self.world = world
         self._given = bool(world)
         self.dropped = 0
         self._frames = list(frames)
+        self._turned = turned
+        self._turned_from: int | None = None  # stamp (ns) from which on its poses may still be wanted
+        self.turned_problem = ""  # why `turned` has no poses, empty if it has
         self._progress = {frame: _Progress() for frame in frames}
         self._histories: dict[str, _History] = {}
         self._waiting: list[tuple[bytes, bool]] = []
@@ -119,6 +123,28 @@ class TransformBuffer:
             return np.zeros(0, np.int64), np.zeros((0, 7))
         self._forget()
         return found
+
+    def at(self, stamp: IntArray) -> tuple[BoolArray, Array]:
+        """Which stamps (n,) ns all transforms of the frame `turned` have reached, and its poses (k, 7) at these.
+
+        A row is NaN at a stamp before a transform began, or in a dropout of it. The poses are in the world, as far as
+        tf has it, else in the root above the frame.
+        """
+        self._absorb()
+        tree, frame = self._tree(), self._turned
+        try:
+            world = self.world if self.world in tree.frames else tree.root(frame)
+            reached = [int(edge.stamp.max()) for edge in tree.not_static(frame, world).values()]
+            decided = stamp <= min(reached) if reached else np.ones(len(stamp), dtype=np.bool_)
+            found = tree.poses_at(frame, world, stamp[decided])
+            self.turned_problem = ""
+        except TransformError as error:
+            self.turned_problem = str(error)
+            return np.zeros(len(stamp), dtype=np.bool_), np.zeros((0, 7))
+        pending = [*stamp[~decided].tolist(), *reached] or stamp.tolist()
+        self._turned_from = min(pending, default=self._turned_from)
+        self._forget()
+        return decided, found
 
     def recent(self, frame: str, count: int) -> IntArray:
         """The newest stamps (n,) in ns of a frame's transforms, at most `count`; none without a connection."""
@@ -175,6 +201,7 @@ class TransformBuffer:
         if history.add(child, edge):
             for progress in self._progress.values():
                 progress.newest = None  # of the time before
+            self._turned_from = None
         if (excess := len(history.edge.stamp) - LIMIT) > 0:  # of a frame that is not connected with the world
             history.drop(excess)
             self.dropped += excess
@@ -213,8 +240,10 @@ class TransformBuffer:
 
     def _forget(self) -> None:
         """Drop samples that no frame needs any more."""
-        newest = [progress.newest for progress in self._progress.values() if progress.newest is not None]
-        if len(newest) < len(self._progress):
+        known = [progress.newest for progress in self._progress.values()]
+        known += [self._turned_from] if self._turned else []
+        newest = [stamp for stamp in known if stamp is not None]
+        if len(newest) < len(known):
             return
         for child, history in self._histories.items():
             needed = [p.done - history.first for p in self._progress.values() if p.leader == child]

@@ -19,6 +19,7 @@ from __future__ import annotations
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.fixed_to_tip import fixed_to_tip
 from push_predictor.recordings.checks.frames import frame_findings, tip_follows
+from push_predictor.recordings.checks.stamps import stamp_findings
 from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.checks.units import orientation_finding, stream_units, table_units
 from push_predictor.recordings.checks.wrench import wrench_findings
@@ -46,7 +47,7 @@ def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
         return tuple(frames)
     found = frames if oriented is None else [oriented, *frames]
     outlined = all(finding.severity == "note" for finding in found)
-    return (*found, *wrench_findings(recording, rig, outlined))
+    return (*found, *wrench_findings(recording, rig, outlined), *stamp_findings(recording))
 
 
 def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:

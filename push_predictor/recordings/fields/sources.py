@@ -105,6 +105,25 @@ class Source:
         return RecordingError(f"{before}{self.key} {self.text!r}{option}: {problem}")
 
 
+@dataclass(frozen=True)
+class FieldReader:
+    """Reads a field of messages of one type as messages of a target's type."""
+
+    target: Target
+    type_name: str
+    field: str
+    definitions: Definitions
+
+    @property
+    def timed(self) -> bool:
+        """Whether the messages contain their time: a header around the field."""
+        return bool(header_path(self.field, self.type_name, self.definitions))
+
+    def read(self, messages: Sequence[bytes], log_times: Sequence[int]) -> list[bytes]:
+        """The messages as `messages_as` gives them."""
+        return messages_as(self.target, messages, log_times, self.type_name, self.field, self.definitions)
+
+
 def definitions_of(type_name: str, schemas: Mapping[str, str]) -> Definitions:
     """The definition of a type and of those in it: standard types as they are, others from the bag's text."""
     found = parse_definitions(type_name, schemas[type_name]) if schemas.get(type_name) else {}

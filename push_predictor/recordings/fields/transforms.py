@@ -68,10 +68,14 @@ class TransformTree:
 
     def moving(self, frame: str, world: str) -> dict[str, Edge]:
         """The edges between two frames that are not static, by child frame. Raises TransformError if all are."""
-        names = [name for part in self._chain(frame, world) for name in part]
-        if not (found := {name: self.edges[name] for name in names if not self.edges[name].static}):
+        if not (found := self.not_static(frame, world)):
             raise TransformError(f"frame {frame!r} never moves in {world!r}: all its transforms are static")
         return found
+
+    def not_static(self, frame: str, world: str) -> dict[str, Edge]:
+        """The edges between two frames that are not static, by child frame; none if all are. Raises TransformError."""
+        names = [name for part in self._chain(frame, world) for name in part]
+        return {name: self.edges[name] for name in names if not self.edges[name].static}
 
     def poses(self, frame: str, world: str, leader: str = "") -> tuple[IntArray, Array, int]:
         """Stamps (n,) in ns and rows (n, 7) of a frame in another, and the number of stamps without a pose.

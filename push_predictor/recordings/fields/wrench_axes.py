@@ -39,6 +39,11 @@ def in_sensor_axes(wrenches: Array, poses: Array) -> Array:
     return in_world_axes(wrenches, inverted(poses))
 
 
+def at_tip(wrenches: Array, sensor: Array, tip: Array) -> Array:
+    """Wrenches (n, 6) along a sensor's axes, along the world's and about the tip; sensor, tip: their poses (n, 7)."""
+    return about_points(in_world_axes(wrenches, sensor), sensor[:, :3], tip[:, :3])
+
+
 def about_points(wrenches: Array, origins: Array, points: Array) -> Array:
     """Wrenches (n, 6) whose torque is about origins (n, 3) m, with their torque about points (n, 3) m.
 

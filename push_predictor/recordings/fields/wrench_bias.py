@@ -113,6 +113,11 @@ def estimate_bias(stamp: IntArray, wrenches: Array, free: BoolArray, poses: Arra
     return replace(bias, weight=float(force[3]), weight_sd=float(force_sd[3]), lever=torque[3:])
 
 
+def with_planar_numbers(wrenches: Array) -> Array:
+    """Wrenches (n, 6) along the world's axes with 0 for numbers that a planar sensor does not report."""
+    return np.where(np.isfinite(wrenches), wrenches, 0.0)
+
+
 def _intervals(stamp: IntArray, free: BoolArray) -> IntArray:
     """The number of the interval of each free sample: consecutive samples within INTERVAL of its first one."""
     rows = np.flatnonzero(free)

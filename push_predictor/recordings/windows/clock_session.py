@@ -73,6 +73,12 @@ class ClockSession:
         return found
 
     @property
+    def stamp_jitter(self) -> dict[str, float]:
+        """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
+        found = {name: track.regular for name, track in self.tracks.items()}
+        return {name: each.noise.jitter for name, each in found.items() if each.noise is not None and each.corrected}
+
+    @property
     def contact(self) -> tuple[int, int]:
         """Number of slider samples in contact, and of all that were evaluated."""
         return self._segmenter.touching, self._segmenter.samples
@@ -94,7 +100,7 @@ class ClockSession:
         ordered = track.order.take(stamp, values, final)
         if self._origin is None and len(ordered.stamp):
             self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(ordered, self._origin or 0)
+        track.extend(track.regular.take(ordered, final or ordered.clock_set), self._origin or 0)
         if ordered.clock_set:
             self.clocks_set.add(name)
         return ordered.clock_set

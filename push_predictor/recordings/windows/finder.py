@@ -72,6 +72,11 @@ class WindowFinder:
         }
 
     @property
+    def stamp_jitter(self) -> dict[str, float]:
+        """The jitter (s) of the stamps that are replaced by regular ones at present, by sensor."""
+        return self._session.stamp_jitter
+
+    @property
     def contact_share(self) -> float | None:
         """Share of the slider's samples so far in which the tip touches it, None before the first."""
         touching, samples = self._contact()

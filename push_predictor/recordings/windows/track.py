@@ -22,6 +22,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.windows.regular_stamps import RegularStamps
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -45,6 +46,7 @@ class Track:
         self.values: Array = np.empty((0, width))
         self.interrupted: BoolArray = np.empty(0, dtype=np.bool_)
         self.order = StampOrder(width, self.is_jump if position else None)
+        self.regular = RegularStamps()
         self.jumps = 0
         self._angle = angle
         self._period: float | None = None
@@ -60,10 +62,10 @@ class Track:
     @property
     def empty(self) -> bool:
         """Whether no sample has arrived, not even an undecided one."""
-        return not len(self) and not len(self.order.waiting[0])
+        return not len(self) and not len(self.order.waiting[0]) and not self.regular.waiting
 
     def extend(self, new: OrderedSamples, origin: int) -> None:
-        """Append samples that `order` accepted."""
+        """Append samples that `order` accepted, with the stamps of `regular`."""
         values, first = self._unwrapped(new.values), min(len(self), 1)
         times = (np.concatenate([self.stamp[-1:], new.stamp]) - origin) * NANOSECOND
         jumps = np.zeros(len(values), dtype=np.bool_)

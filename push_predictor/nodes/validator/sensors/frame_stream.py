@@ -39,14 +39,14 @@ NOT_INSTALLED = "install ros-jazzy-tf2-msgs, or run scripts/install_tf2_msgs.sh"
 
 
 class TransformTopics:
-    """The subscriptions to a tf topic and its static one. sources: the streams that are frames in it.
+    """The subscriptions to a tf topic and its static one.
 
-    world: as in TransformBuffer. Call `look` in the executor's thread; not at the same time as `move`.
+    frames: the streams that are frames in it; world and turned: as in TransformBuffer. Call `look` in the executor's
+    thread; not at the same time as `move`.
     """
 
-    def __init__(self, node: Node, sources: Sequence[Source], world: str) -> None:
-        topic = sources[0].topic
-        self.buffer = TransformBuffer([source.frame for source in sources], world)
+    def __init__(self, node: Node, topic: str, frames: Sequence[str], world: str, turned: str = "") -> None:
+        self.buffer = TransformBuffer(frames, world, turned)
         self.problem, self.refused = "No publisher.", False
         self.heard = monotonic()  # when the last message came, or the last publisher
         self._moving = FollowingSubscription(node, topic, DEPTH, earlier=False, overridable=True)

@@ -29,15 +29,7 @@ from push_predictor.nodes.message_text import definition_of
 from push_predictor.nodes.validator.sensors.stream_source import DEPTH, SILENT, reliability_text, resolved
 from push_predictor.online.message_buffer import MessageBuffer, unchanged
 from push_predictor.online.sensors.topic_report import TopicReport, stamp_figures
-from push_predictor.recordings.fields.message_text import Definitions
-from push_predictor.recordings.fields.sources import (
-    Source,
-    Target,
-    definitions_of,
-    field_to_read,
-    header_path,
-    messages_as,
-)
+from push_predictor.recordings.fields.sources import FieldReader, Source, Target, definitions_of, field_to_read
 from push_predictor.recordings.samples import SampleRules
 
 NO_WRENCH = "No publisher: contact is found from geometry alone."
@@ -55,7 +47,7 @@ class TopicStream:
         self.buffer = MessageBuffer(rules, frame_id)
         self._name, self._source, self._target, self._frame_id = name, resolved(node, source), target, frame_id
         self._subscription = FollowingSubscription(node, source.topic, DEPTH, earlier=False, overridable=True)
-        self._read: dict[str, tuple[str, Definitions]] = {}  # by type: the field, and what it is made of
+        self._read: dict[str, FieldReader] = {}  # by type
         self._refusals: dict[str, str] = {}  # by type
         self._kind = ""  # of the subscription
         self._offered: list[tuple[str, ReliabilityPolicy]] = []  # type and reliability of each publisher
@@ -118,7 +110,7 @@ class TopicStream:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
         if self._frame_id and (others := [frame for frame in frames if frame != self._frame_id]):
             names = " and ".join(map(repr, others))
-            wrench = ", or wrench_frame to tip" if self._name == "wrench" else ""
+            wrench = ", or wrench_frame to tip or a frame of tf" if self._name == "wrench" else ""
             return f"frame_id {names} is not accepted, give {self._frame_id!r}, or set world_frame or frame_id{wrench}."
         if monotonic() - self._heard > SILENT:
             return f"No message for over {SILENT:g} s."
@@ -130,7 +122,7 @@ class TopicStream:
             try:
                 schemas = {kind: definition_of(kind)}
                 field = field_to_read(self._source, kind, self._target, schemas, "")
-                self._read[kind] = field, definitions_of(kind, schemas)
+                self._read[kind] = FieldReader(self._target, kind, field, definitions_of(kind, schemas))
             except RecordingError as error:
                 self._refusals[kind] = str(error)
             except PushPredictorError as error:
@@ -145,12 +137,9 @@ class TopicStream:
 
     def _convert(self, kind: str) -> None:
         """Read the messages that come from now on as those of a type."""
-        field, definitions = self._read[kind]
+        reader = self._read[kind]
         if kind == self._target.type and not self._source.field:
             self.buffer.convert_by(unchanged, self._frame_id)
             return
         # Without a header a message names no frame; it is then dated by its sending.
-        frame_id = self._frame_id if header_path(field, kind, definitions) else ""
-        self.buffer.convert_by(
-            lambda messages, sent: messages_as(self._target, messages, sent, kind, field, definitions), frame_id
-        )
+        self.buffer.convert_by(reader.read, self._frame_id if reader.timed else "")

@@ -1,0 +1,192 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Regular stamps in place of noisy ones while samples arrive.
+
+A window interpolates single samples, so its outcome gets the error of their stamps. Where the first samples of a stream
+show jitter, each stamp is replaced by that of a line through the samples around it, over their numbers in a regular
+grid. Streams with less jitter, or without a grid, keep their stamps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.windows.stamp_noise import (
+    DECIDING,
+    MOST_WIDTH,
+    StampNoise,
+    missing_before,
+    stamp_noise,
+    width,
+)
+from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.types import BoolArray, IntArray
+
+AROUND = 50  # samples before and after one that determine its stamp
+ROWS = 4096  # stamps that are fitted at once: each needs its neighbours' in memory, 1 kB a time
+KEPT = max(AROUND, 5 * MOST_WIDTH)  # samples that are kept before those that were not returned yet
+
+
+class RegularStamps:
+    """Takes the samples of one stream in order and returns them, with regular stamps where they have jitter.
+
+    noise: of the last DECIDING samples before the correction began, or of the last block of them; None until it is
+    known. The result does not depend on the portions. The first DECIDING samples wait for each other. With jitter a
+    sample waits for AROUND others and three widths, or for a gap.
+    """
+
+    def __init__(self) -> None:
+        self.noise: StampNoise | None = None
+        self._held: OrderedSamples | None = None  # samples that wait for the first decision
+        self._block = np.empty(0, np.int64)  # stamps since the last decision
+        self._segment: _Segment | None = None
+        self._last: int | None = None  # stamp (ns) before the next, as it came
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        held = 0 if self._held is None else len(self._held.stamp)
+        return held + (0 if self._segment is None else self._segment.waiting)
+
+    @property
+    def corrected(self) -> bool:
+        """Whether stamps are replaced."""
+        return self.noise is not None and self.noise.corrected
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those whose stamps are known; with `final` all are."""
+        if self._held is not None:
+            new, self._held = _joined(self._held, new), None
+        if self.noise is None and len(new.stamp) < DECIDING:
+            if not final:
+                self._held = new
+                return _rows(new, slice(0, 0))
+            self.noise = stamp_noise(new.stamp)
+        count = 0 if self.corrected else self._undisturbed(new.stamp)
+        if self.noise is None or not self.corrected:
+            return new
+        regular = self._regular(_rows(new, slice(count, None)), self.noise, final)
+        return _joined(_rows(new, slice(0, count)), regular)
+
+    def _undisturbed(self, stamp: IntArray) -> int:
+        """How many of these samples come before jitter shows: that of the first block corrects this block as well."""
+        first = self.noise is None
+        block = np.concatenate([self._block, stamp])
+        while len(block) >= DECIDING:
+            self.noise = stamp_noise(block[:DECIDING])
+            if self.corrected:
+                return max(len(stamp) - len(block) + (0 if first else DECIDING), 0)
+            block, first = block[DECIDING:], False
+        self._block = block
+        return len(stamp)
+
+    def _regular(self, new: OrderedSamples, noise: StampNoise, final: bool) -> OrderedSamples:
+        before = new.stamp[:1] if self._last is None else np.array([self._last])
+        gap = np.diff(np.concatenate([before, new.stamp])) * NANOSECOND
+        begins = np.flatnonzero((gap > longest_interval(noise.period)) | new.interrupted)
+        found = []
+        for number, rows in enumerate(np.split(np.arange(len(new.stamp)), begins)):
+            if number or self._segment is None:
+                if self._segment is not None:
+                    found.append(self._segment.take(_rows(new, rows[:0]), closed=True))
+                self._segment = _Segment(noise, _rows(new, slice(0, 0)))
+            found.append(self._segment.take(_rows(new, rows)))
+        if final and self._segment is not None:
+            found.append(self._segment.take(_rows(new, np.empty(0, np.int64)), closed=True))
+            self._segment = None
+        self._last = int(new.stamp[-1]) if len(new.stamp) else self._last
+        return _joined(*found) if found else new
+
+
+class _Segment:
+    """An uninterrupted run of samples; number: of each in the grid, as far as it is known."""
+
+    def __init__(self, noise: StampNoise, nothing: OrderedSamples) -> None:
+        self._noise, self._width = noise, width(noise)
+        self._samples = nothing
+        self._number = np.empty(0, np.int64)
+        self._returned = 0  # of the samples that are kept
+        self._newest: int | None = None  # regular stamp (ns) that was returned last
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return len(self._samples.stamp) - self._returned
+
+    def take(self, new: OrderedSamples, closed: bool = False) -> OrderedSamples:
+        """Add samples and return those whose regular stamps are known."""
+        self._samples = _joined(self._samples, new)
+        self._count(closed)
+        begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
+        found = _rows(self._samples, slice(begin, end))
+        stamp = self._samples.stamp[: len(self._number)]
+        parts = [_line_at(stamp, self._number, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
+        regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
+        self._returned = end
+        self._forget()
+        return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
+
+    def _count(self, closed: bool) -> None:
+        """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
+        known = len(self._number)
+        end = max(len(self._samples.stamp) - (0 if closed else 3 * self._width), known)
+        if end == known:
+            return
+        missing = missing_before(self._samples.stamp, self._noise)[known:end]
+        last = int(self._number[-1]) if known else -1
+        self._number = np.concatenate([self._number, last + np.cumsum(missing + 1)])
+
+    def _increasing(self, stamp: IntArray) -> IntArray:
+        """The stamps, each at least a nanosecond after the one before."""
+        before = stamp[:1] - 1 if self._newest is None else np.array([self._newest])
+        step = np.arange(len(stamp) + 1)
+        found = (np.maximum.accumulate(np.concatenate([before, stamp]) - step) + step)[1:]
+        self._newest = int(found[-1]) if len(found) else self._newest
+        return found
+
+    def _forget(self) -> None:
+        """Drop the samples before those that the next ones need."""
+        count = max(self._returned - KEPT, 0)
+        self._samples, self._number = _rows(self._samples, slice(count, None)), self._number[count:]
+        self._returned -= count
+
+
+def _line_at(stamp: IntArray, number: IntArray, begin: int, end: int) -> IntArray:
+    """Stamps (end - begin,) in ns at the samples from begin to end of lines through the AROUND samples on either side.
+
+    stamp, number (n,): of the run as far as it is known.
+    """
+    at = np.arange(begin, end)[:, None] + np.arange(-AROUND, AROUND + 1)
+    inside: BoolArray = (at >= 0) & (at < len(stamp))
+    at = np.clip(at, 0, max(len(stamp) - 1, 0))
+    middle = slice(begin, end)
+    x = np.where(inside, number[at] - number[middle, None], 0).astype(np.float64)
+    y = np.where(inside, stamp[at] - stamp[middle, None], 0).astype(np.float64)
+    count = inside.sum(axis=1)
+    mean_x, mean_y = x.sum(axis=1) / count, y.sum(axis=1) / count
+    spread = (np.where(inside, x - mean_x[:, None], 0.0) ** 2).sum(axis=1)
+    slope = (np.where(inside, x - mean_x[:, None], 0.0) * y).sum(axis=1) / np.where(spread > 0.0, spread, 1.0)
+    return np.asarray(stamp[middle] + np.rint(mean_y - slope * mean_x).astype(np.int64))
+
+
+def _rows(samples: OrderedSamples, rows: slice | IntArray) -> OrderedSamples:
+    return OrderedSamples(samples.stamp[rows], samples.values[rows], samples.interrupted[rows], samples.clock_set)
+
+
+def _joined(*parts: OrderedSamples) -> OrderedSamples:
+    stamp, values, interrupted = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("stamp", "values", "interrupted")
+    )
+    return OrderedSamples(stamp, values, interrupted, parts[-1].clock_set)

@@ -1,0 +1,333 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Stamps with jitter: its estimate, regular stamps in place of it, and the accuracy of what is learnt from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
+from push_predictor.evaluation.validation import Comparison, compare, metrics_json
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.online.sensors.topic_report import stamp_figures
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows import regular_stamps
+from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.windows.regular_stamps import AROUND, RegularStamps
+from push_predictor.recordings.windows.stamp_noise import DECIDING, MOST_WIDTH, missing_before, stamp_noise, width
+from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.types import IntArray
+
+BAGS = Path(__file__).resolve().parents[2] / "bags"
+MS = 1_000_000
+START = 1_700_000_000_000 * MS
+
+
+def grid(count: int, period: float = 10.0) -> IntArray:
+    """Stamps (n,) in ns of a regular stream; period in ms."""
+    return np.asarray(START + np.rint(period * MS * np.arange(count)), dtype=np.int64)
+
+
+def noisy(stamp: IntArray, sd: float, seed: int = 0) -> IntArray:
+    """Stamps with a Gaussian jitter, sd in ms, in the order of the samples."""
+    return np.asarray(stamp + np.rint(sd * MS * np.random.default_rng(seed).standard_normal(len(stamp))), np.int64)
+
+
+def samples(stamp: IntArray) -> OrderedSamples:
+    return OrderedSamples(stamp, np.arange(len(stamp))[:, None] * 1.0, np.zeros(len(stamp), np.bool_), False)
+
+
+def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
+    """The stamps that samples get, taken in portions."""
+    taker, parts = RegularStamps(), []
+    whole = samples(stamp)
+    for first in [*range(0, len(stamp), portion), len(stamp)]:
+        rows = slice(first, first + portion)
+        part = OrderedSamples(whole.stamp[rows], whole.values[rows], whole.interrupted[rows], False)
+        parts.append(taker.take(part, final=first == len(stamp)))
+    assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values) and not taker.waiting
+    return np.concatenate([part.stamp for part in parts])
+
+
+# --- the estimate -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sd", [0.2, 1.0, 2.0, 3.0])
+def test_jitter_is_the_standard_deviation_of_a_stamp(sd: float) -> None:
+    stamp = np.delete(grid(3000), slice(500, 520))
+    found = stamp_noise(noisy(stamp, sd))
+    assert found is not None
+    assert (found.period, found.jitter) == (pytest.approx(0.01, rel=0.02), pytest.approx(1e-3 * sd, rel=0.05))
+    assert found.corrected == (sd > 0.5)
+    figures = stamp_figures(noisy(stamp, sd), None)
+    assert figures is not None and (figures.rate, figures.jitter) == (1.0 / found.period, found.jitter)
+
+
+def test_too_few_stamps_have_no_noise() -> None:
+    assert stamp_noise(grid(9)) is None and stamp_noise(grid(10)) is not None
+    assert stamp_noise(np.full(50, START)) is None
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "delay", "exponential"])
+def test_jitter_is_recognised_by_few_samples_whatever_its_distribution(kind: str) -> None:
+    found = []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        delay = rng.exponential(2.0, DECIDING) if kind == "exponential" else 2.0 * rng.standard_normal(DECIDING)
+        delay = np.abs(delay) if kind == "delay" else delay
+        noise = stamp_noise(np.sort(grid(DECIDING) + np.rint(MS * delay).astype(np.int64)))
+        found.append(noise is not None and noise.corrected)
+    assert np.mean(found) > 0.9
+
+
+@pytest.mark.parametrize("share", [0.06, 0.1, 0.2, 0.4])
+def test_exact_stamps_of_irregular_samples_are_no_jitter(share: float) -> None:
+    for seed in range(50):
+        step = 10 * MS * np.maximum(1.0 + share * np.random.default_rng(seed).standard_normal(DECIDING), 0.01)
+        noise = stamp_noise(START + np.cumsum(np.rint(step)).astype(np.int64))
+        assert noise is not None and not noise.corrected
+
+
+# --- regular stamps ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("sd", "left"), [(1.0, 0.15), (2.0, 0.3), (3.0, 0.9)])
+def test_regular_stamps_are_near_the_true_times(sd: float, left: float) -> None:
+    true = grid(2000)
+    stamp = np.maximum.accumulate(noisy(true, sd) - np.arange(2000)) + np.arange(2000)
+    error = (regular(stamp) - true) / MS
+    assert np.std(error) < left and np.abs(error).max() < 8 * left and abs(error.mean()) < 0.2 * sd
+
+
+def test_a_slow_drift_of_the_rate_is_kept() -> None:
+    true = np.asarray(START + np.cumsum(10 * MS + np.linspace(0.0, 0.2 * MS, 3000)), dtype=np.int64)
+    assert np.std(regular(noisy(true, 1.0)) - true) < 0.2 * MS
+
+
+def test_missing_samples_are_counted() -> None:
+    true = np.delete(grid(2000), [300, 301, 700, 1100, 1101, 1102, 1500])
+    stamp = noisy(true, 1.0)
+    noise = stamp_noise(stamp[:DECIDING])
+    assert noise is not None
+    found = missing_before(stamp, noise)
+    assert dict(zip(np.flatnonzero(found).tolist(), found[found > 0].tolist(), strict=True)) == {
+        300: 2,
+        698: 1,
+        1097: 3,
+        1494: 1,
+    }
+    assert np.std(regular(stamp) - true) < 0.2 * MS
+
+
+def test_no_sample_is_missing_in_a_regular_stream() -> None:
+    for sd in (1.0, 2.0):
+        noise = stamp_noise(noisy(grid(3000), sd))
+        assert noise is not None and width(noise) < width(replace(noise, jitter=2 * noise.jitter))
+        assert not missing_before(noisy(grid(3000), sd), noise).any()
+    assert noise is not None and not missing_before(grid(4 * width(noise)), noise).any()
+
+
+def test_a_gap_separates_the_lines_on_either_side() -> None:
+    true = np.concatenate([grid(400), grid(400) + 4_055 * MS])  # not a multiple of the period
+    error = (regular(noisy(true, 1.0)) - true) / MS
+    assert np.abs(error).max() < 1.0, "at the ends a line is less certain"
+
+
+def test_data_that_are_missing_separate_the_lines_too() -> None:
+    true = np.concatenate([grid(200), grid(200) + 2_004 * MS])
+    whole = samples(noisy(true, 1.0))
+    whole.interrupted[200] = True
+    assert np.abs(RegularStamps().take(whole, final=True).stamp - true).max() < 1.2 * MS
+
+
+def test_jitter_that_begins_later_is_replaced_from_the_next_samples_on() -> None:
+    true = grid(1000)
+    stamp = np.where(np.arange(1000) < 3 * DECIDING, true, noisy(true, 2.0))
+    found = regular(stamp)
+    assert np.array_equal(found[: 4 * DECIDING], stamp[: 4 * DECIDING])
+    assert np.std(found[4 * DECIDING :] - true[4 * DECIDING :]) < 0.5 * MS
+
+
+def test_a_short_stream_is_decided_by_what_there_is() -> None:
+    assert np.std(regular(noisy(grid(60), 2.0)) - grid(60)) < 1.0 * MS
+    few = noisy(grid(9), 2.0)
+    assert np.array_equal(regular(few), few)
+
+
+@pytest.mark.parametrize("sd", [0.0, 0.2, 1.0, 2.0])
+@pytest.mark.parametrize("portion", [3, DECIDING])
+def test_the_stamps_do_not_depend_on_the_portions(sd: float, portion: int) -> None:
+    rng = np.random.default_rng(3)
+    true = np.delete(grid(1500), [*rng.integers(0, 1500, 12), *range(800, 830)])
+    stamp = noisy(true, sd)
+    assert np.array_equal(regular(stamp, portion), regular(stamp))
+
+
+def test_the_stamps_do_not_depend_on_how_many_are_fitted_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    stamp = noisy(grid(700), 1.0)
+    whole = regular(stamp)
+    monkeypatch.setattr(regular_stamps, "ROWS", 90)
+    assert np.array_equal(regular(stamp), whole)
+
+
+@settings(max_examples=30, deadline=None)
+@given(sd=st.floats(0.0, 6.0), seed=st.integers(0, 9), missing=st.lists(st.integers(0, 699), max_size=60))
+def test_regular_stamps_increase(sd: float, seed: int, missing: list[int]) -> None:
+    stamp = np.delete(np.sort(noisy(grid(700), sd, seed)), missing)
+    stamp = stamp[np.diff(stamp, prepend=0) > 0]
+    assert (np.diff(regular(stamp)) > 0).all()
+
+
+def test_few_samples_are_kept() -> None:
+    taker, stamp = RegularStamps(), noisy(grid(4000), 1.0)
+    for first in range(0, 4000, 50):
+        taker.take(samples(stamp[first : first + 50]))
+        segment = taker._segment
+        assert taker.waiting <= max(DECIDING, AROUND + 3 * MOST_WIDTH + 50)
+        assert segment is None or len(segment._samples.stamp) < 500
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+@cache
+def bag(name: str) -> Recording:
+    return read_recording(BAGS / name)
+
+
+def with_jitter(recording: Recording, sd: float, kind: str = "gaussian", seed: int = 0) -> Recording:
+    """Jitter in the stamps of every stream, independent from sample to sample; sd in ms."""
+    rng = np.random.default_rng(seed)
+
+    def one(stream: Any) -> Any:
+        noise = sd * MS * rng.standard_normal(len(stream))
+        noise = np.abs(noise) if kind == "delay" else noise
+        return replace(stream, stamp=stream.stamp + np.rint(noise).astype(np.int64))
+
+    return replace(recording, slider=one(recording.slider), pusher=one(recording.pusher), wrench=one(recording.wrench))
+
+
+@pytest.mark.parametrize("name", ["hexagon_delrin", "ellipse_plywood"])
+def test_undisturbed_recordings_keep_their_stamps(name: str) -> None:
+    recording = bag(name)
+    finder = WindowFinder(require_rig(recording))
+    finder.find(recording)
+    for stream in (recording.slider, recording.pusher, recording.wrench):
+        assert stream is not None
+        increasing = stream.stamp[np.diff(np.maximum.accumulate(stream.stamp), prepend=0) > 0]
+        assert np.array_equal(regular(increasing), increasing)
+
+
+def rows(stream: Any, begin: int, end: int) -> Any:
+    return type(stream)(*(column[begin:end] for column in vars(stream).values()))
+
+
+@cache
+def half(number: int) -> Recording:
+    """The first or second half of a recording, of some 60 pushes."""
+    recording = bag("square_abs_test")
+    middle = int(recording.slider.stamp[len(recording.slider) // 2])
+    kept = {}
+    for name in ("slider", "pusher", "wrench"):
+        stream = getattr(recording, name)
+        at = int(np.searchsorted(stream.stamp, middle))
+        kept[name] = rows(stream, *((0, at) if number == 0 else (at, len(stream))))
+    return replace(recording, **kept)
+
+
+def table_of(recording: Recording) -> PushTable:
+    return windows_to_table(find_windows(recording, require_rig(recording)))
+
+
+@cache
+def model() -> PushModel:
+    return train_model(table_of(half(0)), require_rig(half(0)), "gp", name="square")
+
+
+@cache
+def scored(sd: float, kind: str = "gaussian") -> tuple[PushTable, Comparison, dict[str, Any]]:
+    table = table_of(with_jitter(half(1), sd, kind) if sd else half(1))
+    comparison = compare(model(), table)
+    return table, comparison, metrics_json(comparison)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["gaussian", "delay"])
+def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percent(kind: str) -> None:
+    clean, (table, _, found) = scored(0.0)[2], scored(2.0, kind)
+    assert len(table.pushes) == len(scored(0.0)[0].pushes) > 55 and abs(len(table) - len(scored(0.0)[0])) < 8
+    assert found["nmse"]["total"] < 1.05 * clean["nmse"]["total"]
+    assert found["nlpd"]["total"] == pytest.approx(clean["nlpd"]["total"], abs=0.15)
+
+
+@pytest.mark.slow
+def test_the_alarm_stays_silent_with_jitter() -> None:
+    calibration = calibrate(model())
+    table, comparison, _ = scored(2.0)
+    assert not alarm_state(calibration, table, comparison.mean, comparison.covariance).fired
+
+
+def test_windows_of_jittery_streams_are_the_same_online_and_offline() -> None:
+    short = bag("circle_pu")
+    recording = with_jitter(short, 2.0)
+    rig, offline = require_rig(recording), find_windows(recording, require_rig(recording))
+    finder, found = WindowFinder(rig), []
+    assert recording.wrench is not None
+    for begin, end in pairwise(range(0, len(recording.slider) + 37, 37)):
+        finder.add_wrench(rows(recording.wrench, begin // 2, end // 2))
+        finder.add_pusher(rows(recording.pusher, begin, end))
+        finder.add_slider(rows(recording.slider, begin, end))
+        found += finder.take_ready()
+    assert {*finder.stamp_jitter} == {"slider", "pusher", "wrench"}
+    assert finder.stamp_jitter["slider"] == pytest.approx(0.002, rel=0.4)
+    found += finder.finish()
+    assert len(found) == len(offline) > 20
+    for one, other in zip(found, offline, strict=True):
+        assert (one.start, one.end, one.push_id) == (other.start, other.end, other.push_id)
+        np.testing.assert_allclose(one.displacement, other.displacement, rtol=0.0, atol=1e-12)
+
+
+def test_the_check_states_the_jitter() -> None:
+    recording = bag("circle_pu")
+    assert not [each for each in check_recording(recording, require_rig(recording)) if each.name == "stamp_jitter"]
+    slider = with_jitter(recording, 2.0).slider
+    (found,) = [
+        each
+        for each in check_recording(replace(recording, slider=slider), require_rig(recording))
+        if each.name == "stamp_jitter"
+    ]
+    assert found.severity == "note" and "slider 2 ms (20 % of the period)." in found.sentence
+    assert [*found.values] == ["slider_jitter"] and found.values["slider_jitter"].value == pytest.approx(2e-3, rel=0.1)
+
+
+def test_streams_without_samples_have_no_finding() -> None:
+    recording = bag("circle_pu")
+    none = WrenchStream(*(np.empty(0, kind) for kind in (np.int64, float, float, float)))
+    assert isinstance(recording.slider, PoseStream)
+    assert not [each for each in check_recording(replace(recording, wrench=none), require_rig(recording))
+                if each.name == "stamp_jitter"]  # fmt: skip
