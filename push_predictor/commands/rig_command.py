@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 MEASURED = {
     "tip_radius": "the radius of the pusher's round tip in metres",
     "surface": "a name of the surface, for example plywood",
-    "mass": "the slider's mass in kilograms",
 }
 SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
 PICTURES = ".svg"
@@ -45,7 +44,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "rig",
         "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
         "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place and size.",
-        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --mass 0.8 --out rig.yaml",
+        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --out rig.yaml",
     )
     _add_shapes(parser)
     _add_measured(parser)
@@ -82,7 +81,7 @@ def _add_measured(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("what else was measured")
     group.add_argument("--tip-radius", type=float, metavar="R", help="radius of the pusher's round tip, m")
     group.add_argument("--surface", metavar="NAME", help="name of the surface")
-    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg")
+    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg, if it is known")
     group.add_argument("--contact-friction", type=float, metavar="MU", help="pusher on slider, if it is known")
     group.add_argument("--surface-friction", type=float, metavar="MU", help="slider on surface, if it is known")
     group.add_argument(
@@ -146,7 +145,7 @@ def _check_call(options: argparse.Namespace, shape: str | None) -> None:
     for name, meaning in MEASURED.items():
         if shape is not None and getattr(options, name) is None:
             raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
-    for name in (*MEASURED, "name", "contact_friction", "surface_friction", "support_point"):
+    for name in (*MEASURED, "mass", "name", "contact_friction", "surface_friction", "support_point"):
         if shape is None and getattr(options, name) is not None:
             raise RequestError(f"--{name.replace('_', '-')}", getattr(options, name), "it only with a shape")
 
