@@ -28,12 +28,15 @@ from push_predictor.errors import RequestError
 if TYPE_CHECKING:
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.rigs.estimate import RigEstimate
+    from push_predictor.recordings.rigs.polygon_file import Polygon
 
 MEASURED = {
     "tip_radius": "the radius of the pusher's round tip in metres",
     "surface": "a name of the surface, for example plywood",
 }
-SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
+SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon", "svg", "dxf")
+FILES = ("polygon", "svg", "dxf")
+UNITS = ("mm", "cm", "m", "in")
 PICTURES = ".svg"
 
 
@@ -69,12 +72,28 @@ def _add_shapes(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
-        "of [x, y]. From CAD: export the corners of the base as CSV",
+        "of [x, y]",
+    )
+    one.add_argument(
+        "--svg",
+        type=Path,
+        metavar="FILE",
+        help="a drawing with one closed outline, seen from above: polygon, rect, circle, ellipse, or a path of straight "
+        "segments. Its scale: width in mm or cm with viewBox, or --unit",
+    )
+    one.add_argument(
+        "--dxf",
+        type=Path,
+        metavar="FILE",
+        help="a drawing with one closed outline, seen from above: polyline, lines, circle or ellipse. Needs ezdxf",
     )
     group.add_argument(
-        "--keep-origin", action="store_true", help="the polygon's origin is that of the tracked frame: do not move it"
+        "--unit", choices=UNITS, help="length of one unit of the drawing; default: as the drawing states"
     )
-    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the polygon's file name")
+    group.add_argument(
+        "--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"
+    )
+    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the name of the file")
 
 
 def _add_measured(parser: argparse.ArgumentParser) -> None:
@@ -140,8 +159,10 @@ def _check_call(options: argparse.Namespace, shape: str | None) -> None:
             raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
     if shape is not None and options.rig is not None:
         raise RequestError("--rig", str(options.rig), f"either it or --{shape}")
-    if options.keep_origin and shape != "polygon":
-        raise RequestError("--keep-origin", True, "it only with --polygon")
+    if options.keep_origin and shape not in FILES:
+        raise RequestError("--keep-origin", True, "it only with --polygon, --svg or --dxf")
+    if options.unit is not None and shape not in ("svg", "dxf"):
+        raise RequestError("--unit", options.unit, "it only with --svg or --dxf")
     for name, meaning in MEASURED.items():
         if shape is not None and getattr(options, name) is None:
             raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
@@ -171,21 +192,31 @@ def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, 
 
     from push_predictor.geometry.shapes import ellipse, rectangle
     from push_predictor.recordings.rigs.new_rig import length_of, new_rig
-    from push_predictor.recordings.rigs.polygon_file import read_polygon
 
     moved = np.zeros(2)
     notes: tuple[str, ...] = ()
-    if shape == "polygon":
-        polygon = read_polygon(options.polygon, options.keep_origin)
+    if shape in FILES:
+        polygon = _from_file(options, shape)
         outline, moved, notes = polygon.outline, polygon.moved, polygon.notes
     else:
         given = getattr(options, shape)
         sizes = [length_of(f"--{shape}", size) for size in (given if isinstance(given, list) else [given, given])]
         outline = ellipse(sizes[0] / 2.0, sizes[1] / 2.0) if shape in ("circle", "ellipse") else rectangle(*sizes)
     points = None if options.support_point is None else np.array(options.support_point) + [*moved, 0.0]
-    name = options.name or (options.polygon.stem if shape == "polygon" else shape)
+    name = options.name or (getattr(options, shape).stem if shape in FILES else shape)
     measured = (options.tip_radius, options.surface, options.mass)
     return new_rig(name, outline, *measured, points, options.contact_friction, options.surface_friction), notes
+
+
+def _from_file(options: argparse.Namespace, shape: str) -> Polygon:
+    from push_predictor.recordings.rigs.dxf_file import read_dxf
+    from push_predictor.recordings.rigs.polygon_file import read_polygon
+    from push_predictor.recordings.rigs.svg_file import read_svg
+
+    if shape == "polygon":
+        return read_polygon(options.polygon, options.keep_origin)
+    read = read_svg if shape == "svg" else read_dxf
+    return read(getattr(options, shape), options.unit, options.keep_origin)
 
 
 def _write(options: argparse.Namespace, rig: Rig) -> None:
