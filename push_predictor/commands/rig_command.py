@@ -78,8 +78,8 @@ def _add_shapes(parser: argparse.ArgumentParser) -> None:
         "--svg",
         type=Path,
         metavar="FILE",
-        help="a drawing with one closed outline, seen from above: polygon, rect, circle, ellipse, or a path of straight "
-        "segments. Its scale: width in mm or cm with viewBox, or --unit",
+        help="a drawing with one closed outline, seen from above: polygon, rect, circle, ellipse, or a path of "
+        "straight segments. Its scale: width in mm or cm with viewBox, or --unit",
     )
     one.add_argument(
         "--dxf",

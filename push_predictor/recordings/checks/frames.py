@@ -42,7 +42,7 @@ BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the g
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
 AT_REST = 0.1  # share of the slider's motion; a slider moves only with the tip, or in a hand
 TIE = 1.3  # hypotheses with gaps up to this ratio fit equally well: the more usual one is named
-FEW_SAMPLES = 400  # enough for the gap alone, of hypotheses that are mostly wrong
+FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wrong
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
 OUTLINE_MIRRORED = "outline_mirrored"

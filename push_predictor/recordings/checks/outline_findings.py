@@ -187,7 +187,7 @@ def _shape_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
     place = f"on side {edge + 1}" if rig.outline.semi_axes is None else f"at contact {fit.push_contacts[largest]:.2f}"
     sentence = (
         f"The outline's shape is wrong: no turn, shift or size explains the contacts. After the correction, "
-        f"{np.count_nonzero(off)} of {fit.pushes} pushes touch over {1e3 * LENGTH_ALLOWANCE:.1f} mm off the outline, at "
+        f"{np.count_nonzero(off)} of {fit.pushes} pushes touch over {1e3 * LENGTH_ALLOWANCE:.1f} mm off it, at "
         f"most {1e3 * abs(gap):.1f} mm {'outside' if gap > 0.0 else 'inside'}, {place}."
     )
     advice = "Measure the outline there again. If only single pushes are off, their poses may be disturbed."

@@ -44,8 +44,8 @@ class Oval:
 class Drawing:
     """What a drawing contains, y upwards, in its own unit.
 
-    polygons: vertices (n, 2) of closed polygons; others: kinds of elements that are no closed outline. metres: length of
-    the unit, None if the drawing does not state one.
+    polygons: vertices (n, 2) of closed polygons; others: kinds of elements that are no closed outline. metres: length
+    of the unit, None if the drawing does not state one.
     """
 
     polygons: list[Array] = field(default_factory=list)
@@ -67,7 +67,9 @@ def outline_of_drawing(path: Path, drawing: Drawing, unit: str | None, keep_orig
             f"{path}: contains {_contents(drawing)}, give a drawing with one closed outline and nothing else"
         )
     if drawing.polygons:
-        return polygon_of(path, metres * drawing.polygons[0], keep_origin)
+        vertices = metres * drawing.polygons[0]
+        repeated = np.linalg.norm(vertices[-1] - vertices[0]) < SAME_LENGTH  # the end of a line that returns
+        return polygon_of(path, vertices[:-1] if repeated else vertices, keep_origin)
     return _smooth(path, drawing.ovals[0], metres, keep_origin)
 
 
