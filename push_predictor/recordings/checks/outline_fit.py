@@ -64,7 +64,7 @@ class Contacts:
     push: IntArray
     poses: Array
 
-    def at(self, rows: Array) -> Contacts:
+    def at(self, rows: IntArray | BoolArray) -> Contacts:
         """The chosen samples: indices, or a mask (n,)."""
         return Contacts(self.tips[rows], self.velocities[rows], self.push[rows], self.poses[rows])
 
