@@ -46,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "rig",
         "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
-        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place and size.",
+        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place, size or tip radius.",
         "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --out rig.yaml",
     )
     _add_shapes(parser)

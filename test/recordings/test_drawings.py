@@ -25,6 +25,7 @@ import pytest
 from push_predictor.cli import main
 from push_predictor.errors import RigError
 from push_predictor.recordings.rig import load_rig
+from push_predictor.recordings.rigs.drawing import Drawing, outline_of_drawing
 from push_predictor.recordings.rigs.dxf_file import INSUNITS, read_dxf
 from push_predictor.recordings.rigs.polygon_file import Polygon
 from push_predictor.recordings.rigs.svg_file import read_svg
@@ -129,6 +130,16 @@ def test_groups_and_transforms_place_the_outline(tmp_path: Path) -> None:
     assert same_polygon(read_svg(svg(tmp_path, turned)), clockwise)
     over = read_svg(svg(tmp_path, f'<polygon points="{ELL}" transform="scale(1,-1)"/>'))
     assert same_polygon(over, (ell_at_centroid() * [1.0, -1.0])[::-1])
+
+
+def test_transforms_of_one_element_apply_from_the_right(tmp_path: Path) -> None:
+    shown = f'<polygon points="{ELL}" transform="translate(10) scale(2)"/>'
+    assert same_polygon(read_svg(svg(tmp_path, shown), keep_origin=True), 1e-3 * (2.0 * SEEN + [10.0, 0.0]))
+
+
+def test_a_given_unit_replaces_that_of_the_drawing() -> None:
+    drawing = Drawing(polygons=[SEEN], metres=0.001)
+    assert same_polygon(outline_of_drawing(Path("part.dxf"), drawing, "cm", True), 0.01 * SEEN)
 
 
 def test_what_is_not_shown_is_ignored(tmp_path: Path) -> None:

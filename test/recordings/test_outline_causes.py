@@ -196,10 +196,21 @@ def test_the_estimate_of_a_wrong_tip_of_an_ellipse_corrects_the_tip_alone() -> N
     assert lines == ["unchanged", "corrected in the rig"]
 
 
+def test_a_wrong_size_and_a_wrong_tip_are_corrected_together() -> None:
+    rig = rig_of(OVAL)
+    altered = replace(rig, pusher_radius=rig.pusher_radius + 0.0015, outline=transformed(rig.outline, size=1.03))
+    estimate = estimate_rig(bag(OVAL), altered)
+    assert [finding.name for finding in estimate.findings] == ["outline_size", "tip_radius"]
+    assert estimate.corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
+    assert estimate.corrected.outline.area == pytest.approx(rig.outline.area, rel=2e-3)
+    lines = [line.split(": ")[-1] for line in estimate.lines if line.startswith(("  size", "  tip"))]
+    assert lines == ["unchanged", "unchanged", "corrected in the rig"]
+
+
 # --- shape -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("more", [0.002, -0.002, 0.001])
+@pytest.mark.parametrize("more", [0.002, -0.002, 0.0013])
 def test_a_wrong_axis_of_an_ellipse_is_a_wrong_shape_with_both_sizes(more: float) -> None:
     a, b = rig_of(OVAL).outline.semi_axes or NOWHERE
     altered = replace(rig_of(OVAL), outline=ellipse(a + more, b))
