@@ -256,6 +256,21 @@ def test_an_ellipse_given_as_a_circle_is_a_wrong_shape() -> None:
     assert "at contact 0." in finding.sentence
 
 
+def disturbed(recording: Recording, seed: int) -> Recording:
+    """Each four seconds another offset of the tracker (0.15 mm), and noise of each sample (0.1 mm)."""
+    slider, rng = recording.slider, np.random.default_rng(seed)
+    period = (slider.stamp - slider.stamp[0]) // 4_000_000_000
+    offset = rng.normal(0.0, 1.5e-4, (int(period.max()) + 1, 2))[period]
+    x, y = offset.T + rng.normal(0.0, 1e-4, (2, len(period)))
+    return replace(recording, slider=replace(slider, x=slider.x + x, y=slider.y + y))
+
+
+@pytest.mark.parametrize("name", [ROUND, HEXAGON])
+def test_a_tracker_with_noise_and_offsets_gives_no_finding(name: str) -> None:
+    for seed in range(6):
+        assert check_recording(disturbed(bag(name), seed), rig_of(name)) == ()
+
+
 def finding_of(name: str, **values: float) -> Finding:
     return Finding(name, "warning", "", "", {key: Value(value, "1") for key, value in values.items()})
 

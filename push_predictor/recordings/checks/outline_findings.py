@@ -53,6 +53,8 @@ from push_predictor.types import Array
 
 FEWEST_PUSHES = 8  # for five parameters: with fewer, the spread between pushes gives no standard deviation
 SHARE_OFF = 0.05  # of the pushes: if more lie off the corrected outline, its shape is wrong
+NOISY = 3.0 * 1.48  # three standard deviations of the pushes, in median absolute gaps
+ONE_PUSH_OFF = 2.0 * LENGTH_ALLOWANCE  # m; a single push may be disturbed by more than the allowance
 UNSEPARATED = "these contacts do not separate the two"
 
 
@@ -179,15 +181,17 @@ def _extent(rig: Rig) -> Array:
 
 def _shape_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
     """Whether pushes lie off the corrected outline, and on which side most do."""
-    off = fit.off(rig.outline, LENGTH_ALLOWANCE)
-    if np.mean(off) <= SHARE_OFF:
+    usual = NOISY * float(np.median(np.abs(fit.push_gaps))) if fit.spread < LENGTH_ALLOWANCE else 0.0
+    limit = max(LENGTH_ALLOWANCE, usual)
+    off = fit.off(rig.outline, limit)
+    if np.mean(off) <= SHARE_OFF or (np.count_nonzero(off) == 1 and not fit.off(rig.outline, ONE_PUSH_OFF).any()):
         return []
     largest = int(np.argmax(np.where(off, np.abs(fit.push_gaps), 0.0)))
     gap, edge = float(fit.push_gaps[largest]), int(rig.outline.edge(fit.push_contacts[largest : largest + 1])[0][0])
     place = f"on side {edge + 1}" if rig.outline.semi_axes is None else f"at contact {fit.push_contacts[largest]:.2f}"
     sentence = (
         f"The outline's shape is wrong: no turn, shift or size explains the contacts. After the correction, "
-        f"{np.count_nonzero(off)} of {fit.pushes} pushes touch over {1e3 * LENGTH_ALLOWANCE:.1f} mm off it, at "
+        f"{np.count_nonzero(off)} of {fit.pushes} pushes touch over {1e3 * limit:.1f} mm off it, at "
         f"most {1e3 * abs(gap):.1f} mm {'outside' if gap > 0.0 else 'inside'}, {place}."
     )
     advice = "Measure the outline there again. If only single pushes are off, their poses may be disturbed."

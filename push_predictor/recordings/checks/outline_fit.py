@@ -43,6 +43,7 @@ UNKNOWN_SIZE = 0.02  # relative sd
 NOISE = 1e-4  # m; a gap beyond this counts linearly, not squared
 LARGEST = 0.01  # m; a larger gap counts as this much in the cost
 CORNER = 0.003  # m
+SHORT = 0.3  # of the median number of samples
 DISTURBED = 0.001  # m; the spread from which on world frames are sought that are far apart
 STARTS = 12  # turns from which the fit begins
 # Prior sd of what the contacts do not determine, in the units of OutlineFit.
@@ -79,7 +80,8 @@ class OutlineFit:
     minus that along its y. estimate and sd are 0 where a parameter was not fitted.
 
     gap: median absolute gap that is left, m; cost: its mean, m; push_gaps (pushes,): the median of each push, m,
-    signed, and push_contacts (pushes,) where it is on the outline. centre (2,): mean place of the tip, m, world frame.
+    signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples. centre (2,):
+    mean place of the tip, m, world frame.
     """
 
     estimate: Array
@@ -88,6 +90,7 @@ class OutlineFit:
     cost: float
     push_gaps: Array
     push_contacts: Array
+    push_samples: IntArray
     centre: Array
 
     @property
@@ -96,9 +99,13 @@ class OutlineFit:
         return len(self.push_gaps)
 
     def off(self, outline: Outline, allowance: float) -> BoolArray:
-        """Which pushes (pushes,) have a larger gap (m), apart from those at corners: real corners are rounded."""
-        away = _away_from_corners(outline, self.push_contacts)
-        return np.asarray((np.abs(self.push_gaps) > allowance) & (away >= CORNER))
+        """Which pushes (pushes,) have a larger gap (m).
+
+        Not those at corners, which are rounded, nor short ones: a jump of the slider's pose may look like a contact.
+        """
+        judged = _away_from_corners(outline, self.push_contacts) >= CORNER
+        judged &= self.push_samples >= SHORT * np.median(self.push_samples)
+        return np.asarray((np.abs(self.push_gaps) > allowance) & judged)
 
     @property
     def spread(self) -> float:
@@ -207,7 +214,8 @@ def _fit(
     if turns := centred.rotational_symmetry:
         estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
     gap = float(np.median(np.abs(left - radius)))
-    return OutlineFit(estimate, sd, gap, _cost(gaps, part), push_gaps, places, touches.centre)
+    samples = np.unique(touches.push, return_counts=True)[1]
+    return OutlineFit(estimate, sd, gap, _cost(gaps, part), push_gaps, places, samples, touches.centre)
 
 
 class _Touches:
