@@ -32,6 +32,8 @@ from push_predictor.geometry.shapes import ellipse, near_symmetry, rectangle, sh
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.outline_findings import fit_rig, outline_findings
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.rigs.estimate import estimate_rig
@@ -269,6 +271,15 @@ def disturbed(recording: Recording, seed: int) -> Recording:
 def test_a_tracker_with_noise_and_offsets_gives_no_finding(name: str) -> None:
     for seed in range(6):
         assert check_recording(disturbed(bag(name), seed), rig_of(name)) == ()
+
+
+@pytest.mark.parametrize(("off", "names"), [(0.0007, []), (0.0015, ["outline_shape"])])
+def test_a_single_push_needs_to_be_far_off(off: float, names: list[str]) -> None:
+    contacts, rig = contacts_of(bag(ROUND), rig_of(ROUND)), rig_of(ROUND)
+    assert contacts is not None
+    away = np.where(contacts.push == contacts.push[-1], off, 0.0) / np.linalg.norm(contacts.tips, axis=1)
+    moved = replace(contacts, tips=contacts.tips * (1.0 + away[:, None]))
+    assert [finding.name for finding in outline_findings(moved, rig, fit_rig(moved, rig))] == names
 
 
 def finding_of(name: str, **values: float) -> Finding:
