@@ -28,13 +28,15 @@ from push_predictor.errors import RequestError
 if TYPE_CHECKING:
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.rigs.estimate import RigEstimate
+    from push_predictor.recordings.rigs.polygon_file import Polygon
 
 MEASURED = {
     "tip_radius": "the radius of the pusher's round tip in metres",
     "surface": "a name of the surface, for example plywood",
-    "mass": "the slider's mass in kilograms",
 }
-SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
+SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon", "svg", "dxf")
+FILES = ("polygon", "svg", "dxf")
+UNITS = ("mm", "cm", "m", "in")
 PICTURES = ".svg"
 
 
@@ -44,8 +46,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "rig",
         "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
-        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place and size.",
-        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --mass 0.8 --out rig.yaml",
+        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place, size or tip radius.",
+        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --out rig.yaml",
     )
     _add_shapes(parser)
     _add_measured(parser)
@@ -70,19 +72,35 @@ def _add_shapes(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
-        "of [x, y]. From CAD: export the corners of the base as CSV",
+        "of [x, y]",
+    )
+    one.add_argument(
+        "--svg",
+        type=Path,
+        metavar="FILE",
+        help="a drawing with one closed outline, seen from above: polygon, rect, circle, ellipse, or a path of "
+        "straight segments. Its scale: width in mm or cm with viewBox, or --unit",
+    )
+    one.add_argument(
+        "--dxf",
+        type=Path,
+        metavar="FILE",
+        help="a drawing with one closed outline, seen from above: polyline, lines, circle or ellipse. Needs ezdxf",
     )
     group.add_argument(
-        "--keep-origin", action="store_true", help="the polygon's origin is that of the tracked frame: do not move it"
+        "--unit", choices=UNITS, help="length of one unit of the drawing; default: as the drawing states"
     )
-    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the polygon's file name")
+    group.add_argument(
+        "--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"
+    )
+    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the name of the file")
 
 
 def _add_measured(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("what else was measured")
     group.add_argument("--tip-radius", type=float, metavar="R", help="radius of the pusher's round tip, m")
     group.add_argument("--surface", metavar="NAME", help="name of the surface")
-    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg")
+    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg, if it is known")
     group.add_argument("--contact-friction", type=float, metavar="MU", help="pusher on slider, if it is known")
     group.add_argument("--surface-friction", type=float, metavar="MU", help="slider on surface, if it is known")
     group.add_argument(
@@ -141,12 +159,14 @@ def _check_call(options: argparse.Namespace, shape: str | None) -> None:
             raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
     if shape is not None and options.rig is not None:
         raise RequestError("--rig", str(options.rig), f"either it or --{shape}")
-    if options.keep_origin and shape != "polygon":
-        raise RequestError("--keep-origin", True, "it only with --polygon")
+    if options.keep_origin and shape not in FILES:
+        raise RequestError("--keep-origin", True, "it only with --polygon, --svg or --dxf")
+    if options.unit is not None and shape not in ("svg", "dxf"):
+        raise RequestError("--unit", options.unit, "it only with --svg or --dxf")
     for name, meaning in MEASURED.items():
         if shape is not None and getattr(options, name) is None:
             raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
-    for name in (*MEASURED, "name", "contact_friction", "surface_friction", "support_point"):
+    for name in (*MEASURED, "mass", "name", "contact_friction", "surface_friction", "support_point"):
         if shape is None and getattr(options, name) is not None:
             raise RequestError(f"--{name.replace('_', '-')}", getattr(options, name), "it only with a shape")
 
@@ -172,21 +192,31 @@ def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, 
 
     from push_predictor.geometry.shapes import ellipse, rectangle
     from push_predictor.recordings.rigs.new_rig import length_of, new_rig
-    from push_predictor.recordings.rigs.polygon_file import read_polygon
 
     moved = np.zeros(2)
     notes: tuple[str, ...] = ()
-    if shape == "polygon":
-        polygon = read_polygon(options.polygon, options.keep_origin)
+    if shape in FILES:
+        polygon = _from_file(options, shape)
         outline, moved, notes = polygon.outline, polygon.moved, polygon.notes
     else:
         given = getattr(options, shape)
         sizes = [length_of(f"--{shape}", size) for size in (given if isinstance(given, list) else [given, given])]
         outline = ellipse(sizes[0] / 2.0, sizes[1] / 2.0) if shape in ("circle", "ellipse") else rectangle(*sizes)
     points = None if options.support_point is None else np.array(options.support_point) + [*moved, 0.0]
-    name = options.name or (options.polygon.stem if shape == "polygon" else shape)
+    name = options.name or (getattr(options, shape).stem if shape in FILES else shape)
     measured = (options.tip_radius, options.surface, options.mass)
     return new_rig(name, outline, *measured, points, options.contact_friction, options.surface_friction), notes
+
+
+def _from_file(options: argparse.Namespace, shape: str) -> Polygon:
+    from push_predictor.recordings.rigs.dxf_file import read_dxf
+    from push_predictor.recordings.rigs.polygon_file import read_polygon
+    from push_predictor.recordings.rigs.svg_file import read_svg
+
+    if shape == "polygon":
+        return read_polygon(options.polygon, options.keep_origin)
+    read = read_svg if shape == "svg" else read_dxf
+    return read(getattr(options, shape), options.unit, options.keep_origin)
 
 
 def _write(options: argparse.Namespace, rig: Rig) -> None:

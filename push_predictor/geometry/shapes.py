@@ -27,6 +27,7 @@ SMOOTH_VERTICES = 128
 ELLIPSES = {"ellip1": (0.0525, 0.0525), "ellip2": (0.065445, 0.0525), "ellip3": (0.0785, 0.0525)}  # semi-axes, m
 SQUARE_SIDE = 0.09
 HEXAGON_CIRCUMRADIUS = 0.0605
+NEAR = 0.08  # of the reach: vertices that one wrong measurement would bring together
 SHAPES = ("rect1", *ELLIPSES, "hex")
 
 
@@ -75,6 +76,41 @@ def transformed_points(outline: Outline, points: Array, yaw: float, shift: tuple
     """Points (n, 2) of the slider that `transformed` moves with the outline."""
     centre = outline.centroid
     return np.asarray(centre + rotate(size * (points - centre), np.array(yaw)) + shift)
+
+
+def stretched(outline: Outline, stretch: float) -> Outline:
+    """The outline, centroid at the origin, longer along its x axis by half of `stretch` (relative), shorter along y.
+
+    The axes of an ellipse are its semi-axes.
+    """
+    if stretch == 0.0:
+        return outline
+    factors = np.array([1.0 + stretch / 2.0, 1.0 - stretch / 2.0])
+    if outline.semi_axes is None:
+        return Outline(outline.vertices * factors)
+    turn = np.array(outline.pose[2])
+    vertices = rotate(factors * rotate(outline.vertices, -turn), turn)
+    a, b = (np.array(outline.semi_axes) * factors).tolist()
+    return Outline(vertices, (a, b), outline.pose)
+
+
+def near_symmetry(outline: Outline) -> int:
+    """The largest order of a turn about the origin after which no vertex is far from another; 0 for a circle.
+
+    At least the order of the rotational symmetry: a regular hexagon with one wrong vertex still has order 6.
+    """
+    exact = outline.rotational_symmetry
+    if outline.semi_axes is not None:
+        return exact
+    reach = float(np.max(np.linalg.norm(outline.vertices, axis=1)))
+    orders = (k for k in range(len(outline.vertices), 1, -1) if _after_turn(outline.vertices, k) < NEAR * reach)
+    return next(orders, exact)
+
+
+def _after_turn(vertices: Array, order: int) -> float:
+    """The largest distance (m) of a vertex, turned by a fraction of a full turn, from the nearest vertex."""
+    turned = rotate(vertices, np.array(2.0 * np.pi / order))
+    return float(np.max(np.min(np.linalg.norm(turned[:, None] - vertices, axis=2), axis=1)))
 
 
 def mirror_image(outline: Outline) -> Outline:

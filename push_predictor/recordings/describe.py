@@ -67,7 +67,8 @@ def _rig(recording: Recording) -> str:
     rig = recording.rig
     if rig is None:
         return "none: give it to the commands that need it, with --rig"
-    return f"{rig.shape} on {rig.surface}, {rig.object_mass:g} kg"
+    mass = "mass not given" if rig.object_mass is None else f"{rig.object_mass:g} kg"
+    return f"{rig.shape} on {rig.surface}, {mass}"
 
 
 def _bias(bias: WrenchBias) -> dict[str, object]:

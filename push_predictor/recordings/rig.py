@@ -30,7 +30,7 @@ from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
 RECORD_NAME = "push_rig"
-REQUIRED = ("shape", "outline", "pusher_radius", "surface", "object_mass")
+REQUIRED = ("shape", "outline", "pusher_radius", "surface")
 POSE = ("x", "y", "yaw")  # keys of shape_parameters: m, m, rad; a missing one is 0
 HOW_TO_GIVE = "give it with --rig FILE.yaml or the node parameter 'rig'"
 
@@ -39,15 +39,16 @@ HOW_TO_GIVE = "give it with --rig FILE.yaml or the node parameter 'rig'"
 class Rig:
     """A slider, the pusher and the surface.
 
-    pusher_radius in m, object_mass in kg. support_points: (k, 3) of x, y (m, body frame) and load share, or None.
-    contact_friction and surface_friction are Coulomb coefficients, None if unknown.
+    pusher_radius in m; object_mass in kg, None if unknown: quasi-static motion does not depend on it. support_points:
+    (k, 3) of x, y (m, body frame) and load share, or None. contact_friction and surface_friction are Coulomb
+    coefficients, None if unknown.
     """
 
     shape: str
     outline: Outline
     pusher_radius: float
     surface: str
-    object_mass: float
+    object_mass: float | None = None
     support_points: Array | None = None
     contact_friction: float | None = None
     surface_friction: float | None = None
@@ -59,8 +60,9 @@ class Rig:
             "outline": json.dumps(self.outline.vertices.tolist()),
             "pusher_radius": repr(float(self.pusher_radius)),
             "surface": self.surface,
-            "object_mass": repr(float(self.object_mass)),
         }
+        if self.object_mass is not None:
+            record["object_mass"] = repr(float(self.object_mass))
         if self.outline.semi_axes is not None:
             record["shape_parameters"] = json.dumps(_shape_parameters(self.outline))
         if self.support_points is not None:
@@ -84,7 +86,7 @@ def rig_from_record(record: Mapping[str, object], source: str) -> Rig:
         outline=_outline(record, source),
         pusher_radius=_positive(record, "pusher_radius", source),
         surface=str(record["surface"]),
-        object_mass=_positive(record, "object_mass", source),
+        object_mass=_optional(record, "object_mass", source),
         support_points=None if support in (None, "") else _numbers(record, "support_points", 3, source),
         contact_friction=_optional(record, "contact_friction", source),
         surface_friction=_optional(record, "surface_friction", source),

@@ -29,6 +29,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.rig import Rig, load_rig
 
 BAG = str(REPOSITORY / "bags" / "hexagon_delrin")
+SQUARE_BAG = str(REPOSITORY / "bags" / "square_abs_test")
 ROUND_BAG = str(REPOSITORY / "bags" / "circle_pu")
 EXCHANGED = ["--slider-topic", "pusher/pose", "--pusher-topic", "slider/pose"]
 MEASURED = ["--tip-radius", "0.00475", "--surface", "plywood", "--mass", "0.8"]
@@ -66,6 +67,18 @@ def test_sizes_are_those_that_a_caliper_measures(tmp_path: Path, arguments: list
     assert rig.outline.semi_axes == pytest.approx(outline.semi_axes) if outline.semi_axes else True
     assert (rig.shape, rig.surface) == (arguments[0].strip("-"), "plywood")
     assert (rig.pusher_radius, rig.object_mass) == (0.00475, 0.8)
+
+
+def test_a_rig_needs_no_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command of the specification, and the checks of a recording with the rig that it writes."""
+    out = tmp_path / "rig.yaml"
+    call = ["rig", "--square", "0.09", "--tip-radius", "0.00475", "--surface", "plywood", "--out", str(out)]
+    assert main(call) == 0
+    assert "mass           not given" in capsys.readouterr().out
+    assert load_rig(out).object_mass is None and "object_mass" not in out.read_text()
+    assert main(["check", SQUARE_BAG, "--rig", str(out), "--strict"]) == 0
+    assert main(["info", SQUARE_BAG, "--rig", str(out)]) == 0
+    assert "square on plywood, mass not given" in capsys.readouterr().out
 
 
 def test_a_rectangle_is_wide_along_x(tmp_path: Path) -> None:
@@ -179,7 +192,7 @@ def test_a_bad_value_is_refused_by_name(
     assert message in refused(capsys, tmp_path, *MEASURED, *arguments)
 
 
-@pytest.mark.parametrize("option", ["--tip-radius", "--surface", "--mass"])
+@pytest.mark.parametrize("option", ["--tip-radius", "--surface"])
 def test_what_was_not_measured_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str) -> None:
     at = MEASURED.index(option)
     assert option in refused(capsys, tmp_path, "--square", "0.09", *MEASURED[:at], *MEASURED[at + 2 :])

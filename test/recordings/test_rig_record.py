@@ -40,6 +40,14 @@ def test_a_rig_is_read_as_it_was_written(tmp_path: Path, shape: str, yaw: float,
     assert (read.outline.semi_axes, read.outline.pose) == (rig.outline.semi_axes, rig.outline.pose)
 
 
+def test_a_rig_without_mass_is_read_as_it_was_written() -> None:
+    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs")
+    assert "object_mass" not in rig.to_record()
+    assert rig_from_record(rig.to_record(), "here").object_mass is None
+    with pytest.raises(RigError, match="here: push_rig object_mass '-1'"):
+        rig_from_record({**rig.to_record(), "object_mass": "-1"}, "here")
+
+
 def test_a_centred_ellipse_has_the_record_of_earlier_versions() -> None:
     assert rig_of("ellip2", 0.0, (0.0, 0.0)).to_record()["shape_parameters"] == (
         '{"type": "ellipse", "a": 0.065445, "b": 0.0525}'

@@ -21,23 +21,25 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import mirror_image, transformed, transformed_points
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.frames import MIRRORS
-from push_predictor.recordings.checks.outline_findings import LENGTH_ALLOWANCE
+from push_predictor.recordings.checks.mirrors import MIRRORS
+from push_predictor.recordings.checks.outline_causes import LARGEST_SIZE_CHANGE, LARGEST_TIP_CHANGE, LENGTH_ALLOWANCE
 from push_predictor.recordings.rig import Rig
 
 CORRECTED = ("outline_mirrored", "outline_turned", "outline_shifted", "outline_size", "tip_radius")
 CENTRED_WITHIN = 0.5 * LENGTH_ALLOWANCE
-PREVENTS = (*MIRRORS, "outline_unchecked", "outline_misfit")
+PREVENTS = (*MIRRORS, "outline_unchecked", "outline_misfit", "outline_shape")
 
 
 def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
     """The rig whose outline and tip radius are those that the findings of `check_recording` estimate.
 
     Support points move with the outline. Other findings, such as mirrored frames and a clock lag, are faults of the
-    recording: they change nothing here. Without a finding, the rig is the same.
+    recording: they change nothing here. Without a finding, the rig is the same. Raises RigError for a size or a tip's
+    radius that no mistake of measurement explains.
     """
     found = {finding.name: finding.values for finding in findings if finding.name in CORRECTED}
     if not found:
@@ -50,12 +52,26 @@ def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
     moved = (0.0, 0.0) if shift is None else _centring(outline, shift["x"].value, shift["y"].value)
     size = found["outline_size"]["scale"].value if "outline_size" in found else 1.0
     radius = found["tip_radius"]["radius"].value if "tip_radius" in found else rig.pusher_radius
+    _check_plausible(rig, size, radius)
     points = rig.support_points
     if points is not None:
         places = transformed_points(outline, points[:, :2], yaw, moved, size)
         points = np.column_stack([places, points[:, 2]])
     corrected = transformed(outline, yaw, moved, size)
     return replace(rig, outline=corrected, pusher_radius=radius, support_points=points)
+
+
+def _check_plausible(rig: Rig, size: float, radius: float) -> None:
+    if not abs(size - 1.0) <= LARGEST_SIZE_CHANGE:
+        raise RigError(
+            f"outline: the contacts fit {size:.3f} times its size, which is not accepted, give sizes within "
+            f"{100.0 * LARGEST_SIZE_CHANGE:.0f} %: measure them, and the tip radius, again"
+        )
+    if not abs(radius - rig.pusher_radius) <= LARGEST_TIP_CHANGE * rig.pusher_radius:
+        raise RigError(
+            f"pusher_radius: the contacts fit {1e3 * radius:.2f} mm in place of {1e3 * rig.pusher_radius:.2f} mm, "
+            f"which is not accepted, give a radius within {100.0 * LARGEST_TIP_CHANGE:.0f} %: measure it again"
+        )
 
 
 def _centring(outline: Outline, x: float, y: float) -> tuple[float, float]:

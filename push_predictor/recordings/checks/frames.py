@@ -27,7 +27,9 @@ import numpy as np
 from push_predictor.geometry.frames import to_body
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.mirrors import MIRRORS, reflected
 from push_predictor.recordings.checks.motion import body_velocity, motion_of
+from push_predictor.recordings.checks.outline_causes import frames_apart
 from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, fit_rig, outline_findings, unchecked
 from push_predictor.recordings.checks.outline_fit import Contacts, OutlineFit
 from push_predictor.recordings.rig import Rig
@@ -40,15 +42,11 @@ BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the g
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
 AT_REST = 0.1  # share of the slider's motion; a slider moves only with the tip, or in a hand
 TIE = 1.3  # hypotheses with gaps up to this ratio fit equally well: the more usual one is named
+FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wrong
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
 OUTLINE_MIRRORED = "outline_mirrored"
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
-MIRRORS = {
-    "heading_clockwise": (1.0, -1.0, "the slider's heading", "Negate the heading: counter-clockwise is positive."),
-    "frame_mirrored": (-1.0, -1.0, "the slider's y axis and heading", "Use right-handed frames, seen from above."),
-    "y_mirrored": (-1.0, 1.0, "the slider's y axis", "Use right-handed frames, seen from above."),
-}
 
 
 def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
@@ -69,15 +67,19 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
     explained = min(BETTER * fit.gap, FAR * reach)
     if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
-    mirrors = {name: _gap(mirrored(recording, y, heading), rig) for name, (y, heading, *_) in MIRRORS.items()}
+    mirrors = {name: _gap_of(reflected(contacts, each), rig) for name, each in MIRRORS.items()}
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
     if found := _mirror_image_findings(contacts, rig, fit.gap, min(explained, mirrors[best])):
         return found
     if mirrors[best] < explained:
         return [_mirrored(best, fit.gap, mirrors[best])]
     if fit.gap > FAR * reach or _is_implausible(fit, reach):
+        if frames_apart(contacts, rig, fit) is not None:
+            return outline_findings(contacts, rig, fit)
         return [_another_body(recorded) if recorded > FAR * reach else _unexplained(recorded)]
-    return [*outline_findings(contacts, rig, fit), _unexplained(fit.gap)]
+    found = outline_findings(contacts, rig, fit)
+    explained_otherwise = {"frames_apart", "outline_shape"} & {finding.name for finding in found}
+    return found if explained_otherwise else [*found, _unexplained(fit.gap)]
 
 
 def swapped(recording: Recording) -> Recording:
@@ -97,14 +99,18 @@ def contacts_of(recording: Recording, rig: Rig) -> Contacts | None:
     if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
         return None
     touch = motion.contact
-    return Contacts(to_body(motion.tip, motion.slider)[touch], body_velocity(motion)[touch], motion.push[touch])
+    tips = to_body(motion.tip, motion.slider)[touch]
+    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch])
 
 
 def _gap(recording: Recording, rig: Rig) -> float:
     """The gap (m) that the best plausible correction leaves, infinity without one."""
-    if (contacts := contacts_of(recording, rig)) is None:
-        return np.inf
-    fit = fit_rig(contacts, rig)
+    contacts = contacts_of(recording, rig)
+    return np.inf if contacts is None else _gap_of(contacts, rig)
+
+
+def _gap_of(contacts: Contacts, rig: Rig) -> float:
+    fit = fit_rig(contacts.at(np.unique(np.linspace(0, len(contacts.tips) - 1, FEW_SAMPLES).astype(np.int64))), rig)
     return np.inf if _is_implausible(fit, _reach(rig)) else fit.gap
 
 
@@ -169,13 +175,13 @@ def _another_body(gap: float) -> Finding:
 
 
 def _mirrored(name: str, gap: float, after: float) -> Finding:
-    what, advice = MIRRORS[name][2:]
+    mirror = MIRRORS[name]
     sentence = (
-        f"The sign of {what} is wrong. With the sign changed, the median gap in contact falls from "
-        f"{1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
+        f"{mirror.mistake} With it corrected, the median gap in contact falls from {1e3 * gap:.1f} mm to "
+        f"{1e3 * after:.2f} mm."
     )
     values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding(name, "warning", sentence, advice, values)
+    return Finding(name, "warning", sentence, mirror.advice, values)
 
 
 def _outline_mirrored(gap: float, after: float) -> Finding:

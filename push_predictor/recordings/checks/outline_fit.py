@@ -15,56 +15,102 @@
 """Fit yaw, shift and size of the outline, the clock lag and the tip's radius to the tip's positions in contact.
 
 In contact the tip's centre is one tip radius from the outline. The gap that is left depends on the place of contact if
-the outline is turned, shifted or of a wrong size, and on the speed if the clocks are apart. The standard deviations
-take each push as one observation: the samples of a push share their errors.
+the outline is turned, shifted or of a wrong size, on the speed if the clocks are apart, and on the slider's heading and
+place if the world frames of tracker and robot are apart. The standard deviations take each push as one observation: the
+samples of a push share their errors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import transformed
+from push_predictor.geometry.shapes import near_symmetry, stretched, transformed
 from push_predictor.types import Array, BoolArray, IntArray
 
 Gaps: TypeAlias = Callable[[Array], Array]
+YAW, X, Y, SIZE, LAG, TIP, FRAME_YAW, FRAME_X, FRAME_Y, STRETCH = range(10)
+SIMILARITY = (YAW, X, Y, SIZE, LAG)
+FRAMES = (FRAME_YAW, FRAME_X, FRAME_Y)
 MOST_SAMPLES = 1200  # evenly drawn: more change the result by less than its standard deviation
 UNKNOWN_SIZE = 0.02  # relative sd
 NOISE = 1e-4  # m; a gap beyond this counts linearly, not squared
+LARGEST = 0.01  # m; a larger gap counts as this much in the cost
 CORNER = 0.003  # m
+SHORT = 0.3  # of the median number of samples
+DISTURBED = 0.001  # m; the spread from which on world frames are sought that are far apart
 STARTS = 12  # turns from which the fit begins
-WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02])  # rad, m, m, 1, s, m: prior sd of what the contacts do not determine
+# Prior sd of what the contacts do not determine, in the units of OutlineFit.
+WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3])
 TIE = 1.3  # ratio of the gaps up to which the smallest turn is preferred: an almost symmetric outline has several
+MOST_PUSHES = 0.8  # share of the pushes that lie within `spread`: a push in five may be disturbed
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """n samples in contact, in the slider's frame: tips (n, 2) m, velocities (n, 2) m/s, number of the push (n,)."""
+    """n samples in contact.
+
+    tips (n, 2) m and velocities (n, 2) m/s of the tip in the slider's frame; push (n,): number of the push; poses
+    (n, 3) of the slider in the world frame: x, y (m) and heading (rad).
+    """
 
     tips: Array
     velocities: Array
     push: IntArray
+    poses: Array
+
+    def at(self, rows: IntArray | BoolArray) -> Contacts:
+        """The chosen samples: indices, or a mask (n,)."""
+        return Contacts(self.tips[rows], self.velocities[rows], self.push[rows], self.poses[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class OutlineFit:
     """A correction of the outline in the slider's frame, and its uncertainty.
 
-    estimate (6,) and sd (6,): yaw (rad, counter-clockwise, about the centroid), shift along x and y (m), relative size
-    minus 1, lag of the slider's stamps (s), correction of the tip's radius (m); estimate and sd are 0 where a parameter
-    was not fitted. gap: median absolute gap that is left, m; pushes: number of contacts.
+    estimate (10,) and sd (10,): yaw (rad, counter-clockwise, about the centroid), shift along x and y (m), relative
+    size minus 1, lag of the slider's stamps (s), correction of the tip's radius (m); turn (rad, about `centre`) and
+    shift (m, m) that bring the tip from the pusher's world frame to the slider's; relative length along the outline's x
+    minus that along its y. estimate and sd are 0 where a parameter was not fitted.
+
+    gap: median absolute gap that is left, m; cost: its mean, m; push_gaps (pushes,): the median of each push, m,
+    signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples. centre (2,):
+    mean place of the tip, m, world frame.
     """
 
     estimate: Array
     sd: Array
     gap: float
-    pushes: int
+    cost: float
+    push_gaps: Array
+    push_contacts: Array
+    push_samples: IntArray
+    centre: Array
+
+    @property
+    def pushes(self) -> int:
+        """Number of contacts."""
+        return len(self.push_gaps)
+
+    def off(self, outline: Outline, allowance: float) -> BoolArray:
+        """Which pushes (pushes,) have a larger gap (m).
+
+        Not those at corners, which are rounded, nor short ones: a jump of the slider's pose may look like a contact.
+        """
+        judged = _away_from_corners(outline, self.push_contacts) >= CORNER
+        judged &= self.push_samples >= SHORT * np.median(self.push_samples)
+        return np.asarray((np.abs(self.push_gaps) > allowance) & judged)
+
+    @property
+    def spread(self) -> float:
+        """The gap (m) that all pushes but one in five keep below: what the correction leaves unexplained."""
+        return float(np.quantile(np.abs(self.push_gaps), MOST_PUSHES))
 
 
 def fit_outline(outline: Outline, radius: float, contacts: Contacts) -> OutlineFit:
@@ -72,77 +118,158 @@ def fit_outline(outline: Outline, radius: float, contacts: Contacts) -> OutlineF
 
     The size is taken as given too where the contacts do not separate it from a shift: all on one side, for example.
     """
-    fit = _fit(outline, radius, contacts, sized=True, tip=False)
-    return fit if fit.sd[3] < UNKNOWN_SIZE else _fit(outline, radius, contacts, sized=False, tip=False)
+    fit = _fit(outline, radius, contacts, SIMILARITY, _starts)
+    if fit.sd[SIZE] < UNKNOWN_SIZE:
+        return fit
+    return _fit(outline, radius, contacts, [each for each in SIMILARITY if each != SIZE], _starts)
 
 
-def fit_outline_and_tip(outline: Outline, radius: float, contacts: Contacts, first: OutlineFit) -> OutlineFit:
-    """Fit the correction with both size and tip radius. Large sd show that the contacts do not separate the two.
+def fit_outline_and(
+    further: Sequence[int], outline: Outline, radius: float, contacts: Contacts, first: OutlineFit
+) -> OutlineFit:
+    """Fit the correction with further parameters, from the fit without them. Large sd show what is not separable.
 
-    first: the fit without the radius. Contacts at corners are left out: real corners are rounded, and would decide.
+    With the tip's radius, contacts at corners are dropped: real corners are rounded, and would decide.
     """
-    sides = ~_at_corner(outline, contacts, first)
-    chosen = Contacts(contacts.tips[sides], contacts.velocities[sides], contacts.push[sides])
-    return _fit(outline, radius, chosen if sides.any() else contacts, sized=True, tip=True)
+    free = [*_fitted(first), *further]
+    return _fit(outline, radius, _chosen(outline, contacts, first, free), free, lambda *_: [first.estimate])
+
+
+def fit_tip(outline: Outline, radius: float, contacts: Contacts, first: OutlineFit) -> OutlineFit:
+    """Fit the tip's radius in place of the size, which is taken as given."""
+    free = [*(each for each in _fitted(first) if each != SIZE), TIP]
+    return _fit(outline, radius, _chosen(outline, contacts, first, free), free, lambda *_: [first.estimate])
+
+
+def fit_frames(outline: Outline, radius: float, contacts: Contacts, first: OutlineFit) -> OutlineFit:
+    """Fit turn and shift between the world frames of slider and pusher too, from the first fit and from afar."""
+    free = [*_fitted(first), *FRAMES]
+    apart = contacts.poses[:, :2].mean(axis=0) - to_world(contacts.tips, contacts.poses).mean(axis=0)
+    far = first.spread > DISTURBED
+
+    def starts(_: int, residuals: Gaps) -> list[Array]:
+        return [first.estimate, *(_frame_starts(apart, residuals) if far else [])]
+
+    return _fit(outline, radius, contacts, free, starts)
+
+
+def _fitted(fit: OutlineFit) -> list[int]:
+    return [int(each) for each in np.flatnonzero(fit.sd)]
+
+
+def _frame_starts(apart: Array, residuals: Gaps) -> list[Array]:
+    """The two best of the turns between the world frames, with a shift (2,) m that brings tip and slider together."""
+    start = np.zeros((STARTS, len(WEAK)))
+    start[:, FRAME_YAW], start[:, [FRAME_X, FRAME_Y]] = wrap_angle(np.arange(STARTS) * 2.0 * np.pi / STARTS), apart
+    cost = [float(np.sum(np.abs(residuals(row)))) for row in start]
+    return list(start[np.argsort(cost)[:2]])
+
+
+def _chosen(outline: Outline, contacts: Contacts, first: OutlineFit, free: Sequence[int]) -> Contacts:
+    """All contacts, or those away from corners if the tip's radius is fitted."""
+    if TIP not in free or not (sides := ~_at_corner(outline, contacts, first)).any():
+        return contacts
+    return contacts.at(sides)
 
 
 def _at_corner(outline: Outline, contacts: Contacts, fit: OutlineFit) -> BoolArray:
     """Which contacts (n,) are near a corner of the corrected outline."""
-    if outline.semi_axes is not None:
-        return np.zeros(len(contacts.tips), dtype=np.bool_)
-    yaw, x, y, growth, lag, _ = fit.estimate
+    yaw, x, y, growth, lag = fit.estimate[list(SIMILARITY)].tolist()
     corrected = transformed(outline, yaw, (x, y), 1.0 + growth)
     contact = corrected.project(contacts.tips - lag * contacts.velocities).contact
-    away = np.abs(contact[:, None] - corrected.edge_starts).min(axis=1) * corrected.perimeter
-    return np.asarray(away < CORNER)
+    return np.asarray(_away_from_corners(corrected, contact) < CORNER)
 
 
-def _fit(outline: Outline, radius: float, contacts: Contacts, sized: bool, tip: bool) -> OutlineFit:
-    rows = np.unique(np.linspace(0, len(contacts.tips) - 1, MOST_SAMPLES).astype(np.int64))
-    centre = outline.centroid  # a turn about it shifts nothing, so that both are known as well as they can be
-    centred = transformed(outline, shift=(-centre[0], -centre[1]))
-    tips, velocities, push = contacts.tips[rows] - centre, contacts.velocities[rows], contacts.push[rows]
-    turns = centred.rotational_symmetry
-    free = np.array([turns != 0, True, True, sized, True, tip])
+def _away_from_corners(outline: Outline, contact: Array) -> Array:
+    """Distances (n,) m along the outline from the nearest corner; infinity on a smooth one."""
+    if outline.semi_axes is not None:
+        return np.full(len(contact), np.inf)
+    return np.asarray(np.abs(contact[:, None] - outline.edge_starts).min(axis=1) * outline.perimeter)
+
+
+def _fit(
+    outline: Outline,
+    radius: float,
+    contacts: Contacts,
+    parameters: Sequence[int],
+    starts: Callable[[int, Gaps], list[Array]],
+) -> OutlineFit:
+    middle = outline.centroid  # a turn about it shifts nothing, so that both are known as well as they can be
+    centred = transformed(outline, shift=(-middle[0], -middle[1]))
+    touches = _Touches(contacts, middle)
+    free = np.isin(np.arange(len(WEAK)), parameters)
+    free[YAW] &= centred.rotational_symmetry != 0
 
     def gaps(free_part: Array) -> Array:
-        full = np.zeros(6)
-        full[free] = free_part
-        return gap_after(centred, radius, tips, velocities, full)
+        return touches.project(centred, _full(free, free_part))[0] - radius
 
     def residuals(free_part: Array) -> Array:
         return np.concatenate([gaps(free_part) / NOISE, free_part / WEAK[free]])
 
-    part = _best([_refined(residuals, start[free]) for start in _starts(turns, residuals, free)], gaps)
-    sd, estimate = np.zeros(6), np.zeros(6)
-    sd[free], estimate[free] = _deviation(gaps, part, push, WEAK[free]), part
-    if turns:
-        estimate[0] = wrap_angle(np.asarray(estimate[0] * turns)) / turns
-    return OutlineFit(estimate, sd, float(np.median(np.abs(gaps(part)))), len(np.unique(push)))
+    tried = starts(near_symmetry(centred), lambda full: residuals(full[free]))
+    part = _best([_refined(residuals, start[free]) for start in tried], gaps)
+    estimate, sd = _full(free, part), _full(free, _deviation(gaps, part, touches.push, WEAK[free]))
+    left, contact = touches.project(centred, estimate)
+    push_gaps, places = _by_push(touches.push, left - radius, contact)
+    if turns := centred.rotational_symmetry:
+        estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
+    gap = float(np.median(np.abs(left - radius)))
+    samples = np.unique(touches.push, return_counts=True)[1]
+    return OutlineFit(estimate, sd, gap, _cost(gaps, part), push_gaps, places, samples, touches.centre)
 
 
-def gap_after(outline: Outline, radius: float, tips: Array, velocities: Array, correction: Array) -> Array:
-    """Gaps (n,) m between tips and the corrected outline, whose centroid is the origin; correction as in OutlineFit."""
-    yaw, x, y, growth, lag, thicker = correction
-    size = 1.0 + max(growth, -0.9)
-    own = rotate(tips - lag * velocities - [x, y], -yaw) / size
-    return np.asarray(size * outline.project(own).distance - radius - thicker)
+class _Touches:
+    """Evenly drawn contacts, and their distances from a corrected outline whose centroid is the origin."""
+
+    def __init__(self, contacts: Contacts, middle: Array) -> None:
+        drawn = contacts.at(np.unique(np.linspace(0, len(contacts.tips) - 1, MOST_SAMPLES).astype(np.int64)))
+        self.push, self._drawn, self._middle = drawn.push, drawn, middle
+        self._world = to_world(drawn.tips, drawn.poses)
+        self.centre = np.asarray(self._world.mean(axis=0))
+
+    def project(self, outline: Outline, correction: Array) -> tuple[Array, Array]:
+        """Distances (n,) of the tips' centres, less the correction of the radius, and contacts (n,)."""
+        yaw, x, y, growth, lag, thicker, *frame, stretch = correction.tolist()
+        size = 1.0 + max(growth, -0.9)
+        own = rotate(self._tips(*frame) - self._middle - lag * self._drawn.velocities - [x, y], np.array(-yaw)) / size
+        found = stretched(outline, stretch).project(own)
+        return size * found.distance - thicker, found.contact
+
+    def _tips(self, yaw: float, x: float, y: float) -> Array:
+        """The tips in the slider's frame, after a turn about the centre and a shift in the world frame."""
+        if yaw == x == y == 0.0:
+            return self._drawn.tips
+        turned = self.centre + rotate(self._world - self.centre, np.array(yaw)) + [x, y]
+        return to_body(turned, self._drawn.poses)
+
+
+def _full(free: BoolArray, part: Array) -> Array:
+    full = np.zeros(len(free))
+    full[free] = part
+    return full
+
+
+def _by_push(push: IntArray, gap: Array, contact: Array) -> tuple[Array, Array]:
+    """The median gap of each push, and the contact of the sample that has it."""
+    rows = [np.flatnonzero(push == one) for one in np.unique(push)]
+    middle = [each[np.argsort(gap[each])[len(each) // 2]] for each in rows]
+    return gap[middle], contact[middle]
 
 
 def _best(parts: list[Array], gaps: Gaps) -> Array:
     """The first, unless another leaves a clearly smaller gap; the first begins without a correction."""
-    costs = [_cost(gaps)(part) for part in parts]
+    costs = [_cost(gaps, part) for part in parts]
     return parts[0] if costs[0] <= TIE * min(costs) else parts[int(np.argmin(costs))]
 
 
-def _starts(turns: int, residuals: Gaps, free: Array) -> list[Array]:
-    """No correction, and the two best of the turns within one period of the symmetry."""
-    start = np.zeros((STARTS, 6))
+def _starts(turns: int, residuals: Gaps) -> list[Array]:
+    """No correction, and the two best of the turns within one period of the symmetry, exact or almost."""
+    start = np.zeros((STARTS, len(WEAK)))
     if not turns:
         return [start[0]]
-    start[:, 0] = np.arange(STARTS) * 2.0 * np.pi / turns / STARTS
-    start[:, 0] = wrap_angle(start[:, 0] * turns) / turns
-    cost = [float(np.sum(np.abs(residuals(row[free])))) for row in start[1:]]
+    start[:, YAW] = np.arange(STARTS) * 2.0 * np.pi / turns / STARTS
+    start[:, YAW] = wrap_angle(start[:, YAW] * turns) / turns
+    cost = [float(np.sum(np.abs(residuals(row)))) for row in start[1:]]
     return [start[0], *start[1:][np.argsort(cost)[:2]]]
 
 
@@ -150,8 +277,8 @@ def _refined(residuals: Gaps, start: Array) -> Array:
     return np.asarray(least_squares(residuals, start, loss="soft_l1", x_scale=0.01, max_nfev=40).x)
 
 
-def _cost(gaps: Gaps) -> Callable[[Array], float]:
-    return lambda part: float(np.mean(np.minimum(np.abs(gaps(part)), 0.01)))
+def _cost(gaps: Gaps, part: Array) -> float:
+    return float(np.mean(np.minimum(np.abs(gaps(part)), LARGEST)))
 
 
 def _deviation(gaps: Gaps, part: Array, push: IntArray, weak: Array) -> Array:

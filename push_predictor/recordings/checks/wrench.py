@@ -72,6 +72,8 @@ def wrench_findings(recording: Recording, rig: Rig, outlined: bool = True) -> li
 
 
 def _least_force(rig: Rig) -> float:
+    if rig.object_mass is None:
+        return LEAST_FORCE
     return max(FAINTEST, min(LEAST_FORCE, LIGHT * GRAVITY * rig.object_mass))
 
 
@@ -100,6 +102,8 @@ def _absent(size: Array, least: float) -> Finding | None:
 
 def _scale(size: Array, rig: Rig) -> Finding | None:
     """A finding if no friction explains the force: the slider's weight times its friction moves it."""
+    if rig.object_mass is None:
+        return None
     force, weight = float(np.median(size)), GRAVITY * rig.object_mass
     lowest, highest = weight * np.array(FRICTION)
     if rig.surface_friction:

@@ -41,12 +41,13 @@ def new_rig(
     outline: Outline,
     tip_radius: float,
     surface: str,
-    mass: float,
+    mass: float | None = None,
     support_points: Array | None = None,
     contact_friction: float | None = None,
     surface_friction: float | None = None,
 ) -> Rig:
-    """A rig with plausible values: lengths in m, mass in kg, support_points (k, 3) of x, y and load share.
+    """A rig with plausible values: lengths in m, mass in kg (None if unknown), support_points (k, 3) of x, y and load
+    share.
 
     Raises RequestError that names the option, its value and the likely unit.
     """
@@ -54,7 +55,7 @@ def new_rig(
     if not 0.0 < tip_radius <= extent / 2.0:
         accepted = f"metres above 0, at most half the slider's size ({extent / 2.0:g}){_in_mm(tip_radius)}"
         raise RequestError("--tip-radius", tip_radius, accepted)
-    if not 0.0 < mass <= HEAVIEST:
+    if mass is not None and not 0.0 < mass <= HEAVIEST:
         in_grams = f": {mass:g} g are {1e-3 * mass:g} kg" if HEAVIEST < mass < np.inf else ""
         raise RequestError("--mass", mass, f"kilograms above 0, at most {HEAVIEST:g}{in_grams}")
     for option, text in (("--surface", surface), ("--name", shape)):

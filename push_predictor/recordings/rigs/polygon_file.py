@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,7 @@ import numpy as np
 
 from push_predictor.errors import RigError
 from push_predictor.geometry.outline import SAME_LENGTH, Outline
+from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.rigs.new_rig import LARGEST, SMALLEST
 from push_predictor.types import Array
 
@@ -47,24 +49,36 @@ def read_polygon(path: Path, keep_origin: bool = False) -> Polygon:
     Clockwise vertices are reversed; a repeated vertex is dropped. Raises RigError that names file and line or vertex.
     """
     vertices = _from_list(path) if path.suffix in LISTS else _from_csv(path)
+    clockwise = ["the vertices run clockwise: their order was reversed"] if _area(vertices) < 0.0 else []
+    return polygon_of(path, vertices, keep_origin, clockwise)
+
+
+def polygon_of(path: Path, vertices: Array, keep_origin: bool, notes: Sequence[str] = ()) -> Polygon:
+    """The polygon of vertices (n, 2) in m from a file, in either direction; notes: on what was found before.
+
+    Raises RigError that names file and vertex or side.
+    """
     repeated = np.linalg.norm(vertices - np.roll(vertices, -1, axis=0), axis=1) < SAME_LENGTH
-    notes = [f"{int(repeated.sum())} repeated vertices were dropped"] if repeated.any() else []
+    notes = [*notes, *([f"{int(repeated.sum())} repeated vertices were dropped"] if repeated.any() else [])]
     vertices = vertices[~repeated]
     _check(path, vertices)
     if _area(vertices) < 0.0:
         vertices = np.concatenate([vertices[:1], vertices[:0:-1]])
-        notes.append("the vertices run clockwise: their order was reversed")
     if len(vertices) > ROUND:
         notes.append(f"{len(vertices)} vertices: give a round slider by --circle or --ellipse, its normals are smooth")
-    outline = Outline(vertices)
+    return at_centroid(Outline(vertices), keep_origin, notes)
+
+
+def at_centroid(outline: Outline, keep_origin: bool, notes: Sequence[str]) -> Polygon:
+    """The outline with its centroid at the origin, unless keep_origin; the notes state what was moved."""
     x, y = (1e3 * outline.centroid).tolist()
     if float(np.hypot(x, y)) < 1e3 * SAME_LENGTH:
         return Polygon(outline, np.zeros(2), tuple(notes))
     if keep_origin:
         return Polygon(outline, np.zeros(2), (*notes, f"the centroid is at ({x:.2f}, {y:.2f}) mm, not at the origin"))
     moved = -outline.centroid
-    notes.append(f"the centroid ({x:.2f}, {y:.2f}) mm became the origin: the tracker must report the pose there")
-    return Polygon(Outline(vertices + moved), moved, tuple(notes))
+    note = f"the centroid ({x:.2f}, {y:.2f}) mm became the origin: the tracker must report the pose there"
+    return Polygon(transformed(outline, shift=(float(moved[0]), float(moved[1]))), moved, (*notes, note))
 
 
 def _from_csv(path: Path) -> Array:

@@ -38,5 +38,5 @@ def rig_lines(rig: Rig) -> list[str]:
         f"  symmetry       {turns}",
         f"  contact 0      at ({first[0]:g}, {first[1]:g}) mm, contacts count counter-clockwise",
         f"  tip radius     {1e3 * rig.pusher_radius:.4g} mm",
-        f"  mass           {rig.object_mass:g} kg",
+        f"  mass           {'not given' if rig.object_mass is None else f'{rig.object_mass:g} kg'}",
     ]

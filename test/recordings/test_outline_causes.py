@@ -1,0 +1,328 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What explains a gap between contacts and outline: frames apart, mirrored axes, a wrong tip, size or shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from mistakes import tracked
+from repository import REPOSITORY
+
+from push_predictor.errors import RecordingError, RigError
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import ellipse, near_symmetry, rectangle, shape_outline, stretched, transformed
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.corrected_rig import corrected_rig
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.outline_findings import fit_rig, outline_findings
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.rigs.estimate import estimate_rig
+from push_predictor.recordings.streams import Recording
+
+BAGS = ("circle_pu", "ellipse_plywood", "hexagon_delrin", "square_abs_repeats", "square_abs_test")
+OVAL, ROUND, HEXAGON, SQUARE, ONE_SIDE = "ellipse_plywood", "circle_pu", "hexagon_delrin", "square_abs_test", BAGS[3]
+NOWHERE = (0.0, 0.0)
+
+
+@cache
+def bag(name: str) -> Recording:
+    return read_recording(REPOSITORY / "bags" / name)
+
+
+def rig_of(name: str) -> Rig:
+    rig = bag(name).rig
+    assert rig is not None
+    return rig
+
+
+def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
+    return {finding.name: finding for finding in check_recording(recording, rig)}
+
+
+def other_world(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:
+    """The pusher in a world frame in which the slider's is turned by yaw and has its origin at shift."""
+    pusher = recording.pusher
+    x, y = (rotate(np.column_stack([pusher.x, pusher.y]), np.array(yaw)) + shift).T
+    return replace(recording, pusher=replace(pusher, x=x, y=y))
+
+
+def frame_of(finding: Finding) -> tuple[float, tuple[float, float]]:
+    values = finding.values
+    return values["frame_yaw"].value, (values["frame_x"].value, values["frame_y"].value)
+
+
+# --- world frames apart ----------------------------------------------------------------------------------------------
+
+
+TURN, SHIFT, BOTH = (np.radians(3.0), NOWHERE), (0.0, (0.0012, 0.0)), (np.radians(-2.0), (0.003, -0.004))
+
+
+@pytest.mark.parametrize(
+    ("name", "yaw", "shift"),
+    [
+        *((name, *TURN) for name in (ROUND, OVAL, HEXAGON)),
+        *((name, *SHIFT) for name in (ROUND, OVAL, HEXAGON, ONE_SIDE)),
+        (HEXAGON, *BOTH),
+    ],
+)
+def test_world_frames_apart_are_named_with_yaw_and_shift(name: str, yaw: float, shift: tuple[float, float]) -> None:
+    apart = other_world(bag(name), yaw, shift)
+    findings = found(apart, rig_of(name))
+    assert list(findings) == ["frames_apart"]
+    turn, move = frame_of(findings["frames_apart"])
+    assert turn == pytest.approx(-yaw, abs=5e-4)
+    assert move == pytest.approx(tuple(rotate(-np.array(shift), np.array(-yaw))), abs=1e-4)
+    assert all(0.0 < (value.sd or 0.0) < 5e-4 for value in findings["frames_apart"].values.values())
+    stated = f"turned by {np.degrees(turn):.1f} degrees"
+    assert stated in findings["frames_apart"].sentence and findings["frames_apart"].severity == "warning"
+
+
+def test_the_stated_turn_and_shift_bring_the_frames_together() -> None:
+    apart = other_world(bag(ROUND), 0.3, (0.05, 0.015))
+    turn, move = frame_of(found(apart, rig_of(ROUND))["frames_apart"])
+    assert found(other_world(apart, turn, move), rig_of(ROUND)) == {}
+
+
+def test_axes_a_quarter_turn_apart_are_world_frames_apart() -> None:
+    finding = found(other_world(bag(ROUND), np.pi / 2.0, (0.3, 0.0)), rig_of(ROUND))["frames_apart"]
+    turn, move = frame_of(finding)
+    assert wrap_angle(np.array(turn + np.pi / 2.0)) == pytest.approx(0.0, abs=1e-3)
+    assert move == pytest.approx((0.0, 0.3), abs=2e-4)
+
+
+def test_a_shift_of_the_slider_is_separated_from_one_between_the_frames() -> None:
+    both = other_world(tracked(bag(HEXAGON), 0.0, (0.0, 0.003)), 0.0, (0.002, 0.0))
+    findings = found(both, rig_of(HEXAGON))
+    assert list(findings) == ["frames_apart", "outline_shifted"]
+    assert frame_of(findings["frames_apart"])[1] == pytest.approx((-0.002, 0.0), abs=1e-4)
+    shift = findings["outline_shifted"].values
+    assert (shift["x"].value, shift["y"].value) == pytest.approx((0.0, -0.003), abs=1e-4)
+
+
+def test_frames_apart_are_no_part_of_the_rig() -> None:
+    estimate = estimate_rig(other_world(bag(ROUND), 0.0, (0.002, 0.0)), rig_of(ROUND))
+    assert estimate.corrected is rig_of(ROUND)
+    (tip,) = (line for line in estimate.lines if line.startswith("  tip radius"))
+    assert float(tip.split()[2]) == pytest.approx(4.75, abs=0.05)
+
+
+# --- axes mirrored or exchanged --------------------------------------------------------------------------------------
+
+AXES: Mapping[str, tuple[list[list[float]], float, float]] = {  # {name: (axes, sign and offset of the heading)}
+    "frame_mirrored_x": ([[-1.0, 0.0], [0.0, 1.0]], -1.0, np.pi),
+    "x_mirrored": ([[-1.0, 0.0], [0.0, 1.0]], 1.0, 0.0),
+    "axes_exchanged": ([[0.0, 1.0], [1.0, 0.0]], -1.0, np.pi / 2.0),
+    "xy_exchanged": ([[0.0, 1.0], [1.0, 0.0]], 1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "mistake"),
+    [(ROUND, "frame_mirrored_x"), (ROUND, "axes_exchanged"), (SQUARE, "x_mirrored"), (SQUARE, "xy_exchanged")],
+)
+def test_mirrored_or_exchanged_axes_are_named(name: str, mistake: str) -> None:
+    axes, sign, offset = AXES[mistake]
+    slider = bag(name).slider
+    x, y = np.array(axes) @ np.array([slider.x, slider.y])
+    heading = wrap_angle(sign * slider.heading + offset)
+    finding = found(replace(bag(name), slider=replace(slider, x=x, y=y, heading=heading)), rig_of(name))[mistake]
+    assert finding.severity == "warning"
+    assert ("exchanged" if "exchanged" in mistake else "x axis") in finding.sentence
+
+
+# --- tip radius and size ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name != ONE_SIDE])
+@pytest.mark.parametrize("more", [0.0011, -0.0011])
+def test_a_wrong_tip_radius_is_found_with_both_readings(name: str, more: float) -> None:
+    rig = rig_of(name)
+    altered = replace(rig, pusher_radius=rig.pusher_radius + more)
+    (finding,) = check_recording(bag(name), altered)
+    radius = finding.values["radius" if name == OVAL else "radius_if_size_is_right"]
+    assert radius.value == pytest.approx(rig.pusher_radius, abs=5e-5)
+    assert radius.sd is not None and 0.0 < radius.sd < 5e-5
+    assert finding.name == ("tip_radius" if name == OVAL else "outline_size")
+    assert "do not separate the two" in finding.advice or "These contacts" in finding.advice
+    assert f"{1e3 * radius.value:.2f} mm (sd" in finding.sentence
+
+
+def test_a_wrong_tip_of_an_ellipse_may_also_be_its_sizes() -> None:
+    rig = rig_of(OVAL)
+    (finding,) = check_recording(bag(OVAL), replace(rig, pusher_radius=rig.pusher_radius + 0.0011))
+    assert "or, if it is right, the sizes: 128.6 x 102.7 mm" in finding.advice
+
+
+@pytest.mark.parametrize("name", [ROUND, OVAL, HEXAGON])
+def test_the_estimate_states_size_and_radius_each_as_if_the_other_were_right(name: str) -> None:
+    estimate = estimate_rig(bag(name), rig_of(name))
+    record = estimate.record()["estimates"]
+    assert isinstance(record, dict)
+    assert record["tip_radius"]["value"] == pytest.approx(0.00475, abs=5e-5) and 0.0 < record["tip_radius"]["sd"] < 5e-5
+    assert record["size"]["value"] == pytest.approx(1.0, abs=1e-3) and 0.0 < record["size"]["sd"] < 5e-4
+    text = "\n".join(estimate.lines)
+    assert "if the tip radius is right: unchanged" in text and "if the size is right: unchanged" in text
+    both = record["size_and_tip_radius"]
+    assert ("not separated by these contacts" in text) == (both is None)
+    if name == OVAL:
+        assert both["tip_radius"]["value"] == pytest.approx(0.00475, abs=1e-4)
+        assert both["tip_radius"]["sd"] > 3.0 * record["tip_radius"]["sd"]
+
+
+def test_the_estimate_of_a_wrong_tip_of_an_ellipse_corrects_the_tip_alone() -> None:
+    rig = rig_of(OVAL)
+    estimate = estimate_rig(bag(OVAL), replace(rig, pusher_radius=rig.pusher_radius - 0.0011))
+    assert estimate.corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=5e-5)
+    assert estimate.corrected.outline.area == pytest.approx(rig.outline.area)
+    lines = [line.split(": ")[-1] for line in estimate.lines if line.startswith(("  size  ", "  size,"))]
+    assert lines == ["unchanged", "corrected in the rig"]
+
+
+def test_a_wrong_size_and_a_wrong_tip_are_corrected_together() -> None:
+    rig = rig_of(OVAL)
+    altered = replace(rig, pusher_radius=rig.pusher_radius + 0.0015, outline=transformed(rig.outline, size=1.03))
+    estimate = estimate_rig(bag(OVAL), altered)
+    assert [finding.name for finding in estimate.findings] == ["outline_size", "tip_radius"]
+    assert estimate.corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
+    assert estimate.corrected.outline.area == pytest.approx(rig.outline.area, rel=2e-3)
+    lines = [line.split(": ")[-1] for line in estimate.lines if line.startswith(("  size", "  tip"))]
+    assert lines == ["unchanged", "unchanged", "corrected in the rig"]
+
+
+# --- shape -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("more", [0.002, -0.002, 0.0013])
+def test_a_wrong_axis_of_an_ellipse_is_a_wrong_shape_with_both_sizes(more: float) -> None:
+    a, b = rig_of(OVAL).outline.semi_axes or NOWHERE
+    altered = replace(rig_of(OVAL), outline=ellipse(a + more, b))
+    (finding,) = check_recording(bag(OVAL), altered)
+    assert finding.name == "outline_shape"
+    lengths = [finding.values[name].value for name in ("length_x", "length_y")]
+    assert lengths == pytest.approx([2.0 * a, 2.0 * b], abs=1.5e-4)
+    assert "130.8 x 105.0 mm" in finding.sentence
+    if more == 0.002:
+        with pytest.raises(RecordingError, match=r"no rig can be estimated \(outline_shape\): The outline's shape is"):
+            estimate_rig(bag(OVAL), altered)
+
+
+def test_a_wrong_side_of_a_square_is_a_wrong_shape_with_both_sizes() -> None:
+    (finding,) = check_recording(bag(SQUARE), replace(rig_of(SQUARE), outline=rectangle(0.092, 0.09)))
+    lengths = [finding.values[name].value for name in ("length_x", "length_y")]
+    assert finding.name == "outline_shape" and lengths == pytest.approx([0.09, 0.09], abs=1e-4)
+
+
+def with_vertex_off(name: str, vertex: int, more: float = 0.003) -> Rig:
+    vertices = rig_of(name).outline.vertices.copy()
+    vertices[vertex] *= 1.0 + more / np.linalg.norm(vertices[vertex])
+    return replace(rig_of(name), outline=Outline(vertices))
+
+
+@pytest.mark.parametrize(("name", "vertex"), [*((HEXAGON, vertex) for vertex in range(5)), (SQUARE, 0)])
+def test_a_wrong_vertex_is_a_wrong_shape_and_no_turn(name: str, vertex: int) -> None:
+    """The sixth vertex of the hexagon was pushed nowhere near."""
+    findings = found(bag(name), with_vertex_off(name, vertex))
+    assert "outline_shape" in findings and "outline_turned" not in findings
+    finding = findings["outline_shape"]
+    assert 0.0005 < abs(finding.values["residual"].value) < 0.003
+    assert finding.values["share_off"].value >= 0.1 and "no turn, shift or size explains" in finding.sentence
+
+
+def test_the_side_with_the_wrong_vertex_is_named() -> None:
+    finding = found(bag(SQUARE), with_vertex_off(SQUARE, 0))["outline_shape"]
+    assert "inside, on side 1." in finding.sentence or "inside, on side 4." in finding.sentence
+
+
+def test_an_ellipse_given_as_a_circle_is_a_wrong_shape() -> None:
+    finding = found(bag(OVAL), replace(rig_of(OVAL), outline=ellipse(0.058, 0.058)))["outline_shape"]
+    assert "at contact 0." in finding.sentence
+
+
+def disturbed(recording: Recording, seed: int) -> Recording:
+    """Each four seconds another offset of the tracker (0.15 mm), and noise of each sample (0.1 mm)."""
+    slider, rng = recording.slider, np.random.default_rng(seed)
+    period = (slider.stamp - slider.stamp[0]) // 4_000_000_000
+    offset = rng.normal(0.0, 1.5e-4, (int(period.max()) + 1, 2))[period]
+    x, y = offset.T + rng.normal(0.0, 1e-4, (2, len(period)))
+    return replace(recording, slider=replace(slider, x=slider.x + x, y=slider.y + y))
+
+
+@pytest.mark.parametrize("name", [ROUND, HEXAGON])
+def test_a_tracker_with_noise_and_offsets_gives_no_finding(name: str) -> None:
+    for seed in range(6):
+        assert check_recording(disturbed(bag(name), seed), rig_of(name)) == ()
+
+
+@pytest.mark.parametrize(("off", "names"), [(0.0007, []), (0.0015, ["outline_shape"])])
+def test_a_single_push_needs_to_be_far_off(off: float, names: list[str]) -> None:
+    contacts, rig = contacts_of(bag(ROUND), rig_of(ROUND)), rig_of(ROUND)
+    assert contacts is not None
+    away = np.where(contacts.push == contacts.push[-1], off, 0.0) / np.linalg.norm(contacts.tips, axis=1)
+    moved = replace(contacts, tips=contacts.tips * (1.0 + away[:, None]))
+    assert [finding.name for finding in outline_findings(moved, rig, fit_rig(moved, rig))] == names
+
+
+def finding_of(name: str, **values: float) -> Finding:
+    return Finding(name, "warning", "", "", {key: Value(value, "1") for key, value in values.items()})
+
+
+@pytest.mark.parametrize(
+    ("finding", "message"),
+    [
+        (finding_of("outline_size", scale=0.867), "outline: the contacts fit 0.867 times its size"),
+        (finding_of("outline_size", scale=1.101), "within 10 %: measure them"),
+        (finding_of("tip_radius", radius=0.0117), "pusher_radius: the contacts fit 11.70 mm in place of 4.75 mm"),
+        (finding_of("tip_radius", radius=-0.0048), "within 55 %: measure it again"),
+        (finding_of("tip_radius", radius=0.002), "pusher_radius"),
+        (finding_of("tip_radius", radius=float("nan")), "pusher_radius"),
+    ],
+)
+def test_an_implausible_correction_is_refused(finding: Finding, message: str) -> None:
+    with pytest.raises(RigError, match=message):
+        corrected_rig(rig_of(ROUND), [finding])
+
+
+def test_a_diameter_given_as_the_radius_is_corrected() -> None:
+    rig = replace(rig_of(ROUND), pusher_radius=0.0095)
+    assert corrected_rig(rig, [finding_of("tip_radius", radius=0.0047)]).pusher_radius == 0.0047
+    assert corrected_rig(rig, [finding_of("outline_size", scale=0.9)]).outline.semi_axes == pytest.approx(
+        (0.04725,) * 2
+    )
+
+
+# --- the geometry of the fits ----------------------------------------------------------------------------------------
+
+
+def test_a_stretched_ellipse_keeps_its_direction() -> None:
+    outline = stretched(transformed(ellipse(0.06, 0.05), 0.4), 0.1)
+    assert outline.semi_axes == pytest.approx((0.063, 0.0475)) and outline.pose == pytest.approx((0.0, 0.0, 0.4))
+    assert outline.project(outline.vertices).distance == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(stretched(rectangle(0.1, 0.06), -0.2).vertices, axis=0) == pytest.approx([0.09, 0.066])
+
+
+def test_an_almost_regular_outline_has_the_symmetry_of_the_regular_one() -> None:
+    assert near_symmetry(with_vertex_off(HEXAGON, 2).outline) == 6
+    assert near_symmetry(rectangle(0.09, 0.095)) == 4
+    assert near_symmetry(rectangle(0.09, 0.12)) == 2
+    assert near_symmetry(shape_outline("ellip1")) == 0 and near_symmetry(shape_outline("ellip2")) == 2
+    assert near_symmetry(Outline(np.array([[-0.05, -0.03], [0.07, -0.03], [-0.02, 0.06]]))) == 1
