@@ -338,6 +338,11 @@ def test_a_force_that_is_absent_or_in_another_unit_is_named(name: str, factor: f
     assert [each.name for each in wrench_findings(force_scaled(bag(name), factor), rig_of(name))] == [finding]
 
 
+def test_a_slider_of_unknown_mass_may_be_light_or_heavy() -> None:
+    anything = replace(rig_of(SMALL), object_mass=None)
+    assert all(wrench_findings(force_scaled(bag(SMALL), factor), anything) == [] for factor in (0.1, 30.0))
+
+
 def test_the_force_of_a_light_slider_is_judged_by_its_weight() -> None:
     """The forces that a slider of 98 g with this friction gives, of 0.12 N in the median."""
     light = replace(rig_of(SMALL), object_mass=rig_of(SMALL).object_mass / 10.0)

@@ -72,8 +72,8 @@ def wrench_findings(recording: Recording, rig: Rig, outlined: bool = True) -> li
 
 
 def _least_force(rig: Rig) -> float:
-    if rig.object_mass is None:
-        return LEAST_FORCE
+    if rig.object_mass is None:  # the slider may be light
+        return FAINTEST
     return max(FAINTEST, min(LEAST_FORCE, LIGHT * GRAVITY * rig.object_mass))
 
 
