@@ -36,6 +36,7 @@ from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
+from push_predictor.residuals.evidence.extrapolation import about_mechanics
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace
@@ -69,6 +70,15 @@ def learnt(mean: MeanChoice = "zero") -> PushModel:
     table = windows_to_table(find_windows(recording, recording.rig))
     options = TrainingOptions(n_train=150, mean=mean)
     return train_model(table, recording.rig, "gp", name="deployed", options=options)
+
+
+@pytest.fixture(autouse=True)
+def trained_again_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several tests trace with the same model beyond its training."""
+    monkeypatch.setattr("push_predictor.residuals.question.about_mechanics", retrained)
+
+
+retrained = cache(about_mechanics)
 
 
 def loaded(changes: Changes, faults: Faults) -> LoadedData:
