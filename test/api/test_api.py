@@ -315,7 +315,9 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
     write_table(tmp_path / "square_abs_train.csv", model.training)
     model = train(tmp_path / "square_abs_train.csv", kind="analytical", rig=model.rig, watch=lambda stage, done: None)
     write_recording(tmp_path / "later", short_recording(50.0))
-    found = trace(model, tmp_path / "later", alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage))
+    found = trace(
+        model, tmp_path / "later", alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage)
+    )
     assert "motion" in seen and found.alpha == 0.05 and found.model is model
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
     assert "elapsed_time" in tried and "slider_x" not in tried
