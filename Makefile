@@ -16,19 +16,27 @@ export OPENBLAS_NUM_THREADS ?= 1
 export PYTHONUNBUFFERED := 1
 unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint docs bags clean
+.PHONY: demo test lint style types suite docs bags clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m examples.demo
 
-# Four workers on two cores: tests of nodes wait for each other's messages half of their time.
-test: $(VENV)/.installed lint
-	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+# Types beside the suite: mypy, 40 s of one core on a new machine, needs no other result.
+test: style
+	$(MAKE) --no-print-directory -j 2 types suite
 
-lint: $(VENV)/.installed
+lint: style types
+
+style: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: $(VENV)/.installed
 	$(BIN)/mypy
+
+# Four workers on two cores: tests of nodes wait for each other's messages half of their time.
+suite: $(VENV)/.installed
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -19,13 +19,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import threadpoolctl
+from lab_bags import short_recording
 from repository import BAGS, REPOSITORY
 
 import push_predictor
@@ -45,6 +46,7 @@ from push_predictor.errors import PushPredictorError, RecordingError, RequestErr
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.write import write_recording
 
 TRAINING, TEST = BAGS / "square_abs_train", BAGS / "square_abs_test"
 FEW = BAGS / "hexagon_delrin"  # 53 windows
@@ -75,13 +77,36 @@ def test_every_public_name_is_there_and_documented_and_others_are_refused():
 # --- training ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_training_reports_each_stage_with_its_share_of_the_work():
+@dataclass
+class Training:
+    """A model of few windows, each stage of its training with its share, and the BLAS threads during and around it."""
+
+    model: PushModel
+    seen: list[tuple[str, float]]
+    threads: tuple[list[int], set[int], list[int]]
+
+
+@pytest.fixture(scope="module")
+def few() -> Training:
     seen: list[tuple[str, float]] = []
-    train([FEW], kind="gp", n_train=40, watch=lambda stage, done: seen.append((stage, done)))
-    stages = [stage for stage, _ in seen]
+    during: set[int] = set()
+
+    def watch(stage: str, done: float) -> None:
+        seen.append((stage, done))
+        if stage.startswith("train "):
+            during.update(blas_threads())
+
+    with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        model = train([FEW], kind="gp", n_train=40, watch=watch)
+        return Training(model, seen, (before, during, blas_threads()))
+
+
+@pytest.mark.slow
+def test_training_reports_each_stage_with_its_share_of_the_work(few: Training):
+    stages = [stage for stage, _ in few.seen]
     assert [any(output in stage for stage in stages) for output in ("dx", "dy", "dtheta")] == [True] * 3
-    shares = [done for _, done in seen]
+    shares = [done for _, done in few.seen]
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
@@ -100,18 +125,9 @@ def test_without_a_callback_training_prints_its_progress_to_stderr(capsys: pytes
 
 
 @pytest.mark.slow
-def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone():
-    during: set[int] = set()
-
-    def watch(stage: str, done: float) -> None:
-        if stage.startswith("train "):
-            during.update(pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas")
-
-    with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
-        before = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
-        train(FEW, kind="gp", n_train=40, watch=watch)
-        after = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
-    assert during == {1} and before == after
+def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone(few: Training):
+    before, during, after = few.threads
+    assert during == {1} and before == after and 2 in before
 
 
 def blas_threads() -> list[int]:
@@ -273,8 +289,8 @@ def flat(tree: Any) -> list[float]:
 
 
 @pytest.mark.slow
-def test_a_validation_has_the_metrics_of_the_command_line(tmp_path: Path):
-    model = train(FEW, kind="gp", n_train=40, watch=lambda stage, done: None)
+def test_a_validation_has_the_metrics_of_the_command_line(few: Training, tmp_path: Path):
+    model = few.model
     model.save(tmp_path / "m.pushmodel")
     with pytest.warns(push_predictor.DataWarning, match="pushes were used for training"):
         found = validate(model, str(FEW))
@@ -299,7 +315,10 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
     seen: list[str] = []
     write_table(tmp_path / "square_abs_train.csv", model.training)
     model = train(tmp_path / "square_abs_train.csv", kind="analytical", rig=model.rig, watch=lambda stage, done: None)
-    found = trace(model, TEST, alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage))
+    write_recording(tmp_path / "later", short_recording(50.0))
+    found = trace(
+        model, tmp_path / "later", alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage)
+    )
     assert "motion" in seen and found.alpha == 0.05 and found.model is model
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
     assert "elapsed_time" in tried and "slider_x" not in tried

@@ -41,7 +41,7 @@ def commands() -> list[list[str]]:
 def test_the_commands_of_the_readme_validate_a_model(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monday, tuesday = short_recording(70.0), short_recording(60.0, after=75.0)
+    monday, tuesday = short_recording(52.0), short_recording(52.0, after=75.0)
     write_db3(laboratory(monday), tmp_path / "monday")
     laboratory(tuesday).mcap(tmp_path / "tuesday")
     monkeypatch.chdir(tmp_path)
@@ -55,7 +55,7 @@ def test_the_commands_of_the_readme_validate_a_model(
     assert main(check) == 0
     assert capsys.readouterr().out == "monday: no findings\ntuesday: no findings\n"
     assert main(info) == 0
-    assert "slider: 6995 samples" in capsys.readouterr().out
+    assert "slider: 5195 samples" in capsys.readouterr().out
     assert main(train) == 0 and (tmp_path / "monday.pushmodel").is_file()
     capsys.readouterr()
     assert main(validate) == 0

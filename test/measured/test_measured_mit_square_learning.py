@@ -29,13 +29,11 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParamet
 from push_predictor.models.gaussian_process.quadrature import gaussian_log_density
 
 
-@pytest.mark.parametrize(("n", "seeds", "gain"), [(100, 5, 0.10), (500, 1, 0.25), (1000, 1, 0.37)])
-def test_vhgp_has_a_better_density_than_gp_on_the_random_split(
-    measured_data: Path, n: int, seeds: int, gain: float
-) -> None:
-    gp = mean_scores(measured_data, "random", "gp", n, seeds)
-    vhgp = mean_scores(measured_data, "random", "vhgp", n, seeds)
-    assert vhgp.nlpd <= gp.nlpd - gain
+def test_vhgp_has_a_better_density_than_gp_on_the_random_split(measured_data: Path) -> None:
+    """By 0.12 of 100 rows: test_measured_paper."""
+    gp = mean_scores(measured_data, "random", "gp", 500, 1)
+    vhgp = mean_scores(measured_data, "random", "vhgp", 500, 1)
+    assert vhgp.nlpd <= gp.nlpd - 0.25
     assert vhgp.exact_nlpd < vhgp.nlpd
 
 
@@ -49,11 +47,9 @@ def test_the_exact_density_of_vhgp_is_better_than_gp_on_held_out_pushes(measured
 @pytest.mark.parametrize(
     ("split", "n", "seeds", "nmse", "nlpd"),
     [
-        ("random", 100, 5, 0.153, -17.40),
         ("random", 500, 1, 0.115, -17.83),
         ("random", 1000, 1, 0.115, -17.84),
         ("push", 100, 5, 0.197, -17.09),
-        ("push", 1000, 5, 0.144, -17.53),
     ],
 )
 def test_gp_scores_what_the_reference_scores(
@@ -64,10 +60,9 @@ def test_gp_scores_what_the_reference_scores(
     assert gp.nlpd == pytest.approx(nlpd, abs=0.02)
 
 
-@pytest.mark.parametrize("n", [100, 500])
-def test_gp_equals_scikit_learn_given_its_hyperparameters(measured_data: Path, n: int) -> None:
+def test_gp_equals_scikit_learn_given_its_hyperparameters(measured_data: Path) -> None:
     square = load_square(measured_data)
-    training, test = random_split(n, 0)
+    training, test = random_split(100, 0)
     x, y = square.inputs[training], square.outputs[training]
     scaled = (x - x.mean(axis=0)) / x.std(axis=0)
     new = (square.inputs[test] - x.mean(axis=0)) / x.std(axis=0)

@@ -92,7 +92,7 @@ def load_reference(folder: Path, n: int) -> dict[str, Reference]:
 
 
 @pytest.mark.parametrize("output", OUTPUTS)
-@pytest.mark.parametrize("n", [100, 200, 500, 1000, 2000])
+@pytest.mark.parametrize("n", [100, 500, 1000])
 def test_the_stored_posterior_is_reproduced(measured_data: Path, n: int, output: str) -> None:
     reference = load_reference(measured_data, n)[output]
     fields, posterior = reference.fields, reference.posterior()
@@ -105,7 +105,7 @@ def test_the_stored_posterior_is_reproduced(measured_data: Path, n: int, output:
     np.testing.assert_allclose(whole.outcome_variance, fields["Vy_test"], rtol=1e-8)
 
 
-@pytest.mark.parametrize(("n", "slack"), [(100, 0.03), (200, 0.0), (500, 0.0), (1000, 0.0)])
+@pytest.mark.parametrize(("n", "slack"), [(100, 0.03), (500, 0.0)])
 def test_trained_on_the_same_rows_our_density_is_as_good(measured_data: Path, n: int, slack: float) -> None:
     square, reference = load_square(measured_data), load_reference(measured_data, n)
     # The reference has dy to the right.

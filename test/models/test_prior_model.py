@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,9 +142,10 @@ def test_estimates_are_the_most_probable_given_priors_and_pushes(untrained: Push
         return float(np.einsum("nk,nkl,nl->", away, precision, away) + prior)
 
     found = predictor.fitted.values
+    least = misfit(found)
     for name, value in found.items():
         for step in (-0.4, 0.4):
-            assert misfit({**found, name: value + step * BY_NAME[name].spread}) > misfit(found), name
+            assert misfit({**found, name: value + step * BY_NAME[name].spread}) > least, name
 
 
 def test_a_single_push_leaves_the_prediction_wide(untrained: PushModel) -> None:
@@ -339,19 +339,17 @@ def test_table_that_is_too_far_off_is_not_used(untrained: PushModel, monkeypatch
 
 
 @pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
-def test_table_is_accurate_and_fast(rig: Rig) -> None:
+def test_table_is_accurate_without_mechanics(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     model = train_model(empty_table(), rig, "prior", name="p")
-    few_draws = replace(predictor_of(model), draws=predictor_of(model).draws[:24])  # less smooth, and faster
+    few_draws = replace(predictor_of(model), draws=predictor_of(model).draws[:12])  # less smooth, and faster
     model = replace(model, predictor=few_draws)
     tabulated, inputs, duration = tabulate(model), some_inputs(150, 3), np.full(150, 0.3)
     assert tabulated.how.startswith("table of")
     found, exact = (m.predict_rows(inputs, duration) for m in (tabulated, model))
     assert np.quantile(np.abs(found.mean - exact.mean) / exact.std, 0.9) < 0.06
     assert np.quantile(np.abs(found.std / exact.std - 1.0), 0.9) < 0.12
-    start = time.process_time()
-    for k in range(100):
-        tabulated.predict_rows(inputs[k : k + 1], duration[:1])
-    assert time.process_time() - start < 100 * 1e-3
+    monkeypatch.setattr(PushMechanics, "displacement", None)  # what makes the model itself slow
+    np.testing.assert_array_equal(tabulated.predict_rows(inputs, duration).mean, found.mean)
 
 
 def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:

@@ -87,7 +87,7 @@ def test_rows_return_the_windows_that_were_appended():
 
 def test_a_predicted_window_takes_less_than_700_bytes(models: dict[str, PushModel]):
     """A day of pushing without a break, 432 000 windows, then takes less than 300 MB."""
-    windows = made_up_windows(2000)
+    windows = made_up_windows(1000)
     prediction = predict(models["gp"], windows[0])
     live = LiveValidation({"gp": models["gp"]})
     tracemalloc.start()

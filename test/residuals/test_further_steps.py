@@ -31,7 +31,7 @@ from push_predictor.models.effects.exact import Mechanics, joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import REFINEMENTS, Push
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
@@ -49,6 +49,7 @@ from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 CONSTANT = DriverBasis("constant")
 COUNT = 120
+FEW = ("contact_friction", "pressure_spread", "centre_of_friction", "body_anisotropy", "tilted_surface", "inertia")
 WEAR = DriverBasis("linear", ("elapsed_time",), (0.0,), (1000.0,))  # from nothing at the start
 
 
@@ -65,6 +66,13 @@ def deployed() -> PushModel:
     return train_model(pushes(COUNT, 1), square_rig(), "analytical", name="deployed")
 
 
+@pytest.fixture
+def a_library_of_six(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computing responses takes most of the time."""
+    library = [mechanism for mechanism in LIBRARY if mechanism.name in FEW]
+    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
+
+
 def found(model: PushModel, table: PushTable) -> tuple[MotionFinding, dict[Any, tuple[Effect, SelectedTerm]]]:
     """The finding, and its terms with their effects by mechanism."""
     evidence = evidence_of(model, table)
@@ -78,6 +86,7 @@ def within_interval(effect: Effect, truth: Effect) -> bool:
     return bool(np.all(np.abs(effect.coefficients - truth.coefficients) < 2.6 * np.sqrt(np.diag(effect.covariance))))
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 def test_two_constant_changes_at_once_are_both_found_with_their_sizes(deployed: PushModel) -> None:
     _, terms = found(deployed, pushes(COUNT, 5, *BOTH))
     assert set(terms) == {"contact_friction", "body_anisotropy"}
@@ -87,6 +96,7 @@ def test_two_constant_changes_at_once_are_both_found_with_their_sizes(deployed: 
         assert term.since_training
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 def test_what_training_has_in_the_same_size_is_no_change_next_to_one_that_is(deployed: PushModel) -> None:
     before = pushes(COUNT, 3, LESS_FRICTION)
     model = train_model(before, square_rig(), "analytical", name="deployed")
@@ -97,6 +107,7 @@ def test_what_training_has_in_the_same_size_is_no_change_next_to_one_that_is(dep
     }
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 def test_a_mechanism_that_only_the_steps_have_is_found_next_to_one_of_the_library(deployed: PushModel) -> None:
     by_angle = constant("friction_by_angle", 0.25)
     _, terms = found(deployed, pushes(COUNT, 7, LESS_FRICTION, by_angle))
@@ -105,11 +116,13 @@ def test_a_mechanism_that_only_the_steps_have_is_found_next_to_one_of_the_librar
     assert within_interval(terms["friction_by_angle"][0], by_angle)
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 @pytest.mark.parametrize("seed", [8, 9])
 def test_nothing_is_found_where_nothing_changed(deployed: PushModel, seed: int) -> None:
     assert not found(deployed, pushes(COUNT, seed))[0].terms
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 @pytest.mark.parametrize("effect", [LESS_FRICTION, planted("contact_friction", "elapsed_time", WEAR, 0.15)])
 def test_nothing_is_added_to_the_only_effect(deployed: PushModel, effect: Effect) -> None:
     finding, _ = found(deployed, pushes(COUNT, 10, effect))

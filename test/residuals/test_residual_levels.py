@@ -25,6 +25,7 @@ from synthetic import square_rig
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
@@ -45,11 +46,19 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 BLOCKS, ROWS = 40, 3  # a block
+FEW = ("contact_friction", "pressure_spread", "centre_of_friction", "body_anisotropy", "tilted_surface", "inertia")
 
 
 @pytest.fixture(scope="module")
 def deployed() -> PushModel:
     return train_model(pushes(120, 1), square_rig(), "analytical", name="deployed")
+
+
+@pytest.fixture
+def a_library_of_six(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computing responses takes most of the time."""
+    library = [mechanism for mechanism in LIBRARY if mechanism.name in FEW]
+    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
 def searched(model: PushModel, table: PushTable, names: list[str], alpha: float = 0.01) -> SearchResult:
@@ -73,6 +82,7 @@ def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_proje
     assert np.mean(rows) == pytest.approx(np.mean(np.square(total)), rel=0.18)
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(deployed: PushModel) -> None:
     """Twelve recordings of 40 pushes at level 0.2: if that is the rate, seven or more have a probability of 0.4 %."""
     count = 0
@@ -216,6 +226,7 @@ def test_training_is_compared_as_a_whole_with_pushes_everywhere_and_with_pushes_
         assert len(baseline_of(deployed, mechanics, inputs).evidence.table) == len(deployed.training)
 
 
+@pytest.mark.usefixtures("a_library_of_six")
 def test_name_of_a_mechanism_stays_if_the_ladder_explains_what_it_leaves(
     deployed: PushModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

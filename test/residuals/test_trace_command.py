@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,18 +80,37 @@ def run(place: Path, *options: str) -> int:
     return main(["trace", str(place / "deployed.pushmodel"), str(place / "new.csv"), *options])
 
 
+@dataclass(frozen=True)
+class Traced:
+    """The files that the command left of one trace, what it printed, and the trace itself."""
+
+    out: Path
+    model: Path
+    printed: str
+    trace: Trace
+
+
+@pytest.fixture(scope="module")
+def traced(place: Path, tmp_path_factory: pytest.TempPathFactory) -> Traced:
+    folder, traces = tmp_path_factory.mktemp("traced") / "sub", []
+    out, model = folder / "out.json", folder / "extended.pushmodel"
+    real = trace_module.trace_data
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as printed:
+        patch.setattr(
+            trace_module, "trace_data", lambda *given, **options: traces.append(real(*given, **options)) or traces[0]
+        )
+        saved = ["--json", str(out), "--save-model", str(model)]
+        assert run(place, "--covariates", "elapsed_time,slider_x", *saved) == 0
+    return Traced(out, model, printed.getvalue(), traces[0])
+
+
 @pytest.mark.slow
-def test_trace_of_a_table_writes_json_and_extended_model(
-    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, model = tmp_path / "sub" / "out.json", tmp_path / "sub" / "extended.pushmodel"
-    status = run(place, "--covariates", "elapsed_time,slider_x", "--json", str(out), "--save-model", str(model))
-    assert status == 0, capsys.readouterr().err
-    result = json.loads(out.read_text())
+def test_trace_of_a_table_writes_json_and_extended_model(traced: Traced) -> None:
+    result = json.loads(traced.out.read_text())
     assert set(result) >= SECTION_5 and result["pushes"] == {"analysis": 42, "held_out": 18}
     assert result["effects"][0]["covariate"] == "elapsed_time" and result["motion_model_changed"]
-    assert load_model(model).needs == ("elapsed_time",)
-    assert "requests need elapsed_time" in capsys.readouterr().out
+    assert load_model(traced.model).needs == ("elapsed_time",)
+    assert "requests need elapsed_time" in traced.printed
 
 
 def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,11 +133,13 @@ def test_and_takes_recordings_of_the_proposed_pushes(place: Path, found: Any, ex
 
 
 @pytest.mark.slow
-def test_pushes_after_and_are_analysed_and_the_held_out_ones_stay_the_same(place: Path, tmp_path: Path) -> None:
+def test_pushes_after_and_are_analysed_and_the_held_out_ones_stay_the_same(
+    place: Path, traced: Traced, tmp_path: Path
+) -> None:
     write_table(tmp_path / "more.csv", pushes(20, 9, slippery(0.1)))
     (tmp_path / "more.rig.yaml").write_text(json.dumps(square_rig().to_record()))
     data, model, names = [place / "new.csv"], place / "deployed.pushmodel", ["elapsed_time", "slider_x"]
-    alone = trace_module.trace_data(data, model, covariates=names)
+    alone = traced.trace
     both = trace_module.trace_data(data, model, covariates=names, experiment=[tmp_path / "more.csv"])
     assert both.held_out.digest == alone.held_out.digest
     assert len(both.analysis.pushes) == len(alone.analysis.pushes) + 20

@@ -27,7 +27,7 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import concatenate
@@ -267,8 +267,12 @@ class TestPushesOfAnExperiment:
 
 
 @pytest.mark.slow
-def test_pushes_after_a_rest_settle_whether_time_or_distance_drives(model: PushModel) -> None:
+def test_pushes_after_a_rest_settle_whether_time_or_distance_drives(
+    model: PushModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Both grow together until the rest: afterwards time is ahead, and contact friction has followed it."""
+    few = [each for each in LIBRARY if each.name in ("contact_friction", "pressure_spread", "tilted_surface")]
+    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)  # responses take most of it
     first, further = pushes(150, 5), pushes(20, 6)
     time = np.concatenate([first.covariates["elapsed_time"], 1500.0 + 0.2 * further.covariates["elapsed_time"]])
     count = np.concatenate([first.covariates["push_index"], 150.0 + further.covariates["push_index"]])
