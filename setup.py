@@ -71,7 +71,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"{NAME} = push_predictor.cli:main",
-            *(f"{node} = push_predictor.nodes.{node}:main" for node in NODES),
+            *(f"{node} = push_predictor.nodes.entry:{node}" for node in NODES),
         ]
     },
     zip_safe=False,

@@ -16,14 +16,26 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from threadpoolctl import threadpool_limits
+VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+def limit_process() -> None:
+    """Limit this process and its children to one thread, unless the environment sets another number.
+
+    Call it before numpy is imported: a BLAS reads the environment once.
+    """
+    for name in VARIABLES:
+        os.environ.setdefault(name, "1")
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, whatever the environment asks for."""
+    from threadpoolctl import threadpool_limits
+
     with threadpool_limits(limits=1, user_api="blas"):
         yield

@@ -23,7 +23,6 @@ import json
 import multiprocessing
 import os
 import shutil
-import signal
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -33,6 +32,7 @@ from typing import TYPE_CHECKING
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
+from push_predictor.online.child_process import start_child
 from push_predictor.online.files.window_table import TABLE
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.metadata import METADATA_FILE
@@ -87,11 +87,8 @@ class Failed:
 
 def start_trace(task: TraceTask) -> tuple[BaseProcess, Connection]:
     """Start the process. Its pipe delivers Stage messages, then Traced or Failed."""
-    # spawned: a fork would inherit locks that the middleware's threads own
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(sender, task), daemon=True, name="trace")
-    process.start()
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    process = start_child(_run, (sender, task), "trace")
     sender.close()
     return process, receiver
 
@@ -114,7 +111,6 @@ def _is_bag(path: Path) -> bool:
 
 
 def _run(connection: Connection, task: TraceTask) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     os.nice(NICENESS)
     try:
         connection.send(_traced(connection, task))
