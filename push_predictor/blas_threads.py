@@ -17,8 +17,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -35,7 +41,16 @@ def limit_process() -> None:
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, whatever the environment asks for."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _controller("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
         yield
+
+
+@lru_cache(maxsize=2)
+def _controller(with_scipy: bool) -> ThreadpoolController:
+    """The BLAS libraries that are loaded. To find them takes twenty times as long as to limit them.
+
+    with_scipy: numpy and scipy have one each, and scipy's is loaded late.
+    """
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
