@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
+_process = {"limited": False}
+
+
 def limit_process() -> None:
     """Limit this process and its children to one thread, unless the environment sets another number.
 
@@ -36,21 +39,24 @@ def limit_process() -> None:
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
+    _process["limited"] = "numpy" not in sys.modules and all(os.environ[name] == "1" for name in VARIABLES)
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, whatever the environment asks for."""
-    with _controller("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
+    if _process["limited"]:
+        yield
+        return
+    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
+
+    with _controller().limit(limits=1, user_api="blas"):
         yield
 
 
-@lru_cache(maxsize=2)
-def _controller(with_scipy: bool) -> ThreadpoolController:
-    """The BLAS libraries that are loaded. To find them takes twenty times as long as to limit them.
-
-    with_scipy: numpy and scipy have one each, and scipy's is loaded late.
-    """
+@lru_cache(maxsize=1)
+def _controller() -> ThreadpoolController:
+    """The BLAS libraries of numpy and scipy. To find them takes twenty times as long as to limit them."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

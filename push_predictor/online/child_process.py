@@ -12,16 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Processes that a node starts for long work."""
+"""Processes that a node starts for long work. multiprocessing is imported when the first one starts: it takes time."""
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
+import sys
 from collections.abc import Callable, Sequence
-from multiprocessing import resource_tracker
-from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
 
 
 def start_child(target: Callable[..., None], arguments: Sequence[Any], name: str) -> BaseProcess:
@@ -29,6 +30,9 @@ def start_child(target: Callable[..., None], arguments: Sequence[Any], name: str
 
     Ctrl-C reaches the whole process group. A child that is still importing would print a traceback.
     """
+    import multiprocessing
+    from multiprocessing import resource_tracker
+
     context = multiprocessing.get_context("spawn")  # a fork would inherit the locks of the middleware's threads
     process = context.Process(target=target, args=tuple(arguments), daemon=True, name=name)
     resource_tracker.ensure_running()  # the start of its process would unblock the signal
@@ -42,5 +46,6 @@ def start_child(target: Callable[..., None], arguments: Sequence[Any], name: str
 
 def kill_children() -> None:
     """End all processes that this one has started with multiprocessing, at once."""
-    for child in multiprocessing.active_children():
-        child.kill()
+    if "multiprocessing" in sys.modules:
+        for child in sys.modules["multiprocessing"].active_children():
+            child.kill()
