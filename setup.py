@@ -34,7 +34,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/config", glob("config/*")),
-        (f"share/{NAME}/resource", glob("resource/*.pushmodel")),
+        (f"share/{NAME}/resource", glob("resource/*.pushmodel*")),
         # pip puts the executables into bin/ only; `ros2 run` looks here
         (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
     ],
