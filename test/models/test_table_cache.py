@@ -93,8 +93,11 @@ def test_a_kept_table_predicts_as_the_one_computed(
     assert kept.how == computed.how and kept.error == computed.error and kept.tabulated
 
 
-def test_matrices_are_not_computed_for_a_kept_table(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    load_served(file)
+@pytest.mark.parametrize("loaded_before", [0, 1])
+def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, loaded_before: int) -> None:
+    """They take 50 MB."""
+    for _ in range(loaded_before):
+        load_served(file)
     served = load_served(file)
     regressions = served.model.predictor.base.regressions  # type: ignore[attr-defined]
     assert not any("_posterior" in vars(regression) for regression in regressions)
@@ -113,6 +116,11 @@ def test_training_writes_the_table_next_to_the_model(
     file.rename(moved)
     tables_of(file).rename(tables_of(moved))
     assert load_served(moved).tabulated and not folder.exists()
+
+
+def test_a_device_gets_no_table_next_to_it(model: PushModel, tmp_path: Path) -> None:
+    keep_tables(model, tmp_path / "pipe")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_validation_uses_the_table_of_the_server(

@@ -68,7 +68,12 @@ def as_served(model: PushModel) -> TabulatedModel:
 
 @one_blas_thread()
 def keep_tables(model: PushModel, path: Path) -> None:
-    """Write the tables of a model that was saved at this path next to it, so that no server has to compute them."""
+    """Write the tables of a model that was saved at this path next to it, so that no server has to compute them.
+
+    Raises OSError. Does nothing for a device.
+    """
+    if not path.is_file():
+        return
     served = _read(model, None)
     if served is None:
         served = with_effect_table(tabulate(model))
