@@ -118,7 +118,7 @@ def main() -> int:
     taken: dict[str, list[float]] = {name: [] for name in (*NODES, *PROGRAMS)}
     worked: dict[str, list[float]] = {name: [] for name in (*NODES, *_PARTS)}
     memory: dict[str, list[float]] = {name: [] for name in NODES}
-    threads: dict[str, list[tuple[float, float]]] = {name: [] for name in ENTRIES}
+    threads: dict[str, list[tuple[float, float]]] = {name: [] for name in (COLD, *ENTRIES)}
     before = load()
     with graph(options.domain):
         for _ in range(options.repeats):
@@ -127,13 +127,15 @@ def main() -> int:
                 taken[name].append(ready)
                 worked[name].append(processor)
                 memory[name].append(size)
+            limited = _ready(COLD, OPENBLAS_NUM_THREADS="1")
+            threads[COLD].append((taken[COLD][-1] / limited[0], worked[COLD][-1] / limited[1]))
             for name, arguments in PROGRAMS.items():
                 taken[name].append(_ended(arguments)[0])
             for name, code in _PARTS.items():
                 worked[name].append(_ended(("-c", code))[1])
             for name, code in ENTRIES.items():
-                plain, limited = _ended(("-c", code)), _ended(("-c", code), OPENBLAS_NUM_THREADS="1")
-                threads[name].append((plain[0] / limited[0], plain[1] / limited[1]))
+                free, one = _ended(("-c", code)), _ended(("-c", code), OPENBLAS_NUM_THREADS="1")
+                threads[name].append((free[0] / one[0], free[1] / one[1]))
     _print(taken, EMPTY, list(NODES))
     for name in NODES:
         print(f"{name:22s} processor time {min(worked[name]):.2f} s, memory {max(memory[name]):.0f} MB")
@@ -146,15 +148,15 @@ def main() -> int:
     return 0
 
 
-def _ready(name: str) -> tuple[float, float, float]:
-    """Time until a node is ready, its processor time by then (s), and its memory (MB)."""
+def _ready(name: str, **given: str) -> tuple[float, float, float]:
+    """Time until a node is ready, its processor time by then (s), and its memory (MB). given: environment."""
     arguments, kind, service = NODES[name]
     with caller() as asking, TemporaryDirectory(prefix="push_start_") as folder:
         copy = shutil.copy(MODEL, folder)
         client = asking.node.create_client(kind, service)
         begun = perf_counter()
-        given = [word.replace("COPY", copy) for word in arguments]
-        with process(*given, PUSH_PREDICTOR_CACHE=folder) as number:
+        words = [word.replace("COPY", copy) for word in arguments]
+        with process(*words, PUSH_PREDICTOR_CACHE=folder, **given) as number:
             while not client.service_is_ready():  # wait_for_service looks every 0.25 s
                 if perf_counter() > begun + PATIENCE:
                     raise SystemExit(f"{name}: no {client.srv_name} after {PATIENCE:g} s")

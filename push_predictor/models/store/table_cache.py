@@ -22,6 +22,8 @@ may be deleted at any time.
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -50,6 +52,8 @@ def load_served(path: Path) -> TabulatedModel:
         if served is None:  # the model of a kept table was checked before the table was computed
             computed = _computed(load_model(path))
             served = _read(model, path) or computed  # what is read goes without the matrices, which take 50 MB
+            del computed
+            _return_memory()
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         served.predict_rows(first.inputs, first.duration, first.covariates)
@@ -117,6 +121,13 @@ def _computed(model: PushModel) -> TabulatedModel:
             write_tables(kept, digest, served)
             _delete_oldest(kept.parent)
     return served
+
+
+def _return_memory() -> None:
+    """Give the memory of the computation back: glibc would keep 100 MB for later."""
+    gc.collect()
+    with suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _kept(digest: str) -> Path | None:
