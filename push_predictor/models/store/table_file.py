@@ -121,6 +121,7 @@ def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Arra
         accurate = compared(predictor, prior, CHECKED)[1]
         return TabulatedModel(with_base(model, prior), str(record["how"])) if accurate else None
     learnt = without_mean(model.base)
+    assert isinstance(learnt.predictor, GaussianProcessPredictor)
     cells, coarse, least = record["nodes"]
     values = [arrays[f"nodes_{k}"] for k in range(9)]
     domain = domain_from_nodes(learnt, learnt.predictor, TableNodes(cells, coarse, least, values))
