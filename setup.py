@@ -48,7 +48,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/config", glob("config/*")),
-        (f"share/{NAME}/resource", glob("resource/*.pushmodel")),
+        (f"share/{NAME}/resource", glob("resource/*.pushmodel*")),
         # pip puts the executables into bin/ only; `ros2 run` looks here
         (f"lib/{NAME}", [f"scripts/run/{executable}" for executable in (NAME, *NODES)]),
     ],
@@ -87,7 +87,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"{NAME} = push_predictor.cli:main",
-            *(f"{node} = push_predictor.nodes.{node}:main" for node in NODES),
+            *(f"{node} = push_predictor.nodes.entry:{node}" for node in NODES),
         ]
     },
     zip_safe=False,

@@ -16,14 +16,47 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
-from threadpoolctl import threadpool_limits
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
+VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+_process = {"limited": False}
+
+
+def limit_process() -> None:
+    """Limit this process and its children to one thread, unless the environment sets another number.
+
+    Call it before numpy is imported: a BLAS reads the environment once.
+    """
+    for name in VARIABLES:
+        os.environ.setdefault(name, "1")
+    _process["limited"] = "numpy" not in sys.modules and all(os.environ[name] == "1" for name in VARIABLES)
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, whatever the environment asks for."""
-    with threadpool_limits(limits=1, user_api="blas"):
+    if _process["limited"]:
         yield
+        return
+    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
+
+    with _controller().limit(limits=1, user_api="blas"):
+        yield
+
+
+@lru_cache(maxsize=1)
+def _controller() -> ThreadpoolController:
+    """The BLAS libraries of numpy and scipy. To find them takes twenty times as long as to limit them."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

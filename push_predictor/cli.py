@@ -27,6 +27,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from push_predictor import __version__
+from push_predictor.blas_threads import limit_process
 from push_predictor.commands.common.old_spellings import current_spelling
 from push_predictor.commands.common.output import check_json, warn
 from push_predictor.errors import PushPredictorError
@@ -52,7 +53,7 @@ COMMANDS = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command and return its exit status."""
     # With a thousand rows a second thread gains little, and it is ten times slower if another process needs the core.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    limit_process()
     words, warnings = current_spelling(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion only: argcomplete takes longer than the parser

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from push_predictor.types import Array
 
@@ -28,7 +28,7 @@ def normal_scores(values: Array) -> Array:
     values: (n, ...); the result has the same shape. Equal values share the mean of their ranks. A column that contains
     NaN gets NaN scores.
     """
-    return np.asarray(ndtri(np.apply_along_axis(_shares, 0, values)))
+    return np.asarray(scipy.special.ndtri(np.apply_along_axis(_shares, 0, values)))
 
 
 def _shares(column: Array) -> Array:

@@ -34,6 +34,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from push_predictor.blas_threads import VARIABLES
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import PushModel
@@ -125,15 +126,20 @@ def predict_server(model: Path, namespace: str = "") -> Iterator[int]:
         yield number
 
 
-@contextmanager
-def process(*arguments: str) -> Iterator[int]:
-    """Run another Python with this repository's packages; yields its process id."""
+def environment_of(**given: str) -> dict[str, str]:
+    """The environment of another Python with this repository's packages, without a number of threads."""
     # If inherited, it would keep a Python of another environment from setting its library path.
-    environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
-    environment["OPENBLAS_NUM_THREADS"] = "1"
+    apart = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE", *VARIABLES}
+    environment = {name: value for name, value in os.environ.items() if name not in apart}
     root = str(Path(__file__).resolve().parents[2])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
-    running = subprocess.Popen([sys.executable, *arguments], env=environment)
+    return {**environment, **given}
+
+
+@contextmanager
+def process(*arguments: str, **given: str) -> Iterator[int]:
+    """Run another Python with this repository's packages; yields its process id. given: environment variables."""
+    running = subprocess.Popen([sys.executable, *arguments], env=environment_of(**given))
     try:
         yield running.pid
     finally:

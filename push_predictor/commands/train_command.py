@@ -109,7 +109,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.models.store.table_cache import keep_table
+    from push_predictor.models.store.table_cache import keep_tables
     from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, load_data, load_rig_for
     from push_predictor.recordings.table import empty_table
@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> None:
     model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     with progress("table for predict_server"):
-        keep_table(model, options.out)
+        keep_tables(model, options.out)
     if kind in LEARNT:
         checks.learnt_from(options.data, table, rig)
     lines = _saved_ladder(model, ladder, options.out)

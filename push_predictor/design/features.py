@@ -24,7 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag, lapack
+import scipy
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.exact import Mechanics, joint
@@ -120,7 +120,7 @@ def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:
     """Features (n, 3, q) in m, m, rad of the effects' uncertain coefficients."""
     completed = extended.completed(push)
     designs = joint(Mechanics(extended.physics, extended.mechanics), extended.effects, completed).designs
-    covariance = block_diag(*(effect.covariance for effect in extended.effects))
+    covariance = scipy.linalg.block_diag(*(effect.covariance for effect in extended.effects))
     begin = np.cumsum([0, *(len(effect.coefficients) for effect in extended.effects)])
     for (i, j), shared in extended.cross.items():
         covariance[begin[j] : begin[j + 1], begin[i] : begin[i + 1]] = shared.T  # i < j: eigh reads this triangle
@@ -129,7 +129,7 @@ def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:
 
 def _root(covariance: Array) -> Array:
     """R (n, r) with R R' the covariance (n, n) in units of noise, but for a remainder of at most NEGLIGIBLE."""
-    factor, pivots, rank, _ = lapack.dpstrf(covariance, tol=NEGLIGIBLE, lower=1)
+    factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(covariance, tol=NEGLIGIBLE, lower=1)
     if covariance.diagonal().max() <= NEGLIGIBLE:
         rank = 0
     root = np.empty((len(covariance), rank))

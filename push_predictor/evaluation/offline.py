@@ -27,8 +27,8 @@ from push_predictor.evaluation.alarm.scores import recording_alarm
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
+from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.supports import on_supports
-from push_predictor.models.tabulated.tabulated_model import as_served
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig

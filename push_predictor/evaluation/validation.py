@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from push_predictor.evaluation.metrics import (
     COVERAGE_LEVELS,
@@ -132,7 +132,7 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
 def pit(comparison: Comparison) -> Array:
     """Probability integral transform (n, 3): the predicted probability of an outcome below the observed one."""
     tails, residuals = comparison.tails, comparison.residuals
-    return np.asarray(ndtr(residuals)) if tails is None else tails.probability(residuals)
+    return np.asarray(scipy.special.ndtr(residuals)) if tails is None else tails.probability(residuals)
 
 
 def trained_on(model: PushModel, table: PushTable) -> list[str]:

@@ -18,12 +18,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
@@ -38,6 +40,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 KINDS = ("vhgp", "gp", "analytical", "prior")
 USUAL_SPEED, USUAL_DURATION = 0.02, 0.2  # m/s, s: of the pushes of an untrained model
 DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
+SMALLEST_LARGE = 100  # rows of a matrix on which a BLAS may use several threads
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
 
 
@@ -106,12 +109,18 @@ class PushModel:
         """
         push = Push(inputs, duration, covariates or {})
         inside = self.in_domain(inputs) & self.covariates_seen(push)
-        return Prediction(*self.predictor.moments(push), inside, self.predictor.tails)
+        with one_blas_thread() if self._has_large_matrices else nullcontext():
+            return Prediction(*self.predictor.moments(push), inside, self.predictor.tails)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Names of the covariates that every push must bring; none unless the model is extended."""
         return self.predictor.needs
+
+    @cached_property
+    def _has_large_matrices(self) -> bool:
+        """Whether more threads would work on a prediction, for little; to forbid it takes some microseconds."""
+        return self.predictor.learnt and len(self.training) >= SMALLEST_LARGE
 
     @cached_property
     def base(self) -> PushModel:
@@ -127,11 +136,15 @@ class PushModel:
         rows = self.training
         if block is None:
             block = np.unique(rows.push_id, return_inverse=True)[1]
-        return self.predictor.held_out_moments(Push(rows.inputs, rows.duration, rows.covariates), block)
+        with one_blas_thread():
+            return self.predictor.held_out_moments(Push(rows.inputs, rows.duration, rows.covariates), block)
 
     def exact_log_density(self, table: PushTable) -> Array | None:
         """Log density (n, 3) of a table's outcomes under the exact predictive, None if that is a Gaussian."""
-        return self.predictor.exact_log_density(Push(table.inputs, table.duration, table.covariates), table.outcomes)
+        with one_blas_thread():
+            return self.predictor.exact_log_density(
+                Push(table.inputs, table.duration, table.covariates), table.outcomes
+            )
 
     def in_domain(self, inputs: Array) -> BoolArray:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.

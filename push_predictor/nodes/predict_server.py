@@ -16,8 +16,14 @@
 
 from __future__ import annotations
 
-import gc
 import sys
+
+if __name__ == "__main__":  # before the other imports: they take half a second, in which a signal may arrive
+    from push_predictor.nodes import entry
+
+    sys.exit(entry.predict_server())
+
+import gc
 import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -39,7 +45,7 @@ from push_predictor.errors import InactiveError, PushPredictorError, RequestErro
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.runtime import run
 from push_predictor.nodes.server.model_services import handle_list_models, handle_load_model
 from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
 from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
@@ -308,16 +314,10 @@ class PredictServer(LifecycleNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit status."""
-    return run("predict_server", started_server, args)
+    return run("predict_server", lambda stop: PredictServer(), args, start=start_server)
 
 
-def started_server(stop: Stop) -> PredictServer:
-    """The node, active if its parameter `autostart` is true. Raises RequestError for a bad parameter."""
-    node = PredictServer()
+def start_server(node: PredictServer) -> None:
+    """Activate the node if its parameter `autostart` is true."""
     if node.value("autostart"):
         node.start()
-    return node
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -17,6 +17,12 @@
 from __future__ import annotations
 
 import sys
+
+if __name__ == "__main__":  # before the other imports: they take half a second, in which a signal may arrive
+    from push_predictor.nodes import entry
+
+    sys.exit(entry.push_recorder())
+
 import threading
 from collections.abc import Sequence
 from time import monotonic
@@ -117,7 +123,3 @@ def main(args: Sequence[str] | None = None) -> int:
     if summary is not None:
         print(summary.to_text())
     return status
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,11 +16,17 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":  # before the other imports: they take half a second, in which a signal may arrive
+    from push_predictor.nodes import entry
+
+    sys.exit(entry.push_replay())
+
 import gc
 import json
 import os
 import struct
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -296,7 +302,3 @@ def _size(path: Path) -> int:
 
 def _text(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -17,6 +17,12 @@
 from __future__ import annotations
 
 import sys
+
+if __name__ == "__main__":  # before the other imports: they take half a second, in which a signal may arrive
+    from push_predictor.nodes import entry
+
+    sys.exit(entry.push_validator())
+
 import threading
 from collections.abc import Sequence
 from time import monotonic
@@ -180,7 +186,3 @@ class PushValidator(Node):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit status."""
     return run("push_validator", PushValidator, args)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -33,6 +32,7 @@ from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
 from push_predictor.models.push_model import PushModel
+from push_predictor.online.child_process import start_child
 from push_predictor.online.completed_pushes import CompletedPush
 from push_predictor.recordings.table import concatenate
 
@@ -85,11 +85,8 @@ class AlarmProcess:
             return
         self.stop()
         self._model = model
-        # spawned: a fork would inherit the threads' locks of the middleware
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs, model, self._rate), daemon=True, name="alarm")
-        self._process.start()
+        self._connection, theirs = multiprocessing.Pipe()
+        self._process = start_child(_work, (theirs, model, self._rate), "alarm")
         theirs.close()
         self._asked = True  # the process speaks first
 
@@ -137,7 +134,6 @@ class AlarmProcess:
 
 def _work(connection: Connection, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     os.nice(NICENESS)
     try:
         calibration = calibrate(model)

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from push_predictor.errors import PushPredictorError
+from push_predictor.online.child_process import start_child
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
@@ -67,11 +67,8 @@ class CheckProcess:
         """Check a recording, or that of a path and its topics, if no check runs. rig: None for the recorded one."""
         if self.busy:
             return
-        # spawned: a fork would inherit the threads' locks of the middleware
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_check, args=(theirs, data, rig, topics), daemon=True, name="check")
-        self._process.start()
+        self._connection, theirs = multiprocessing.Pipe()
+        self._process = start_child(_check, (theirs, data, rig, topics), "check")
         theirs.close()
 
     def work(self) -> None:
@@ -105,7 +102,6 @@ class CheckProcess:
 
 
 def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     os.nice(NICENESS)
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.read import read_recording, require_rig

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
 import sys
 from collections.abc import Mapping
@@ -29,6 +28,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.offline import report_windows
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.push_model import PushModel
+from push_predictor.online.child_process import start_child
 from push_predictor.online.files.window_rows import WindowRows
 from push_predictor.online.live_validation import LiveValidation
 
@@ -58,12 +58,7 @@ class ReportWriter:
         comparisons = [validation.comparison(k) for k in range(len(validation.models))]
         whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
         models, shown = [validation.models[k] for k in whole], [comparisons[k] for k in whole]
-        # spawned: a fork would inherit the threads' locks of the middleware
-        context = multiprocessing.get_context("spawn")
-        self._process = context.Process(
-            target=_write, args=(models, validation.predicted(), shown, folder, alarm), daemon=True
-        )
-        self._process.start()
+        self._process = start_child(_write, (models, validation.predicted(), shown, folder, alarm), "report")
 
     def stop(self) -> None:
         """End a report that is being written; its unfinished files are removed."""
@@ -79,7 +74,6 @@ def _write(
     folder: Path,
     alarm: Mapping[str, object] | None,
 ) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that unfinished files are removed
     try:
         report_windows(models, windows, comparisons, folder, "online validation", alarm=alarm)

@@ -20,26 +20,23 @@ It reports to the node through a pipe. When the node has died, it ends and delet
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import shutil
-import signal
 from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
-from push_predictor.online.files.window_table import TABLE
+from push_predictor.online.child_process import start_child
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.bag.metadata import METADATA_FILE
 from push_predictor.recordings.rig import HOW_TO_GIVE
-from push_predictor.recordings.table_file import ENDINGS, rig_path
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
+
     from push_predictor.residuals.outcome import Trace
 
 REPORT, VERDICT, EXTENDED = "trace.html", "trace.json", "extended.pushmodel"
@@ -87,11 +84,10 @@ class Failed:
 
 def start_trace(task: TraceTask) -> tuple[BaseProcess, Connection]:
     """Start the process. Its pipe delivers Stage messages, then Traced or Failed."""
-    # spawned: a fork would inherit locks that the middleware's threads own
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(sender, task), daemon=True, name="trace")
-    process.start()
+    import multiprocessing
+
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    process = start_child(_run, (sender, task), "trace")
     sender.close()
     return process, receiver
 
@@ -101,6 +97,9 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
     A validator's table comes first, then the folder itself as a recording, then all push tables and recordings in it.
     """
+    from push_predictor.online.files.window_table import TABLE
+    from push_predictor.recordings.table_file import ENDINGS
+
     if (folder / TABLE).is_file():
         return (folder / TABLE,)
     if _is_bag(folder):
@@ -110,11 +109,12 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
 
 def _is_bag(path: Path) -> bool:
+    from push_predictor.recordings.bag.metadata import METADATA_FILE
+
     return (path / METADATA_FILE).is_file() and path.name not in NOT_TRACED
 
 
 def _run(connection: Connection, task: TraceTask) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     os.nice(NICENESS)
     try:
         connection.send(_traced(connection, task))
@@ -169,6 +169,9 @@ def _report(path: Path, trace: Trace) -> Sequence[str]:
 
 def _settled(path: Path, folder: Path) -> Path:
     """A copy of a table that a validator may be appending to, without an incomplete last line; else the path itself."""
+    from push_predictor.online.files.window_table import TABLE
+    from push_predictor.recordings.table_file import rig_path
+
     if path.name != TABLE:
         return path
     copy = folder / COPIES / TABLE

@@ -27,6 +27,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import CovariateError, RequestError, TooLargeError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
@@ -62,6 +63,7 @@ class Rollout:
     in_domain: Array
 
 
+@one_blas_thread()
 def rollout(
     predictor: PushModel | TabulatedModel,
     slider_mean: Array,

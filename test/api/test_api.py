@@ -43,6 +43,7 @@ from push_predictor import (
     validate,
 )
 from push_predictor.errors import PushPredictorError, RecordingError, RequestError, RigError, TrainingError
+from push_predictor.planning.rollout import rollout
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.windows.push_window import windows_to_table
@@ -130,6 +131,9 @@ def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone(few:
     assert during == {1} and before == after and 2 in before
 
 
+LEARNT = "push_predictor.models.predictors.gaussian_process_predictor.GaussianProcessPredictor"
+
+
 def blas_threads() -> list[int]:
     return [pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
 
@@ -145,6 +149,13 @@ def blas_threads() -> list[int]:
             lambda model: choose_push(model, [0.0, 0.0, 0.0], Goal([0.03, 0.0, 0.0], 0.01, None)),
         ),
         ("push_predictor.residuals.trace.window_options", lambda model: trace(model, TEST)),
+        (f"{LEARNT}.moments", lambda model: model.predict(Pushes(0.02, 0.1, 0.3))),
+        (f"{LEARNT}.held_out_moments", lambda model: model.held_out_moments()),
+        (f"{LEARNT}.exact_log_density", lambda model: model.exact_log_density(model.training)),
+        (
+            "push_predictor.planning.rollout.persistence_of",
+            lambda model: rollout(model, np.zeros(3), np.zeros((3, 3)), np.array([[0.02, 0.1, 0.0, 0.2]])),
+        ),
     ],
 )
 def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pytest.MonkeyPatch, step: str, call: Any):
@@ -160,6 +171,21 @@ def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pyt
         with pytest.raises(PushPredictorError, match="reached"):
             call(replace(model, name="fresh"))
         assert set(during) == {1} and blas_threads() == before
+
+
+def test_a_prediction_without_large_matrices_is_not_slowed_down(monkeypatch: pytest.MonkeyPatch):
+    computed = train(TRAINING, kind="analytical", n_train=120)
+    during: list[int] = []
+    exact = type(computed.predictor).moments
+
+    def moments(*arguments: Any) -> Any:
+        during.extend(blas_threads())
+        return exact(*arguments)
+
+    monkeypatch.setattr(type(computed.predictor), "moments", moments)
+    with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
+        computed.predict(Pushes(0.02, 0.1, 0.3))
+    assert set(during) == {2}
 
 
 @pytest.mark.slow

@@ -33,7 +33,9 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store import table_cache
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated import effect_table_build
 from push_predictor.models.tabulated.effect_axes import change_axes
 from push_predictor.models.tabulated.table_accuracy import relative_error
@@ -360,3 +362,33 @@ def test_registry_tabulates_effects(tmp_path: Path) -> None:
     registry.load(path)
     (line,) = registry.answering
     assert "effects: table of" in line and registry.get("").effects is not None
+
+
+def not_again(*_: object) -> TabulatedModel:
+    raise AssertionError("a table was computed")
+
+
+@pytest.mark.parametrize("kind", ["about mechanics", "analytical", "fitted"])
+@pytest.mark.parametrize("accurate", [True, False])
+def test_tables_of_effects_are_kept_and_checked(
+    kind: str, accurate: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That there is no accurate table is kept too: to find that out takes longest."""
+    monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(tmp_path / "tables"))
+    monkeypatch.setattr(effect_table_build, "WORK", (20_000,))
+    monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 10.0 if accurate else 0.0)
+    monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 10.0)
+    model, rows = extended(kind, *CASES["linear"]), inside()
+    computed = as_served(model)
+    assert (computed.effects is not None) is accurate
+    with monkeypatch.context() as patch:
+        patch.setattr(table_cache, "with_effect_table", not_again)
+        kept = as_served(model)
+    assert kept.how == computed.how
+    one, other = predicted(computed, rows), predicted(kept, rows)
+    assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
+    monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 1e-9)
+    monkeypatch.setattr(table_cache, "with_effect_table", not_again)
+    if accurate:
+        with pytest.raises(AssertionError, match="a table was computed"):
+            as_served(model)

@@ -17,20 +17,23 @@
 from __future__ import annotations
 
 import json
-import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from repository import REPOSITORY
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store import table_cache
-from push_predictor.models.store.model_file import save_model
-from push_predictor.models.store.table_cache import keep_table, load_served, table_folder
+from push_predictor.models.store import table_cache, table_file
+from push_predictor.models.store.arrays_record import read_arrays
+from push_predictor.models.store.model_file import load_model, model_digest, save_model
+from push_predictor.models.store.table_cache import as_served, keep_tables, load_served, table_folder, tables_of
 from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.models.train import train_model
@@ -63,9 +66,19 @@ def never(*_: object, **__: object) -> TabulatedModel:
     raise AssertionError("a table was computed")
 
 
-def only(folder: Path, ending: str) -> Path:
-    (found,) = folder.glob(f"*{ending}")
+def only(folder: Path) -> Path:
+    (found,) = folder.iterdir()
     return found
+
+
+def rewrite(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]) -> None:
+    """Change the record and the arrays of a file of tables."""
+    arrays = read_arrays(path)
+    record = json.loads(arrays.pop("record").tobytes())
+    change(record, arrays)
+    arrays["record"] = np.frombuffer(json.dumps(record).encode(), dtype=np.uint8)
+    with path.open("wb") as stream:
+        np.savez(stream, **arrays)
 
 
 def test_a_kept_table_predicts_as_the_one_computed(
@@ -81,8 +94,11 @@ def test_a_kept_table_predicts_as_the_one_computed(
     assert kept.how == computed.how and kept.error == computed.error and kept.tabulated
 
 
-def test_matrices_are_not_computed_for_a_kept_table(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    load_served(file)
+@pytest.mark.parametrize("loaded_before", [0, 1])
+def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, loaded_before: int) -> None:
+    """They take 50 MB."""
+    for _ in range(loaded_before):
+        load_served(file)
     served = load_served(file)
     regressions = served.model.predictor.base.regressions  # type: ignore[attr-defined]
     assert not any("_posterior" in vars(regression) for regression in regressions)
@@ -92,13 +108,36 @@ def test_matrices_are_not_computed_for_a_kept_table(file: Path, folder: Path, mo
     assert all("_posterior" in vars(regression) for regression in regressions)
 
 
-def test_training_keeps_the_table_for_servers(
+def test_training_writes_the_table_next_to_the_model(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    keep_table(model, file)
+    keep_tables(model, file)
     monkeypatch.setattr(table_cache, "tabulate", never)
-    assert load_served(file).tabulated
-    keep_table(model, file)
+    moved = file.with_name("moved.model")
+    file.rename(moved)
+    tables_of(file).rename(tables_of(moved))
+    assert load_served(moved).tabulated and not folder.exists()
+
+
+def test_a_device_gets_no_table_next_to_it(model: PushModel, tmp_path: Path) -> None:
+    keep_tables(model, tmp_path / "pipe")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_validation_uses_the_table_of_the_server(
+    file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load_served(file)
+    monkeypatch.setattr(table_cache, "tabulate", never)
+    assert as_served(model).tabulated and as_served(load_model(file)).tabulated
+    keep_tables(model, file)
+    assert tables_of(file).exists()
+
+
+def test_the_shipped_model_has_its_table(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_cache, "tabulate", never)
+    served = load_served(REPOSITORY / "resource" / "simulated_square_abs.pushmodel")
+    assert served.tabulated and not folder.exists()
 
 
 def test_the_table_of_a_prior_model_is_kept_and_checked(
@@ -120,26 +159,19 @@ def test_the_table_of_a_prior_model_is_kept_and_checked(
         pushes, duration = np.array([[0.02, 0.1, 0.2], [0.03, 0.6, -0.3]]), np.full(2, 0.2)
         one, other = (served.predict_rows(pushes, duration) for served in (computed, kept))
         assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
-    array = only(folder, ".npy")
-    wrong = 1.5 * np.load(array) + 1.0
-    np.save(array, wrong)
-    record = only(folder, ".json")
-    record.write_text(json.dumps({**json.loads(record.read_text()), "checksum": zlib.crc32(array.read_bytes())}))
+    rewrite(only(folder), lambda record, arrays: arrays.update(prior=1.5 * arrays["prior"] + 1.0))
     again = load_served(file)
     assert np.array_equal(again.predict_rows(pushes, duration).mean, one.mean)
 
 
-@pytest.mark.parametrize("ending", [".json", ".npy"])
-@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", "cut", "flipped", None])
+@pytest.mark.parametrize("content", [b"", b"{}", "cut", "flipped"])
 def test_a_damaged_table_is_computed_again(
-    file: Path, folder: Path, ending: str, content: bytes | str | None, monkeypatch: pytest.MonkeyPatch
+    file: Path, folder: Path, content: bytes | str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = load_served(file)
-    damaged = only(folder, ending)
+    damaged = only(folder)
     whole = damaged.read_bytes()
-    if content is None:
-        damaged.unlink()
-    elif content == "cut":
+    if content == "cut":
         damaged.write_bytes(whole[:-9])
     elif content == "flipped":
         middle = len(whole) // 2
@@ -155,55 +187,65 @@ def test_a_damaged_table_is_computed_again(
 @pytest.mark.parametrize(
     "change",
     [
-        {"axes": [[0.0, 1.0, 16]]},
-        {"axes": "none"},
-        {"columns": [0, 1]},
-        {"least": None},
-        {"error": [1.0]},
-        {"probes": {}},
+        lambda record, arrays: record.update(format_version=2),
+        lambda record, arrays: record.update(model="another"),
+        lambda record, arrays: record.update(nodes=[[16], [16], [0.0]]),
+        lambda record, arrays: record.update(nodes="none"),
+        lambda record, arrays: record["nodes"].__setitem__(0, [100_000] * 3),
+        lambda record, arrays: record["nodes"].__setitem__(2, None),
+        lambda record, arrays: record.update(error=[1.0]),
+        lambda record, arrays: record.update(probes={}),
+        lambda record, arrays: arrays.pop("nodes_8"),
+        lambda record, arrays: arrays.update(nodes_0=arrays["nodes_0"] + np.nan),
+        lambda record, arrays: arrays.update(nodes_4=arrays["nodes_4"] * 1.5),
+        lambda record, arrays: arrays.pop("record", record.clear()),
     ],
-    ids=lambda change: next(iter(change)),
 )
-def test_a_record_that_does_not_fit_is_computed_again(file: Path, folder: Path, change: dict[str, object]) -> None:
+def test_a_file_that_does_not_fit_is_computed_again(
+    file: Path, folder: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]
+) -> None:
     expected = load_served(file)
-    record = only(folder, ".json")
-    record.write_text(json.dumps({**json.loads(record.read_text()), **change}))
+    right = read_arrays(kept := only(folder))
+    rewrite(kept, change)
     assert load_served(file).how == expected.how
+    assert read_arrays(kept)["record"].tobytes() == right["record"].tobytes()
 
 
 @pytest.mark.parametrize("name", ["mean", "covariance", "process_covariance"])
-def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(file: Path, folder: Path, name: str) -> None:
-    load_served(file)
-    record = only(folder, ".json")
-    content = json.loads(record.read_text())
-    content["probes"][name] = (np.array(content["probes"][name]) * 1.02).tolist()
-    record.write_text(json.dumps(content))
-    load_served(file)
-    assert json.loads(record.read_text())["probes"] != content["probes"]
-
-
-def test_another_model_or_other_code_has_its_own_table(
-    file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
+    file: Path, folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    load_served(file)
+
+    def change(record: dict[str, Any], arrays: object) -> None:
+        record["probes"][name] = (np.array(record["probes"][name]) * 1.02).tolist()
+
+    rewrite(only(folder), change)
+    monkeypatch.setattr(table_cache, "tabulate", never)
+    with pytest.raises(ModelFileError, match="a table was computed"):
+        load_served(file)
+
+
+def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, model: PushModel, folder: Path) -> None:
     load_served(file)
     other = file.with_name("other.pushmodel")
     save_model(replace(model, name="other"), other)
     load_served(other)
-    monkeypatch.setattr(table_cache, "_code", lambda: b"later")
-    load_served(file)
-    assert len(list(folder.glob("*.json"))) == 3
+    assert len(list(folder.iterdir())) == 1
+    outcomes = model.training.outcomes + [1e-9, 0.0, 0.0]
+    save_model(replace(model, training=replace(model.training, outcomes=outcomes)), other)
+    load_served(other)
+    assert len(list(folder.iterdir())) == 2
 
 
 def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_cache, "MOST_TABLES", 2)
-    for version in (b"1", b"2", b"1", b"3"):
-        monkeypatch.setattr(table_cache, "_code", lambda version=version: version)
+    for version in (1, 2, 1, 3):
+        monkeypatch.setattr(table_file, "FORMAT_VERSION", version)
+        monkeypatch.setattr(table_cache, "FORMAT_VERSION", version)
         load_served(file)
-    assert len(list(folder.glob("*.json"))) == len(list(folder.glob("*.npy"))) == 2
-    monkeypatch.setattr(table_cache, "tabulate", never)
-    for version in (b"1", b"3"):
-        monkeypatch.setattr(table_cache, "_code", lambda version=version: version)
-        load_served(file)
+    digest = model_digest(load_model(file))
+    assert {path.name for path in folder.iterdir()} == {f"{digest}.1.tables", f"{digest}.3.tables"}
 
 
 def test_a_folder_that_takes_no_files_is_no_error(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

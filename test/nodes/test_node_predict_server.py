@@ -50,7 +50,6 @@ from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server, runtime
-from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
 from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push_batch
@@ -305,7 +304,8 @@ def test_unexpected_exception_becomes_a_logged_refusal(folder, monkeypatch, capf
     arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']"]
     rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = predict_server.started_server(Stop())
+        node = predict_server.PredictServer()
+        predict_server.start_server(node)
         response = node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response())
         assert not response.success
         assert not np.any(response.mean)
@@ -512,7 +512,8 @@ def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder,
     arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']", "-p", "default_model:=gp"]
     rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = predict_server.started_server(Stop())
+        node = predict_server.PredictServer()
+        predict_server.start_server(node)
         wanted = LoadModel.Request(path=str(folder / "analytical.model"), make_default=True)
         assert node._on_load(wanted, LoadModel.Response()).success
         assert node.value("default_model") == "analytical"

@@ -174,10 +174,9 @@ def test_bad_goal_is_aborted_with_the_reason(case: str, server: Server, drifting
 def test_process_of_a_trace_reports_the_reason(
     case: str, place: Path, drifting: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In this process, whose priority and signal handlers are kept."""
+    """In this process, whose priority is kept."""
     given, words = BAD_DATA[case]
     monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
-    monkeypatch.setattr(trace_process.signal, "signal", lambda number, handler: None)
     given.get("change", lambda folder: None)(drifting)
     (folder := drifting / ".trace-work").mkdir()
     task = TraceTask(

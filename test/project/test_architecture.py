@@ -172,6 +172,17 @@ def test_a_node_starts_without_the_slow_packages_of_scipy(node: str) -> None:
 
 
 @pytest.mark.slow
+def test_the_server_imports_what_few_requests_need_when_they_need_it() -> None:
+    """Matrices and special functions wait for a push outside the table, readers of recordings for a trace."""
+    late = {"scipy.special", "scipy.linalg", "threadpoolctl", "multiprocessing", "mcap", "csv", "sqlite3"}
+    check = (
+        "import sys; from push_predictor.blas_threads import limit_process; limit_process()\n"
+        f"import push_predictor.nodes.predict_server; sys.exit(str({late} & sys.modules.keys() or '') or None)"
+    )
+    subprocess.run([sys.executable, "-c", check], check=True, cwd=REPOSITORY)
+
+
+@pytest.mark.slow
 def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
     forbidden = "import sys; sys.modules.update(dict.fromkeys(['rclpy', 'matplotlib', 'rosbags', 'h5py', 'rich']))\n"
     use = (

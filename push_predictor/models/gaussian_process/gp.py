@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, blas
+import scipy
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.cross_validation import held_out_errors
@@ -170,7 +170,7 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
     constant = len(outputs) * np.log(2.0 * np.pi * noise)
     value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
     weights = ridge.precision()
-    blas.dger(-1.0, alpha, alpha, a=weights.T, overwrite_a=1)
+    scipy.linalg.blas.dger(-1.0, alpha, alpha, a=weights.T, overwrite_a=1)
     of_noise = -noise * np.trace(weights)
     return value, np.append(-0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
 
@@ -194,7 +194,7 @@ def _cost(inputs: Array, outputs: Array, family: KernelFamily) -> Cost:
     def negative_log_likelihood(vector: Array) -> tuple[float, Array]:
         try:
             value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector, family))
-        except LinAlgError:
+        except np.linalg.LinAlgError:
             return _REFUSED, np.zeros_like(vector)
         return -value, -gradient
 

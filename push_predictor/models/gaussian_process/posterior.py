@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import blas
+import scipy
 
 from push_predictor.models.gaussian_process.ridge import cholesky_in_place
 from push_predictor.types import Array
@@ -37,8 +37,8 @@ class KernelPosterior:
 
     def weights(self, values: Array) -> Array:
         """(K + noise)^-1 values, shape (n,): the posterior mean at x* is k(x*, X) times this."""
-        half = blas.dtrsv(self._factor, values, lower=1)
-        return np.asarray(blas.dtrsv(self._factor, half, lower=1, trans=1))
+        half = scipy.linalg.blas.dtrsv(self._factor, values, lower=1)
+        return np.asarray(scipy.linalg.blas.dtrsv(self._factor, half, lower=1, trans=1))
 
     def explained_variance(self, cross: Array) -> Array:
         """By how much the observations reduce the prior variance at m inputs, shape (m,).
@@ -47,12 +47,12 @@ class KernelPosterior:
         diag(cross (K + noise)^-1 cross').
         """
         if len(cross) == 1:
-            half = blas.dtrsv(self._factor, cross[0], lower=1)
+            half = scipy.linalg.blas.dtrsv(self._factor, cross[0], lower=1)
             return np.array([half @ half])
-        half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
+        half = scipy.linalg.blas.dtrsm(1.0, self._factor, cross.T, lower=1)
         return np.asarray(np.einsum("ij,ij->j", half, half))
 
     def explained_covariance(self, cross: Array) -> Array:
         """By how much the observations reduce the prior covariance between m inputs, (m, m); cross (m, n) as above."""
-        half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
+        half = scipy.linalg.blas.dtrsm(1.0, self._factor, cross.T, lower=1)
         return np.asarray(half.T @ half)

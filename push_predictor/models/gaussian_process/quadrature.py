@@ -21,7 +21,7 @@ section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+import scipy
 
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.types import Array
@@ -35,7 +35,9 @@ def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
     """Log p(outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
     variances = _variances_at_nodes(prediction)
     return np.asarray(
-        logsumexp(_log_normal(outcomes[:, None], prediction.mean[:, None], variances) + _LOG_WEIGHTS, axis=1)
+        scipy.special.logsumexp(
+            _log_normal(outcomes[:, None], prediction.mean[:, None], variances) + _LOG_WEIGHTS, axis=1
+        )
     )
 
 
@@ -47,7 +49,7 @@ def gaussian_log_density(prediction: LatentPrediction, outcomes: Array) -> Array
 def exact_cdf(prediction: LatentPrediction, outcomes: Array) -> Array:
     """P(y <= outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
     deviations = (outcomes - prediction.mean)[:, None] / np.sqrt(_variances_at_nodes(prediction))
-    return np.asarray(ndtr(deviations) @ np.exp(_LOG_WEIGHTS))
+    return np.asarray(scipy.special.ndtr(deviations) @ np.exp(_LOG_WEIGHTS))
 
 
 def _variances_at_nodes(prediction: LatentPrediction) -> Array:

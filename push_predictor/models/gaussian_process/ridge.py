@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import LinAlgError, blas, lapack
+import scipy
 
 from push_predictor.types import Array
 
@@ -87,7 +87,7 @@ def factorise(matrix: Array, nugget: float = 0.0, *, smooth: bool = True) -> Reg
     n = len(matrix)
     if n < _SMALLEST_FACTORISED or not smooth:
         return RegularisableKernel(matrix, None, nugget)
-    factor, pivots, rank, _ = lapack.dpstrf(matrix.T, tol=_DROPPED * matrix[0, 0], lower=1)
+    factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(matrix.T, tol=_DROPPED * matrix[0, 0], lower=1)
     if rank > _LARGEST_SHARE * n:
         return RegularisableKernel(matrix, None, nugget)
     root = np.empty((rank, n))
@@ -100,10 +100,10 @@ def cholesky_in_place(matrix: Array) -> Array:
 
     Raises LinAlgError where the matrix is not positive definite.
     """
-    factor, info = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
+    factor, info = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
     # Whether LAPACK notices a NaN depends on its place in the matrix.
     if info != 0 or not np.isfinite(factor[-1, -1]):
-        raise LinAlgError(f"matrix of {len(matrix)} rows is not positive definite")
+        raise np.linalg.LinAlgError(f"matrix of {len(matrix)} rows is not positive definite")
     return np.asarray(factor)
 
 
@@ -120,7 +120,7 @@ class _LowRankRidge:
         inner.flat[:: len(inner) + 1] += 1.0
         factor = cholesky_in_place(inner)
         # T' L' = root' solved from the right, so that LAPACK's columns are our rows
-        shrunk = blas.dtrsm(1.0, factor, root.T, side=1, lower=1, trans_a=1).T
+        shrunk = scipy.linalg.blas.dtrsm(1.0, factor, root.T, side=1, lower=1, trans_a=1).T
         return cls(weights, _log_determinant(factor), shrunk)
 
     @property
@@ -152,7 +152,7 @@ class _DenseRidge:
         inner.flat[:: len(inner) + 1] += 1.0
         factor = cholesky_in_place(inner)
         log_determinant = _log_determinant(factor)
-        inverse, _ = lapack.dtrtri(factor, lower=1, overwrite_c=1)
+        inverse, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
         return cls(weights, log_determinant, inverse)
 
     @property
@@ -166,7 +166,7 @@ class _DenseRidge:
 
     def precision(self) -> Array:
         # In Fortran's order L'L is formed in the lower triangle, for a sixth of a product's operations.
-        matrix, _ = lapack.dlauum(self.inverse_root, lower=1)
+        matrix, _ = scipy.linalg.lapack.dlauum(self.inverse_root, lower=1)
         scale = np.sqrt(self.weights)
         matrix *= scale
         matrix *= scale[:, None]

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import blas
+import scipy
 
 from push_predictor.models.gaussian_process.ridge import RegularisableKernel, Ridge, factorise
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
@@ -203,4 +203,4 @@ def sites_from(precisions: Array, noise_mean: Array) -> Sites:
 
 def _subtract_square(matrix: Array, vector: Array, sign: float = 1.0) -> None:
     """Subtract sign vector vector' in place."""
-    blas.dger(-sign, vector, vector, a=matrix.T, overwrite_a=1)
+    scipy.linalg.blas.dger(-sign, vector, vector, a=matrix.T, overwrite_a=1)

@@ -24,7 +24,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.descent import Descent, part_of_rows
@@ -152,7 +151,7 @@ class _Search:
             problem = VhgpProblem.of(self.inputs, self.outputs, parameters)
             goal = penalty - self.best.cost if self.best else None
             bound = maximise_over_noise(problem, self._start(problem), _SEARCH_TOLERANCE, goal=goal)
-        except (LinAlgError, FloatingPointError):
+        except (np.linalg.LinAlgError, FloatingPointError):
             return _REFUSED, np.zeros_like(vector)
         cost = penalty - bound.value
         if self.best is None or cost < self.best.cost:

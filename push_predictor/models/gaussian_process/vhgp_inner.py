@@ -23,7 +23,6 @@ alone, with the mean tied to it, diverges. Where a few rows make the last steps 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError
 
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
 from push_predictor.types import Array
@@ -57,7 +56,7 @@ def _first(problem: VhgpProblem, start: Sites | None) -> Bound:
     if start is not None:
         try:
             return Bound.at(problem, start)
-        except (LinAlgError, FloatingPointError):
+        except (np.linalg.LinAlgError, FloatingPointError):
             pass  # a far line search: the old sites do not suit the new hyperparameters
     return Bound.tied(problem, np.full(len(problem.outputs), 0.5))
 
@@ -80,7 +79,7 @@ def _improved(
 def _bound_if_above(lowest: float, problem: VhgpProblem, sites: Sites) -> Bound | None:
     try:
         bound = Bound.at(problem, sites)
-    except (LinAlgError, FloatingPointError):
+    except (np.linalg.LinAlgError, FloatingPointError):
         return None
     return bound if bound.value >= lowest else None
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ellipe
+import scipy
 
 from push_predictor.errors import RigError
 from push_predictor.types import Array, IntArray
@@ -62,7 +62,7 @@ def uniform_support(outline: Outline) -> Support:
     """
     if outline.semi_axes is not None:
         a, b = sorted(outline.semi_axes, reverse=True)
-        return Support(outline.pose[:2], float(4.0 / (3.0 * np.pi) * a * ellipe(1.0 - (b / a) ** 2)))
+        return Support(outline.pose[:2], float(4.0 / (3.0 * np.pi) * a * scipy.special.ellipe(1.0 - (b / a) ** 2)))
     x, y = outline.centroid
     length = _integral_of_distance(outline.vertices - outline.centroid) / outline.area
     return Support((float(x), float(y)), length)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
@@ -56,9 +56,9 @@ def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAW
     """
     table = [BY_NAME[name] for name in names]
     spread = np.array([p.spread for p in table])
-    low = ndtr((np.array([p.low for p in table]) - means) / spread)
-    high = ndtr((np.array([p.high for p in table]) - means) / spread)
-    half = means + spread * ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))
+    low = scipy.special.ndtr((np.array([p.low for p in table]) - means) / spread)
+    high = scipy.special.ndtr((np.array([p.high for p in table]) - means) / spread)
+    half = means + spread * scipy.special.ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))
     sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in names])
     return np.concatenate([half, sign * half])
 
@@ -66,7 +66,7 @@ def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAW
 def normal_draws(names: Sequence[str], means: Array, covariance: Array, seed: int, count: int = DRAWS) -> Array:
     """Draws (count, p) in pairs on opposite sides of `means` (p,), moved into the plausible ranges."""
     table = [BY_NAME[name] for name in names]
-    half = ndtri(_sobol(len(names), count // 2, seed)) @ np.linalg.cholesky(covariance).T
+    half = scipy.special.ndtri(_sobol(len(names), count // 2, seed)) @ np.linalg.cholesky(covariance).T
     draws = means + np.concatenate([half, -half])
     return np.asarray(np.clip(draws, [p.low for p in table], [p.high for p in table]))
 

@@ -33,7 +33,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtri, fdtri, gammaln, ndtri, stdtr, stdtrit
+import scipy
 
 from push_predictor.errors import RequestError
 from push_predictor.types import Array
@@ -77,14 +77,14 @@ class Tails:
 
     def probability(self, residuals: Array) -> Array:
         """Predicted probability (n, 3) of a residual below these (n, 3)."""
-        return np.asarray(stdtr(self.degrees, residuals / self.unit_scale))
+        return np.asarray(scipy.special.stdtr(self.degrees, residuals / self.unit_scale))
 
     def half_width(self, level: float, kind: IntervalKind = "student") -> Array:
         """Half-width (3,) of the central interval of that level, in (0, 1). Raises RequestError."""
         if not 0.0 < level < 1.0:
             raise RequestError("level", level, "a number above 0 and below 1")
         if kind == "student":
-            return np.asarray(self.unit_scale * stdtrit(self.degrees, 0.5 + 0.5 * level))
+            return np.asarray(self.unit_scale * scipy.special.stdtrit(self.degrees, 0.5 + 0.5 * level))
         if kind == "conformal":
             return self._conformal(level)
         raise RequestError("interval", kind, " or ".join(INTERVAL_KINDS))
@@ -95,7 +95,7 @@ class Tails:
         outputs: how many are looked at together. For a t distribution, the squared distance over their number is
         F-distributed (Kotz and Nadarajah 2004, section 1.4).
         """
-        return self.joint_scale * float(np.sqrt(outputs * fdtri(outputs, self.joint_degrees, level)))
+        return self.joint_scale * float(np.sqrt(outputs * scipy.special.fdtri(outputs, self.joint_degrees, level)))
 
     def _conformal(self, level: float) -> Array:
         """The quantile at which the training pushes and a new one, of infinite residual, reach the level.
@@ -124,16 +124,24 @@ def half_widths(tails: Tails | None, level: float, kind: IntervalKind = "student
         raise RequestError("interval", kind, "student, for a model without residuals of held-out training pushes")
     if not 0.0 < level < 1.0:
         raise RequestError("level", level, "a number above 0 and below 1")
-    return np.full(3, float(ndtri(0.5 + 0.5 * level)))
+    return np.full(3, float(scipy.special.ndtri(0.5 + 0.5 * level)))
 
 
 def joint_radius(tails: Tails | None, level: float, outputs: int = 3) -> float:
     """See Tails; that of a Gaussian without tails."""
-    return float(np.sqrt(chdtri(outputs, 1.0 - level))) if tails is None else tails.joint_radius(level, outputs)
+    return (
+        float(np.sqrt(scipy.special.chdtri(outputs, 1.0 - level)))
+        if tails is None
+        else tails.joint_radius(level, outputs)
+    )
 
 
 def student_log_density(residuals: Array, scale: Array | float, degrees: Array | float) -> Array:
     """Log density of residuals (...) under t distributions about zero with scale and degrees of freedom."""
-    constant = gammaln(0.5 * (degrees + 1.0)) - gammaln(0.5 * degrees) - 0.5 * np.log(np.pi * degrees)
+    constant = (
+        scipy.special.gammaln(0.5 * (degrees + 1.0))
+        - scipy.special.gammaln(0.5 * degrees)
+        - 0.5 * np.log(np.pi * degrees)
+    )
     square = (residuals / scale) ** 2
     return np.asarray(constant - np.log(scale) - 0.5 * (degrees + 1.0) * np.log1p(square / degrees))

@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import gammaln
+import scipy
 
 from push_predictor.models.predictors.tails import STEPS, Tails, student_log_density
 from push_predictor.types import Array, IntArray
@@ -87,7 +87,11 @@ def _radial_log_density(distance: Array, size: int, scale: float, degrees: float
     """Log density (n,) of a t distribution in `size` dimensions at distances (n,), up to a constant of `size`."""
     if size == 1:
         return student_log_density(distance, scale, degrees)
-    constant = gammaln(0.5 * (degrees + size)) - gammaln(0.5 * degrees) - 0.5 * size * np.log(degrees)
+    constant = (
+        scipy.special.gammaln(0.5 * (degrees + size))
+        - scipy.special.gammaln(0.5 * degrees)
+        - 0.5 * size * np.log(degrees)
+    )
     reach = np.log1p((distance / scale) ** 2 / degrees)
     return np.asarray(constant - size * np.log(scale) - 0.5 * (degrees + size) * reach)
 

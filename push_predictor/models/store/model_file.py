@@ -20,6 +20,7 @@ in well under a second.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import os
@@ -83,6 +84,18 @@ def load_model(path: str | os.PathLike[str], *, check: bool = True) -> PushModel
         raise ModelFileError(f"{path}: the model file is damaged ({error})") from None
     except Exception as error:  # any other failure of the computation is caused by the values in the file
         raise ModelFileError(f"{path}: the model file is damaged ({type(error).__name__}: {error})") from None
+
+
+def model_digest(model: PushModel) -> str:
+    """A hash of what determines the predictions of a model: the same for a model and its file, of whatever version."""
+    arrays = table_arrays(model.training)
+    header = _header(model, arrays)
+    known = {key: header[key] for key in ("kind", "rig", "covariates", PREDICTOR)}
+    digest = hashlib.sha256(json.dumps(known, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
+    return digest.hexdigest()[:32]
 
 
 def is_model_file(path: Path) -> bool:

@@ -43,22 +43,15 @@ ALIKE = 1e-4  # of the largest value
 MEAN_TOLERANCE = 0.2  # predicted standard deviations, in 99 of 100 pushes; the root of the mean square is a fifth of it
 COVARIANCE_TOLERANCE = 0.1  # relative, of the variance of any combination of outputs, in 99 of 100 pushes
 CHECKED = 400  # pushes: training rows, and as many with other inputs
+RECHECKED = 10  # the same, when a table is read
 
 
 def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     """A table of an extended model's effects, None if there is none, with the reason in words."""
-    predictor, rows = model.predictor, model.training
-    assert isinstance(predictor, ExtendedPredictor)
-    if RECORDING in predictor.needs:
-        return None, "exact: the mechanics depend on the recording"
-    if not len(rows):
-        return None, "exact: there are no training pushes"
-    source = EffectSource(predictor, model.usual_duration)
-    push = predictor.completed(Push(rows.inputs, rows.duration, rows.covariates))
-    change = change_axes(*source.changes(push))
-    if change is None:
-        return None, "exact: the changes take too many values"
-    builder, how = _Builder.of(source, push, change), ""
+    builder = _builder(model)
+    if isinstance(builder, str):
+        return None, f"exact: {builder}"
+    how = ""
     for work in WORK:
         if (table := builder.table(work)) is None:
             how += "; a table would need too many knots"
@@ -72,28 +65,56 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     return None, f"exact{how}"
 
 
-def table_errors(model: PushModel, table: EffectTable) -> tuple[float, float]:
-    """Differences of a table and the model that 99 of 100 pushes do not exceed.
+def effect_table_from(model: PushModel, moved: TensorSpline, slopes: TensorSpline) -> EffectTable | None:
+    """A table of splines that were built before; None unless it agrees with the model. Raises ValueError or IndexError
+    if they do not fit the model.
+    """
+    builder = _builder(model)
+    if isinstance(builder, str):
+        return None
+    table = builder.with_splines(moved, slopes)
+    of_mean, of_covariance = table_errors(model, table, RECHECKED, 0.5)
+    return table if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE else None
+
+
+def _builder(model: PushModel) -> _Builder | str:
+    """The axes of a table; in words, why there can be none."""
+    predictor, rows = model.predictor, model.training
+    assert isinstance(predictor, ExtendedPredictor)
+    if RECORDING in predictor.needs:
+        return "the mechanics depend on the recording"
+    if not len(rows):
+        return "there are no training pushes"
+    source = EffectSource(predictor, model.usual_duration)
+    push = predictor.completed(Push(rows.inputs, rows.duration, rows.covariates))
+    change = change_axes(*source.changes(push))
+    return "the changes take too many values" if change is None else _Builder.of(source, push, change)
+
+
+def table_errors(
+    model: PushModel, table: EffectTable, checked: int = CHECKED, share: float = 0.99
+) -> tuple[float, float]:
+    """Differences of a table and the model that a share of the pushes does not exceed.
 
     Of means, in predicted standard deviations, and of covariances, relative: see tabulated_model.TableAccuracy.
     """
-    push = _checked(model)
+    push = _checked(model, checked)
     exact, expected = model.predictor.moments(push), model.predictor.shift(push)
     found = table.shift(push, table.located(push))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
     of_mean = np.abs(found.mean - table.source.anchor(push) - expected.mean) / sd
     of_covariance = relative_error(exact.covariance - expected.covariance + found.covariance, exact.covariance)
-    return float(np.quantile(of_mean.max(axis=1), 0.99)), float(np.quantile(of_covariance, 0.99))
+    return float(np.quantile(of_mean.max(axis=1), share)), float(np.quantile(of_covariance, share))
 
 
-def _checked(model: PushModel) -> Push:
+def _checked(model: PushModel, count: int) -> Push:
     """Training rows, and rows with inputs drawn evenly between them."""
     rng, rows = np.random.default_rng(0), model.training
-    known = rows.take(rng.integers(len(rows), size=2 * CHECKED))
+    known = rows.take(rng.integers(len(rows), size=2 * count))
     inputs = known.inputs.copy()
     low, high = rows.inputs.min(axis=0), rows.inputs.max(axis=0)
     low[1], high[1] = 0.0, 1.0
-    inputs[CHECKED:] = rng.uniform(low, high, (CHECKED, 3))
+    inputs[count:] = rng.uniform(low, high, (count, 3))
     covariates = dict(known.covariates)
     if {"slider_heading", "push_heading"} <= set(covariates):
         normal = model.rig.outline.inward_normal(inputs[:, 1])
@@ -159,9 +180,14 @@ class _Builder:
         moved, slopes = self._factor(work, 1), self._factor(work, 2 * parameters)
         if slopes < COARSEST:
             return None
-        splines = self._spline(self._axes(moved), self._moved), self._spline(self._axes(slopes), self.source.slopes)
+        return self.with_splines(
+            self._spline(self._axes(moved), self._moved), self._spline(self._axes(slopes), self.source.slopes)
+        )
+
+    def with_splines(self, moved: TensorSpline, slopes: TensorSpline) -> EffectTable:
+        """The table with these splines."""
         axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
-        return EffectTable(self.source, *axes, *splines)
+        return EffectTable(self.source, *axes, moved, slopes)
 
     def _spline(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> TensorSpline:
         boxes = self.place.edges * len(self.change.levels)

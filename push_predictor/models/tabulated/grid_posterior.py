@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 
 import numpy as np
-from scipy.linalg import blas, lapack
+import scipy
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
@@ -78,13 +78,15 @@ class GridPosterior:
         """
         prior, smallest_noise = self.kernel.variance, float(self.noise_variances.min())
         dropped = max(_DROPPED * smallest_noise / prior, _ROUNDING)
-        factor, pivots, rank, _ = lapack.dpstrf(self.kernel.matrix(self.inputs), tol=dropped * prior, lower=1)
+        factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(
+            self.kernel.matrix(self.inputs), tol=dropped * prior, lower=1
+        )
         basis, order = np.tril(factor[:, :rank]), pivots - 1
         weighted = basis / np.sqrt(self.noise_variances[order])[:, None]
         information, vectors = np.linalg.eigh(weighted.T @ weighted)
         share = information / (1.0 + information)
         kept = share > dropped
-        root = blas.dtrsm(prior, basis[:rank], vectors[:, kept] * np.sqrt(share[kept]), lower=1, trans_a=1)
+        root = scipy.linalg.blas.dtrsm(prior, basis[:rank], vectors[:, kept] * np.sqrt(share[kept]), lower=1, trans_a=1)
         return order[:rank], root
 
 

@@ -54,6 +54,21 @@ class Axis:
         at_knots = chebyshev.chebvander(np.linspace(-1.0, 1.0, self.cells + 1), count - 1)
         return np.asarray(np.linalg.solve(at_nodes.T, at_knots.T).T)
 
+    def nodes_to_coefficients(self, count: int) -> Array:
+        """Matrix (cells + 3, count) from values at the nodes to coefficients of the spline."""
+        return _knots_to_coefficients(self.cells) @ self.nodes_to_knots(count)
+
+    def coarse_to_coefficients(self, cells: int) -> Array:
+        """Matrix (cells + 3, coarse cells + 1) from values at the knots of a coarse spline to coefficients of a fine
+        one.
+        """
+        place = np.linspace(0.0, cells, self.cells + 1)
+        cell = np.minimum(place.astype(np.int64), cells - 1)
+        at_knots = np.zeros((self.cells + 1, cells + 3))
+        for k, weight in enumerate(_weights(place - cell)):
+            at_knots[np.arange(self.cells + 1), cell + k] = weight
+        return _knots_to_coefficients(self.cells) @ at_knots @ _knots_to_coefficients(cells)
+
 
 class TensorSpline:
     """Interpolating cubic splines of K functions on boxes that share their D axes; twice differentiable in each.

@@ -26,7 +26,7 @@ from push_predictor.models.features import push_features
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
-from push_predictor.models.tabulated.prediction_table import PredictionTable, tabulate
+from push_predictor.models.tabulated.prediction_table import PredictionTable, TableNodes, from_nodes, tabulate
 from push_predictor.models.tabulated.push_chart import Chart, push_chart
 from push_predictor.types import Array, BoolArray
 
@@ -91,8 +91,19 @@ class TabulatedDomain(FeatureBox):
 
 def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refinement: float = 1.0) -> TabulatedDomain:
     """The domain of a model with this predictor; refinement: of the table. Raises TooFineError."""
-    inputs, chart = model.training.inputs, push_chart(model.rig.outline)
+    box, low, high = _bounds(model)
+    return TabulatedDomain(box.chart, box.low, box.high, tabulate(predictor, box.chart, low, high, refinement))
+
+
+def domain_from_nodes(model: PushModel, predictor: GaussianProcessPredictor, nodes: TableNodes) -> TabulatedDomain:
+    """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
+    box, low, high = _bounds(model)
+    return TabulatedDomain(box.chart, box.low, box.high, from_nodes(nodes, predictor, box.chart, low, high))
+
+
+def _bounds(model: PushModel) -> tuple[FeatureBox, Array, Array]:
+    """The domain, and the least and largest velocity, place and angle (3,) of the training rows."""
+    inputs, box = model.training.inputs, feature_box(model)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
-    low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
-    box = feature_box(model)
-    return TabulatedDomain(chart, box.low, box.high, tabulate(predictor, chart, low, high, refinement))
+    low[1], high[1] = box.chart.place_range(box.chart.place(inputs[:, 1])[0])
+    return box, low, high

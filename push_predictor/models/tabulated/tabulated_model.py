@@ -54,23 +54,31 @@ from push_predictor.models.tabulated.tabulated_domain import FeatureBox, Tabulat
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
+ONLY_LEARNT = "exact: only learnt models have a table"
 REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 
 @dataclass(frozen=True, eq=False)
 class TabulatedModel:
-    """A model with its table, and in words how it predicts. domain and error are None if there is no table.
+    """A model with its table. domain and error are None if there is no table.
 
-    effects: the table of its effects, None if they are computed.
+    base_how: in words, how its base predicts. effects: the table of its effects, None if they are computed;
+    effects_how: the same in words.
 
     A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
     """
 
     model: PushModel
-    how: str
+    base_how: str
     domain: TabulatedDomain | None = None
     error: TableAccuracy | None = None
     effects: EffectTable | None = None
+    effects_how: str = ""
+
+    @property
+    def how(self) -> str:
+        """In words, how it predicts."""
+        return f"{self.base_how}; effects: {self.effects_how}" if self.effects_how else self.base_how
 
     @property
     def tabulated(self) -> bool:
@@ -200,7 +208,7 @@ def tabulate(model: PushModel) -> TabulatedModel:
         table, how = tabulated_prior(learnt.predictor)
         return TabulatedModel(model if table is None else with_base(model, table), how)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
-        return TabulatedModel(model, "exact: only learnt models have a table")
+        return TabulatedModel(model, ONLY_LEARNT)
     how, exact = "", probed(learnt)
     for refinement in REFINEMENTS:
         try:
@@ -219,17 +227,16 @@ def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy)
     return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
 
 
-def as_served(model: PushModel) -> TabulatedModel:
-    """The model as the server predicts with it: with the tables of its base and of its effects."""
-    return with_effect_table(tabulate(model))
-
-
 def with_effect_table(tabulated: TabulatedModel) -> TabulatedModel:
     """The same with a table of its effects, if it has effects and the table is accurate; takes some seconds."""
     if not tabulated.model.predictor.effects:
         return tabulated
-    table, how = build_effect_table(tabulated.model)
-    return replace(tabulated, how=f"{tabulated.how}; effects: {how}", effects=table)
+    return with_effects(tabulated, *build_effect_table(tabulated.model))
+
+
+def with_effects(tabulated: TabulatedModel, table: EffectTable | None, how: str) -> TabulatedModel:
+    """The same with this table of its effects, None if they are computed; how: in words."""
+    return replace(tabulated, effects=table, effects_how=how)
 
 
 def _taken(push: Push, rows: BoolArray) -> Push:

@@ -26,11 +26,9 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -53,6 +51,10 @@ from push_predictor.online.trace_process import (
     start_trace,
 )
 from push_predictor_interfaces.action import TraceResidual
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
 
 POLL_PERIOD = 0.05  # s between two looks at the trace's process
 CLOSE_TIMEOUT = 5.0  # s in which the executor ends a trace and sends the result when the node ends

@@ -22,7 +22,7 @@ B adds, and P_BB^-1 = W_B^-1 + V_B C^-1 V_B'.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_solve
+import scipy
 
 from push_predictor.models.gaussian_process.ridge import cholesky_in_place
 from push_predictor.models.gaussian_process.sparse.kernel import InducedRidge
@@ -49,4 +49,4 @@ def _covariance_without(ridge: InducedRidge, rows: IntArray) -> Array:
     """C^-1 (m, m): covariance of the whitened inducing variables given all rows but these."""
     weighted = ridge.induced.features[rows] * np.sqrt(ridge.weights[rows])[:, None]
     factor = cholesky_in_place(np.ascontiguousarray(ridge.inner - weighted.T @ weighted))
-    return np.asarray(cho_solve((factor, True), np.eye(len(factor))))
+    return np.asarray(scipy.linalg.cho_solve((factor, True), np.eye(len(factor))))

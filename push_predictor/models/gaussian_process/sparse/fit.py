@@ -24,7 +24,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.descent import Descent
@@ -108,7 +107,7 @@ def _improved(problem: SparseProblem, bound: SparseBound, tolerance: float) -> S
 def _bound_at(problem: SparseProblem, sites: Sites) -> SparseBound | None:
     try:
         return SparseBound.at(problem, sites)
-    except (LinAlgError, FloatingPointError):
+    except (np.linalg.LinAlgError, FloatingPointError):
         return None
 
 
@@ -127,7 +126,7 @@ def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_induc
     try:
         bound = maximise_over_noise(search.problem(best.parameters), [best.sites], _FINAL_TOLERANCE * len(outputs))
         return SparseVHGP(inputs, outputs, best.parameters, bound.tied_precisions, *chosen)
-    except (LinAlgError, FloatingPointError) as error:
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
         raise TrainingError(f"no sparse VHGP of {len(outputs)} rows was found: {error}") from None
 
 
@@ -154,7 +153,7 @@ class _Search:
         try:
             problem = self.problem(parameters)
             bound = maximise_over_noise(problem, self._starts(problem), _SEARCH_TOLERANCE * n)
-        except (LinAlgError, FloatingPointError):
+        except (np.linalg.LinAlgError, FloatingPointError):
             return _REFUSED, np.zeros_like(point)
         penalty, slope = noise_penalty(point * _UNIT, n)
         cost = penalty - bound.value

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import blas, cho_solve
+import scipy
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
@@ -67,7 +67,7 @@ class InducedKernel:
         inner = np.eye(len(self.inducing), order="F")
         for rows in _blocks(len(weights)):
             weighted = self.features[rows] * np.sqrt(weights[rows])[:, None]
-            inner = blas.dsyrk(1.0, weighted.T, beta=1.0, c=inner, lower=1, overwrite_c=1)
+            inner = scipy.linalg.blas.dsyrk(1.0, weighted.T, beta=1.0, c=inner, lower=1, overwrite_c=1)
         inner = np.tril(inner) + np.tril(inner, -1).T
         return InducedRidge(self, weights, inner, cholesky_in_place(inner.copy()))
 
@@ -100,7 +100,7 @@ class InducedRidge:
 
     def mean(self, values: Array) -> Array:
         """Posterior mean (m,) of the whitened inducing variables, whose prior is N(0, I), given values (n,)."""
-        return np.asarray(cho_solve((self.factor, True), self.induced.features.T @ values))
+        return np.asarray(scipy.linalg.cho_solve((self.factor, True), self.induced.features.T @ values))
 
     def residual(self, values: Array) -> Array:
         """P D values, shape (n,): the residual of a smoother of these values."""
@@ -110,7 +110,7 @@ class InducedRidge:
     def explained(self) -> Array:
         """I - inner^-1 (m, m): of the whitened inducing variables' prior variance."""
         identity = np.eye(len(self.inner))
-        return np.asarray(identity - cho_solve((self.factor, True), identity))
+        return np.asarray(identity - scipy.linalg.cho_solve((self.factor, True), identity))
 
     def gradient(self, added: Array, removed: Array | None = None) -> Array:
         """Derivative of tr(H Q) - 1/2 sum weights k(x, x), at H fixed, by (log_lengthscales, log_sd), (D + 1,).
@@ -120,8 +120,8 @@ class InducedRidge:
         induced, kernel = self.induced, self.induced.kernel
         vectors = np.column_stack([added] if removed is None else [added, removed])
         signed = vectors * [1.0, -1.0][: vectors.shape[1]]
-        whitened = blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
-        of_features = blas.dtrsm(1.0, induced.factor, self.explained, side=1, lower=1)
+        whitened = scipy.linalg.blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
+        of_features = scipy.linalg.blas.dtrsm(1.0, induced.factor, self.explained, side=1, lower=1)
         gradient = np.zeros(induced.inputs.shape[1] + 1)
         for rows in _blocks(len(self.weights)):
             cross = kernel.cross(induced.inputs[rows], induced.inducing)
@@ -135,8 +135,8 @@ class InducedRidge:
         """The part of the gradient that goes through K_ZZ, with opposite sign."""
         induced, kernel = self.induced, self.induced.kernel
         known = self.inner - np.eye(len(self.inner)) - self.explained
-        weights = blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
-        weights = blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ whitened.T
+        weights = scipy.linalg.blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
+        weights = scipy.linalg.blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ whitened.T
         weights = 0.25 * (weights + weights.T)
         gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)
         gradient[-1] += 2.0 * _JITTER * kernel.variance * float(np.trace(weights))
@@ -152,7 +152,7 @@ def _inducing_factor(kernel: SquaredExponential, inducing: Array) -> Array:
 
 def _whitened(factor: Array, rows: Array) -> Array:
     """Rows (n, m) times L^-T, in their memory."""
-    return np.asarray(blas.dtrsm(1.0, factor, rows.T, lower=1, overwrite_b=1).T)
+    return np.asarray(scipy.linalg.blas.dtrsm(1.0, factor, rows.T, lower=1, overwrite_b=1).T)
 
 
 def _contracted(kernel: SquaredExponential, inputs: Array, inducing: Array, weighted: Array) -> Array:

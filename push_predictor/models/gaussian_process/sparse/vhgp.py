@@ -23,7 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import blas
+import scipy
 
 from push_predictor.models.gaussian_process.gp import check_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
@@ -57,7 +57,7 @@ class InducedPosterior:
         share, vectors = np.linalg.eigh(ridge.explained)
         kept = share > _NOTHING
         columns = np.column_stack([ridge.mean(values), vectors[:, kept] * np.sqrt(share[kept])])
-        columns = blas.dtrsm(1.0, induced.factor, columns, lower=1, trans_a=1)
+        columns = scipy.linalg.blas.dtrsm(1.0, induced.factor, columns, lower=1, trans_a=1)
         return cls(induced.kernel, induced.inducing, columns[:, 0].copy(), np.ascontiguousarray(columns[:, 1:]))
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:

@@ -1,0 +1,140 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files of tables: what a model's tables are computed from, as arrays and a JSON record in one zip archive.
+
+A table is named by the digest of its model and by the version of this format. It is checked when it is read: its
+checksums, and its predictions at some pushes against those of the model.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from push_predictor.errors import ModelFileError
+from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.arrays_record import read_arrays
+from push_predictor.models.tabulated.effect_table_build import effect_table_from
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
+from push_predictor.models.tabulated.prediction_table import TableNodes
+from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
+from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
+from push_predictor.models.tabulated.tabulated_model import (
+    ONLY_LEARNT,
+    TabulatedModel,
+    with_base,
+    with_domain,
+    with_effects,
+    without_mean,
+)
+from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, compared, with_spline
+from push_predictor.recordings.atomic import write_whole
+from push_predictor.types import Array
+
+FORMAT_VERSION = 1  # also to be raised when a table's values change their meaning
+RECORD = "record"
+CHECKED = 10  # random pushes of the domain, and as many training pushes
+
+
+def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
+    """Write the tables of a model with this digest, none if it has none. Raises OSError."""
+    arrays: dict[str, Array] = {}
+    record = {"format_version": FORMAT_VERSION, "model": digest, **_base_record(tabulated, arrays)}
+    if tabulated.effects is not None:
+        record["moved"] = _spline_record(tabulated.effects.moved, "moved", arrays)
+        record["slopes"] = _spline_record(tabulated.effects.slopes, "slopes", arrays)
+    if tabulated.effects_how:
+        record["effects_how"] = tabulated.effects_how
+    if "how" not in record and "effects_how" not in record:
+        return
+    text = np.frombuffer(json.dumps(record, allow_nan=False).encode(), dtype=np.uint8)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **{RECORD: text}, **arrays)
+    write_whole(path, buffer.getvalue())
+
+
+def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | None:
+    """The model with the tables of a file; None without a whole file of this model, or if they predict otherwise."""
+    try:
+        arrays = read_arrays(path)
+        record = json.loads(arrays.pop(RECORD).tobytes().decode())
+        if (record["format_version"], record["model"]) != (FORMAT_VERSION, digest):
+            return None
+        tabulated = _base(model, record, arrays)
+        if tabulated is None or not model.predictor.effects:
+            return tabulated
+        how = str(record["effects_how"])
+        if "moved" not in record:
+            return with_effects(tabulated, None, how)
+        splines = (_spline(record[name], arrays[name]) for name in ("moved", "slopes"))
+        effects = effect_table_from(tabulated.model, *splines)
+        return None if effects is None else with_effects(tabulated, effects, how)
+    except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+        return None
+
+
+def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[str, Any]:
+    base = tabulated.model.base
+    if isinstance(base.predictor, TabulatedPrior):
+        return {"how": tabulated.base_how, "prior": _spline_record(base.predictor.spline, "prior", arrays)}
+    if tabulated.domain is None or tabulated.error is None:
+        return {}
+    nodes, probes = tabulated.domain.table.nodes, probed(without_mean(base), CHECKED)
+    arrays |= {f"nodes_{k}": values for k, values in enumerate(nodes.values)}
+    return {
+        "how": tabulated.base_how,
+        "nodes": [nodes.cells, nodes.coarse, nodes.least],
+        "error": astuple(tabulated.error),
+        "probes": {name: getattr(probes, name).tolist() for name in Probes.__dataclass_fields__},
+    }
+
+
+def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Array]) -> TabulatedModel | None:
+    predictor = model.base.predictor
+    if "how" not in record:  # computing says at once why the base has no table
+        return (
+            None
+            if isinstance(predictor, PriorPredictor | GaussianProcessPredictor)
+            else TabulatedModel(model, ONLY_LEARNT)
+        )
+    if isinstance(predictor, PriorPredictor):
+        prior = with_spline(predictor, _spline(record["prior"], arrays["prior"]))
+        accurate = compared(predictor, prior, CHECKED)[1]
+        return TabulatedModel(with_base(model, prior), str(record["how"])) if accurate else None
+    learnt = without_mean(model.base)
+    assert isinstance(learnt.predictor, GaussianProcessPredictor)
+    cells, coarse, least = record["nodes"]
+    values = [arrays[f"nodes_{k}"] for k in range(9)]
+    domain = domain_from_nodes(learnt, learnt.predictor, TableNodes(cells, coarse, least, values))
+    probes = Probes(*(np.array(record["probes"][name]) for name in Probes.__dataclass_fields__))
+    if not probes.error_of(domain).accepted:
+        return None
+    return with_domain(model, domain, TableAccuracy(*record["error"]))
+
+
+def _spline_record(spline: TensorSpline, name: str, arrays: dict[str, Array]) -> list[Any]:
+    arrays[name] = spline.coefficients
+    return [astuple(axis) for axis in spline.axes]
+
+
+def _spline(axes: list[Any], coefficients: Array) -> TensorSpline:
+    return TensorSpline([Axis(*axis) for axis in axes], coefficients)

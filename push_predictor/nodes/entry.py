@@ -1,0 +1,66 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The start of a node process: signals and threads are settled before the imports of a node, which take half a second.
+
+The console scripts and `python -m push_predictor.nodes.NAME` begin here. Import nothing at the top that takes time.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from importlib import import_module
+
+from push_predictor.blas_threads import limit_process
+
+
+def predict_server() -> int:
+    """Run the node predict_server; returns the exit status."""
+    return _run("predict_server")
+
+
+def push_recorder() -> int:
+    """Run the node push_recorder; returns the exit status."""
+    return _run("push_recorder")
+
+
+def push_replay() -> int:
+    """Run the node push_replay; returns the exit status."""
+    return _run("push_replay")
+
+
+def push_validator() -> int:
+    """Run the node push_validator; returns the exit status."""
+    return _run("push_validator")
+
+
+def install_handlers() -> None:
+    """End the process at SIGINT or SIGTERM, with status 0, until nodes.runtime handles them.
+
+    Python's own handler would print a traceback of the imports.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _end)
+
+
+def _run(node: str) -> int:
+    install_handlers()
+    limit_process()
+    status: int = import_module(f"push_predictor.nodes.{node}").main()
+    return status
+
+
+def _end(number: int, frame: object) -> None:
+    os._exit(0)  # nothing to clean up: neither a node nor a child process exists yet

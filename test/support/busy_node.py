@@ -1,0 +1,72 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A small node that works for ever at one moment of its life; `python busy_node.py MOMENT --ros-args ...` runs it.
+
+It prints what it does. moment: constructor, start, blocked (a start in one long call) or callback.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+
+from rclpy.node import Node
+
+from push_predictor.nodes.entry import install_handlers
+from push_predictor.nodes.runtime import Stop, run
+
+
+class BusyNode(Node):
+    def __init__(self, moment: str) -> None:
+        super().__init__("busy")
+        self._moment, self._closing = moment, threading.Event()
+        threading.Thread(target=self._closing.wait).start()  # as push_replay has them
+        if moment == "constructor":
+            work()
+        self.create_timer(0.01, work if moment == "callback" else lambda: None)
+
+    def begin(self) -> None:
+        if self._moment == "start":
+            work()
+        if self._moment == "blocked":
+            print("working", flush=True)
+            time.sleep(1000.0)
+        print("started", flush=True)
+
+    def close(self) -> None:
+        print("closed", flush=True)
+
+    def destroy_node(self) -> None:
+        self._closing.set()
+        super().destroy_node()
+
+
+def work() -> None:
+    print("working", flush=True)
+    try:
+        while True:
+            time.sleep(0.001)
+    except Exception:
+        print("caught", flush=True)
+
+
+def make(stop: Stop) -> BusyNode:
+    return BusyNode(sys.argv[1])
+
+
+if __name__ == "__main__":
+    install_handlers()
+    sys.exit(run("busy", make, sys.argv[2:], start=BusyNode.begin))
