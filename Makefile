@@ -65,7 +65,7 @@ $(VENV)/.wheel: $(VENV)/.python $(INTERFACES)
 
 # Python compiles what is imported: a tenth of these packages. tf2_msgs is not on PyPI.
 $(VENV)/.dependencies: $(VENV)/.python setup.py push_predictor_paper/setup.py scripts/install_interfaces.sh scripts/install_tf2_msgs.sh
-	$(BIN)/pip install -qq --no-compile 'ros-jazzy-rclpy[fastrtps]' '.[report,live,import,test]' ./push_predictor_paper
+	$(BIN)/pip install -qq --no-compile 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces '.[report,live,import,test]' ./push_predictor_paper
 	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/install_tf2_msgs.sh
 	touch $@
 

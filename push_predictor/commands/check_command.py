@@ -59,6 +59,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Check the data and print the findings. Raises RecordingError that names what is refused."""
+    from push_predictor.evaluation.check_page.answer import pushed
     from push_predictor.evaluation.check_page.page import check_json, write_check_page
     from push_predictor.recordings.checks.checked import checked_data
     from push_predictor.recordings.rig import load_rig
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace) -> None:
     rig = load_rig(options.rig) if options.rig else None
     with progress("check"):
         checked = {str(path): checked_data(path, rig, topics_of(options)) for path in options.data}
-        save_topics_of(options, options.data)
+        save_topics_of(options, [path for path in options.data if not checked[str(path)].refused])
         if options.page is not None:
             write_check_page(options.page, checked)
     failing = ("refused", "warning") if options.strict else ("refused",)
@@ -84,7 +85,7 @@ def run(options: argparse.Namespace) -> None:
     }
     if not write_json(options, content):
         for path, of in checked.items():
-            print(f"{path}: {len(of.findings) or 'no'} finding{'' if len(of.findings) == 1 else 's'}")
+            print(f"{path}: {len(of.findings) or 'no'} finding{'' if len(of.findings) == 1 else 's'}. {pushed(of)}")
             for finding in of.findings:
                 print("\n".join(finding.lines))
         if options.page is not None:

@@ -31,6 +31,7 @@ from push_predictor.commands.common.options import (
     add_command,
     add_model,
     add_recording,
+    add_rig,
     add_topics,
     save_topics_of,
     topics_of,
@@ -48,6 +49,7 @@ from push_predictor.commands.doctor.findings import Finding
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
+    from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.topics import Topics
 
 PATIENCE = 90.0  # s for all checks of ROS
@@ -65,14 +67,18 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     add_model(parser, "?", note=" to predict with (default: the shipped one)")
     add_recording(parser, "default: a simulated one")
+    add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Run all checks and print the findings. Raises PushPredictorError that names what is missing."""
+    from push_predictor.recordings.rig import load_rig
+
     with progress("doctor"):
-        findings = list(_findings(options.model, options.recording, topics_of(options)))
+        rig = load_rig(options.rig) if options.rig else None
+        findings = list(_findings(options.model, options.recording, topics_of(options), rig))
         save_topics_of(options, [options.recording] if options.recording else [])
     missing = [finding.name for finding in findings if finding.state == "missing"]
     content = {"version": __version__, "sound": not missing, "checks": [finding.record() for finding in findings]}
@@ -84,12 +90,12 @@ def run(options: argparse.Namespace) -> None:
         raise PushPredictorError(f"missing or broken: {', '.join(missing)}")
 
 
-def _findings(model: Path | None, recording: Path | None, topics: Topics) -> Iterator[Finding]:
+def _findings(model: Path | None, recording: Path | None, topics: Topics, rig: Rig | None) -> Iterator[Finding]:
     yield from python_and_packages()
     yield from _ros_findings()
     yield executables()
     yield model_predicts(model)
-    yield recording_reads(recording, topics)
+    yield recording_reads(recording, topics, rig)
     yield space()
 
 

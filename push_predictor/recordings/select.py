@@ -40,7 +40,7 @@ from push_predictor.recordings.fields.sources import (
 )
 from push_predictor.recordings.fields.transforms import TransformError, TransformTree, read_tree
 from push_predictor.recordings.fields.world_frame import poses_in_world
-from push_predictor.recordings.topics import DEFAULT_TOPICS, Topics
+from push_predictor.recordings.topics import DEFAULT_TOPICS, NO_WRENCH, Topics
 
 TF, STATIC = "/tf", "_static"  # /tf_static belongs to /tf
 STREAMS = {"slider": POSE_TARGET, "pusher": POSE_TARGET, "wrench": WRENCH_TARGET}
@@ -79,8 +79,9 @@ def select(bag: Bag, topics: Topics) -> Selection:
     Raises RecordingError for a topic that is missing, empty, or of a type that does not fit.
     """
     every = topics.over(DEFAULT_TOPICS)
-    named = {name: Source(f"{name}_topic", f"--{name}-topic", getattr(every, name)) for name in STREAMS}
-    given = {name for name in STREAMS if getattr(topics, name)}
+    wanted = [name for name in STREAMS if (name, getattr(every, name)) != ("wrench", NO_WRENCH)]
+    named = {name: Source(f"{name}_topic", f"--{name}-topic", getattr(every, name)) for name in wanted}
+    given = {name for name in wanted if getattr(topics, name)}
     further = [Source("covariate_topics", "--covariate-topic", text) for text in topics.covariates]
     _check_present(bag, named, given, further)
     expected = {name: _expected(bag, source, STREAMS[name], name in given) for name, source in named.items()}

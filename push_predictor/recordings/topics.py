@@ -28,6 +28,7 @@ FRAMES = ("slider", "pusher", "world")
 STREAMS = ("slider", "pusher", "wrench")
 WORLD_AXES, TIP_AXES = "world", "tip"
 FREE_MOTION, NO_BIAS = "free_motion", "none"
+NO_WRENCH = "none"  # in place of a topic: contact from geometry alone
 BIASES = (FREE_MOTION, NO_BIAS)
 KEYS = (
     *(f"{name}_topic" for name in STREAMS),
@@ -44,10 +45,10 @@ class Topics:
     """Where the streams of a recording are (docs/reference/recordings.md); '' and () mean: not given.
 
     slider, pusher and wrench are topics; a leading slash makes no difference. `TOPIC.FIELD` names a field of another
-    type, `/tf:FRAME` a frame. covariates: further scalars, each a topic or TOPIC.FIELD. world: the frame in which poses
-    from tf are given, and into which tf turns other poses. wrench_frame: the axes of the wrench, `world`, `tip`, or a
-    frame in tf. wrench_bias: `free_motion` to estimate and subtract it, `none` not to. Raises RequestError for another
-    one.
+    type, `/tf:FRAME` a frame; the wrench `none` leaves a recorded one out. covariates: further scalars, each a topic or
+    TOPIC.FIELD. world: the frame in which poses from tf are given, and into which tf turns other poses. wrench_frame:
+    the axes of the wrench, `world`, `tip`, or a frame in tf. wrench_bias: `free_motion` to estimate and subtract it,
+    `none` not to. Raises RequestError for another one.
     """
 
     slider: str = ""

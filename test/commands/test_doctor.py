@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,8 @@ from push_predictor.commands.doctor.checks import (
 )
 from push_predictor.commands.doctor.findings import Finding
 from push_predictor.nodes import doctor_graph
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.write import write_recording
 
 OF_ROS = ["rclpy", "messages", "interfaces", "middleware", "shared memory", "security", "loop-back call"]
 
@@ -161,6 +164,11 @@ def test_unreadable_model_is_named(tmp_path: Path):
 
 def test_given_recording_is_checked(tmp_path: Path):
     assert "120 pushes" in recording_reads(REPOSITORY / "bags" / "square_abs_test").found
+    recording = read_recording(REPOSITORY / "bags" / "hexagon_delrin")
+    write_recording(tmp_path / "without_rig", replace(recording, rig=None))
+    found = recording_reads(tmp_path / "without_rig")
+    assert found.state == "missing" and "no push_rig record" in found.found and found.remedy == "--rig FILE.yaml"
+    assert "10 pushes" in recording_reads(tmp_path / "without_rig", rig=recording.rig).found
     (tmp_path / "bad.mcap").write_bytes(b"no recording")
     found = recording_reads(tmp_path / "bad.mcap")
     assert found.state == "missing" and "bad.mcap" in found.found

@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from mistakes import BAGS
+from mistakes import BAGS, force_of_another_time
 from repository import REPOSITORY
 
 from push_predictor.recordings.checks.check import check_table
@@ -187,6 +188,17 @@ def test_the_heading_of_a_circle_is_checked_by_its_windows() -> None:
     recording = read_recording(REPOSITORY / "bags" / "circle_pu")
     found = checked_recording(mirrored(recording, 1.0, -1.0)).findings
     assert [each.name for each in found if each.severity == "warning"] == ["dtheta_sign"]
+
+
+def test_a_wrench_that_hides_pushes_is_left_out_of_the_coverage() -> None:
+    """Contact is found from geometry alone then: the advice is about the wrench, not about pushes that are missing."""
+    checked = checked_recording(force_of_another_time(read_recording(REPOSITORY / "bags" / TRAIN)))
+    sound = checked_data(REPOSITORY / "bags" / TRAIN)
+    assert checked.coverage is not None and sound.coverage is not None
+    assert checked.coverage.pushes >= sound.coverage.pushes
+    (finding,) = checked.findings
+    hidden = re.search(r"contact is found in (\d+) of (\d+) pushes. `--wrench-topic none`", finding.advice)
+    assert hidden is not None and int(hidden[1]) < 0.7 * int(hidden[2])
 
 
 # --- units -----------------------------------------------------------------------------------------------------------

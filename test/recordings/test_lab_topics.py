@@ -307,6 +307,13 @@ def test_saved_topics_are_read_and_given_ones_win(tmp_path: Path) -> None:
     assert_same_windows(read_recording(path, topics=Topics(pusher=UR)))
 
 
+def test_a_recorded_wrench_can_be_left_out(tmp_path: Path) -> None:
+    path = vicon_and_ur().mcap(tmp_path / "lab", original().rig)
+    save_topics(path, NAMES)
+    assert read_recording(path).wrench is not None
+    assert read_recording(path, topics=Topics(wrench="none")).wrench is None
+
+
 @pytest.mark.parametrize("topics", [Topics(), NAMES, Topics("/tf:a", covariates=("/b.c[1]",), world="map")])
 def test_saved_topics_come_back(tmp_path: Path, topics: Topics) -> None:
     save_topics(tmp_path / "a.b.mcap", topics)

@@ -95,7 +95,8 @@ def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
         "TOPIC is a name, TOPIC.FIELD a field of another type, /tf:FRAME a frame.\nWhat is not given is read from "
         "NAME.recording.yaml next to the recording.",
     )
-    for name, default in (("slider", "slider/pose"), ("pusher", "pusher/pose"), ("wrench", "pusher/wrench")):
+    wrench = "pusher/wrench, if there is one; none leaves a recorded wrench out"
+    for name, default in (("slider", "slider/pose"), ("pusher", "pusher/pose"), ("wrench", wrench)):
         group.add_argument(f"--{name}-topic", default="", metavar="TOPIC", help=f"default: {default}")
     group.add_argument(
         "--covariate-topic",

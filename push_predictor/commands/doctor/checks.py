@@ -31,6 +31,7 @@ from push_predictor.commands.doctor.findings import Finding
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
+    from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.topics import Topics
 
 PYTHON = ((3, 10), (3, 13))
@@ -82,7 +83,7 @@ def model_predicts(given: Path | None) -> Finding:
     return Finding("model", "ok", f"{path} loads and predicts ({model.kind}, {len(model.training)} windows)")
 
 
-def recording_reads(given: Path | None, topics: Topics | None = None) -> Finding:
+def recording_reads(given: Path | None, topics: Topics | None = None, rig: Rig | None = None) -> Finding:
     """Check that a recording (default: a simulated one) can be read and contains pushes."""
     try:
         from push_predictor.recordings.describe import describe_recording
@@ -90,11 +91,13 @@ def recording_reads(given: Path | None, topics: Topics | None = None) -> Finding
 
         with tempfile.TemporaryDirectory(prefix="push_predictor_doctor_") as folder:
             path = given or _simulated(Path(folder))
-            found = describe_recording(path, topics or Topics())
+            found = describe_recording(path, topics or Topics(), rig)
     except Exception as error:  # as above
         return _broken("recording", _words(error), _OF_A_RECORDING)
     source = str(given) if given else "simulated recording"
-    if not found.get("windows"):
+    if "windows" not in found:
+        return _broken("recording", f"{source} has no push_rig record", "no push can be found", "--rig FILE.yaml")
+    if not found["windows"]:
         return _broken("recording", f"{source} contains no push", f"push_predictor info {source}")
     return Finding("recording", "ok", f"{source}: {found['pushes']} pushes, {found['windows']} windows")
 

@@ -33,8 +33,9 @@ def answer_of(checked: CheckedData) -> tuple[tuple[str, str, str], str]:
     """What was found, what to do, what was pushed; and a label: refused, check first, or sound."""
     worst = min(checked.findings, key=lambda finding: ORDER.index(finding.severity), default=None)
     label = "sound" if worst is None else LABELS[worst.severity]
-    found, to_do, pushed = _found(checked, worst), _to_do(checked, worst), _pushed(checked)
-    return (with_minus(found), with_minus(to_do), with_minus(pushed)), label
+    sentences = _found(checked, worst), _to_do(checked, worst), pushed(checked)
+    found, to_do, done = map(with_minus, sentences)
+    return (found, to_do, done), label
 
 
 def with_minus(text: str) -> str:
@@ -59,7 +60,8 @@ def _to_do(checked: CheckedData, worst: Finding | None) -> str:
     return worst.advice
 
 
-def _pushed(checked: CheckedData) -> str:
+def pushed(checked: CheckedData) -> str:
+    """What was pushed: sides, speeds and angles."""
     if checked.coverage is None:
         return "Pushes are searched for once this is corrected."
     return coverage_sentence(checked.coverage)

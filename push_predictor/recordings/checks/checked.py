@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from push_predictor.recordings.checks.check import check_recording, check_table
@@ -33,6 +34,8 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+
+HIDING = ("wrench_absent", "wrench_unrelated")  # a force that is missing in contacts: these are not found
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,11 @@ class CheckedData:
     table: PushTable | None = None
     contacts: ContactFit | None = None
 
+    @property
+    def refused(self) -> bool:
+        """Whether nothing can be learnt from these data."""
+        return any(finding.severity == "refused" for finding in self.findings)
+
 
 def checked_data(path: Path, rig: Rig | None = None, topics: Topics = Topics()) -> CheckedData:
     """Check the recording or push table of a path. Raises RecordingError, TableError or RigError."""
@@ -65,12 +73,24 @@ def checked_recording(recording: Recording) -> CheckedData:
     found = check_recording(recording, rig)
     if any(finding.severity == "refused" for finding in found):
         return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
-    table = windows_to_table(find_windows(recording, rig))
+    used = recording
+    if any(finding.name in HIDING for finding in found):
+        used, found = _without_wrench(recording, rig, found)
+    table = windows_to_table(find_windows(used, rig))
     if all(finding.severity == "note" for finding in found):
         found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
     coverage = coverage_of(table, rig.outline, rig.pusher_radius)
-    fit = contact_fit(recording, rig, table)
+    fit = contact_fit(used, rig, table)
     return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
+
+
+def _without_wrench(recording: Recording, rig: Rig, found: Sequence[Finding]) -> tuple[Recording, tuple[Finding, ...]]:
+    """The recording without a wrench that hides pushes, and the findings with their number."""
+    alone = replace(recording, wrench=None)
+    some, every = (len({window.push_id for window in find_windows(each, rig)}) for each in (recording, alone))
+    hides = f" With this wrench, contact is found in {some} of {every} pushes. `--wrench-topic none` does without it."
+    told = [replace(each, advice=each.advice + hides) if each.name in HIDING else each for each in found]
+    return alone, tuple(told)
 
 
 def _checked_table(name: str, table: PushTable, rig: Rig | None) -> CheckedData:

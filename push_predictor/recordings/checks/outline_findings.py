@@ -223,6 +223,6 @@ def _clock_findings(fit: OutlineFit) -> list[Finding]:
     if abs(lag) <= DOUBT * sd + LAG_ALLOWANCE:
         return []
     side = "late" if lag > 0.0 else "early"
-    sentence = f"The slider's stamps are {1e3 * abs(lag):.0f} ms {side} (sd {1e3 * sd:.0f} ms) against the pusher's."
+    sentence = f"The slider's stamps are {1e3 * abs(lag):.0f} ms {side} (sd {1e3 * sd:.2g} ms) against the pusher's."
     advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
     return [Finding("clocks_apart", "warning", sentence, advice, {"lag": Value(lag, "s", sd)})]
