@@ -92,9 +92,11 @@ class PushValidator(Node):
         self._closing.set()
         while not self._closed.wait(0.1) and self._stop.error is None:
             pass
-        self._writer.report.stop()
+        self._writer.close()
         self._alarm.stop()
-        if self._run is not None:
+        if self._run is None:
+            self.get_logger().warning(self._status.why_nothing())
+        else:
             self._run.checks.check.stop()
         self._sensors.close()
         if self._session.failure:

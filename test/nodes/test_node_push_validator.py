@@ -73,6 +73,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import runtime
 from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.validator import publishers
+from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.bag.reader import open_bag
@@ -607,6 +608,23 @@ def test_unusable_messages_are_counted_by_kind(domain: int, models):
         assert "/slider/pose: 4 of 5 samples were rejected" in status.message
         assert finish(node).success
         assert process.stop() == 0, process.text()
+
+
+def test_a_validator_without_samples_states_at_its_end_what_was_missing(domain: int, models):
+    with ros_context(domain) as node, validator(domain, model=models["gp"]) as process:
+        Status(node).wait_for_first()
+        assert process.stop(signal.SIGINT) == 0, process.text()
+        ending = process.text().rpartition("Nothing was validated. ")[2]
+    assert "No rig yet" in ending and "/slider/pose" in ending and "/pusher/pose" in ending
+
+
+def test_the_log_names_a_report_that_the_end_interrupts():
+    logged: list[str] = []
+    writer = ResultWriter("", SimpleNamespace(warning=logged.append))
+    stopped: list[bool] = []
+    writer.report = SimpleNamespace(busy=True, stop=lambda: stopped.append(True))
+    writer.close()
+    assert stopped == [True] and "The report was interrupted" in logged[0]
 
 
 def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyPatch):

@@ -52,7 +52,14 @@ class ResultWriter:
             self._log.warning(f"The result has no score: {windows} windows were found, and none was predicted.")
         if with_report and len(run.validation.predicted()):
             self.report.start(run.validation, self.folder, None if run.alarm is None else run.alarm.json)
+            self._log.info(f"Writing the report {self.folder / 'report.html'}, which takes some seconds.")
         return ""
+
+    def close(self) -> None:
+        """End a report that is being written."""
+        if self.report.busy:
+            self._log.warning("The report was interrupted. `push_predictor report validation` writes one.")
+        self.report.stop()
 
     def warn_of_interrupted(self, run: ValidationRun) -> None:
         """Log once where an earlier run was moved that had not come to its end."""

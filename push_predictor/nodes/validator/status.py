@@ -71,6 +71,10 @@ class StatusPublisher:
         status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure, rig)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
+    def why_nothing(self) -> str:
+        """Why there was no run: what is missing of model, rig and samples, in words."""
+        return _paragraph(["Nothing was validated", *self._problems(None), *self._sensors.problems()])
+
     def _log_topics(self) -> None:
         """Log a line for each sensor topic of which something has changed."""
         log = self._node.get_logger()
