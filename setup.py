@@ -72,6 +72,7 @@ setup(
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
             "catkin_pkg>=1",
+            "ezdxf>=1.1",
             "pytest>=8",
             "pytest-xdist>=3.5",
             "hypothesis>=6",

@@ -24,13 +24,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from benchmarks.blind.effects import GROUPS, World, draw
 from benchmarks.blind.recordings import conditions
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import Recording, taken
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.changes import Changes, Law, Moment
 from push_predictor.simulation.physics import GRAVITY
@@ -39,7 +39,6 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.simulation.standard_bags import SPEEDS, TRAVEL, standard_bags
 
-Stream = TypeVar("Stream", PoseStream, WrenchStream)
 GROUP, SIZE = "library", "large"
 PLAIN, TRACED, REST = 25, 150, 80  # pushes: before the effect, with it until the trace, after the trace
 
@@ -101,10 +100,6 @@ def until(recording: Recording, seconds: float) -> Recording:
     """The first seconds of a recording."""
     first = min(int(recording.slider.stamp[0]), int(recording.pusher.stamp[0]))
     last = first + round(seconds * 1e9)
-    wrench = None if recording.wrench is None else _cut(recording.wrench, last)
-    return replace(recording, slider=_cut(recording.slider, last), pusher=_cut(recording.pusher, last), wrench=wrench)
-
-
-def _cut(stream: Stream, last: int) -> Stream:
-    keep = stream.stamp <= last
-    return replace(stream, **{f.name: getattr(stream, f.name)[keep] for f in fields(stream)})
+    slider, pusher = (taken(stream, stream.stamp <= last) for stream in (recording.slider, recording.pusher))
+    wrench = None if recording.wrench is None else taken(recording.wrench, recording.wrench.stamp <= last)
+    return replace(recording, slider=slider, pusher=pusher, wrench=wrench)

@@ -22,9 +22,8 @@ reconstructs the poses between.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -41,11 +40,11 @@ from push_predictor.recordings.importers.report import Notes
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import joined as chained
 from push_predictor.recordings.windows.contact import NEAR
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.types import Array
 
-Stream = TypeVar("Stream", PoseStream, WrenchStream)
 MCUBE, MLAB = Path("mcube_preliminary"), Path("mlab", "sensor_log")
 POSE_RATE = 50.0  # Hz, of reconstructed poses; mlab's robot logged at 30 Hz
 FEWEST_RUNS = 3
@@ -96,9 +95,9 @@ def joined(recordings: Sequence[Recording], name: str) -> Recording:
     return replace(
         first,
         name=name,
-        slider=_chained([recording.slider for recording in recordings]),
-        pusher=_chained([recording.pusher for recording in recordings]),
-        wrench=_chained(wrenches) if len(wrenches) == len(recordings) else None,
+        slider=chained([recording.slider for recording in recordings]),
+        pusher=chained([recording.pusher for recording in recordings]),
+        wrench=chained(wrenches) if len(wrenches) == len(recordings) else None,
     )
 
 
@@ -214,9 +213,3 @@ def _wrench(push: LogPush) -> WrenchStream:
     """The force of the slider on the finger; the log has no torque."""
     fx, fy = -force_samples(push.force, push.robot).T
     return WrenchStream(nanoseconds(push.force[:, 0]), fx, fy, np.zeros(len(fx)))
-
-
-def _chained(streams: Sequence[Stream]) -> Stream:
-    first = streams[0]
-    columns = {f.name: np.concatenate([getattr(stream, f.name) for stream in streams]) for f in fields(first)}
-    return replace(first, **columns)

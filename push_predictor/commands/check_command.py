@@ -50,7 +50,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--rig-out",
         type=Path,
         metavar="FILE.yaml",
-        help="write the rig with outline and tip corrected; for one recording",
+        help="write the rig; outline and tip are corrected; for one recording",
     )
     add_rig(parser)
     add_topics(parser)

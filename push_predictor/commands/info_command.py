@@ -49,7 +49,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
     add_rig(parser)
     parser.add_argument(
-        "--rig-out", type=Path, metavar="FILE.yaml", help="write the recorded push_rig record as rig file"
+        "--rig-out", type=Path, metavar="FILE.yaml", help="write the rig; it is that of the push_rig record"
     )
     add_topics(parser)
     parser.set_defaults(run=run)

@@ -16,11 +16,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
 
 from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.rig import Rig
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,23 @@ class WrenchStream:
 
     def __len__(self) -> int:
         return len(self.stamp)
+
+
+Stream = TypeVar("Stream", PoseStream, WrenchStream)
+
+
+def taken(stream: Stream, rows: Array | IntArray | BoolArray | slice) -> Stream:
+    """The samples of a stream at an index, a mask or a slice."""
+    return replace(stream, **{name: of[rows] for name, of in vars(stream).items() if of is not None})
+
+
+def joined(streams: Sequence[Stream]) -> Stream:
+    """One stream of consecutive ones, at least one; what one of them lacks is lacking."""
+    columns = {name: [getattr(stream, name) for stream in streams] for name in vars(streams[0])}
+    whole: dict[str, Any] = {
+        name: None if any(part is None for part in parts) else np.concatenate(parts) for name, parts in columns.items()
+    }
+    return replace(streams[0], **whole)
 
 
 @dataclass(frozen=True, eq=False)

@@ -202,7 +202,7 @@ def test_only_missing_parts_are_a_failure(
     state: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ):
     finding = Finding("thing", state, "what was found", "why it matters", "mend it")
-    monkeypatch.setattr(doctor_command, "_findings", lambda model, recording, topics: iter([finding]))
+    monkeypatch.setattr(doctor_command, "_findings", lambda model, recording, topics, rig: iter([finding]))
     assert main(["doctor", "--json", str(tmp_path / "doctor.json")]) == (state == "missing")
     printed, content = capsys.readouterr(), json.loads((tmp_path / "doctor.json").read_text())
     assert printed.out.splitlines()[1].split() == [state, "thing", "what", "was", "found"]

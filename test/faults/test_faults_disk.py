@@ -234,7 +234,6 @@ def test_a_trace_reports_which_result_could_not_be_written(
     monkeypatch.setattr(
         "push_predictor.residuals.trace.trace_data", lambda *_, **__: made_up_trace(slippery(0.1), count=30)
     )
-    monkeypatch.setattr(trace_process.signal, "signal", lambda *_: None)
     monkeypatch.setattr(trace_process.os, "nice", lambda _: None)
     place = tmp_path / "result" / ".trace-x"
     place.mkdir(parents=True)

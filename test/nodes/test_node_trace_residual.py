@@ -193,7 +193,6 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     place: Path, drifting: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
-    monkeypatch.setattr(trace_process.signal, "signal", lambda number, handler: None)
     monkeypatch.setattr(trace_process, "_report", lambda path, trace: [])
     found = made_up_trace(slippery(0.1), count=30)
     monkeypatch.setattr("push_predictor.residuals.trace.trace", lambda *_, **__: found)

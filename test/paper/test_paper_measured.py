@@ -35,7 +35,7 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.cleaning import nanoseconds
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import require_rig
-from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.streams import PoseStream, Recording, taken
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
@@ -81,7 +81,7 @@ def single_pushes(shape: str, surface: str) -> list[Recording]:
 
 def between(stream: Any, begin: int, end: int) -> Any:
     rows = (stream.stamp >= begin) & (stream.stamp <= end)
-    kept = replace(stream, **{name: values[rows] for name, values in vars(stream).items()})
+    kept = taken(stream, rows)
     return replace(kept, stamp=nanoseconds(kept.stamp / 1e9))
 
 

@@ -63,8 +63,17 @@ KEY_OF = {  # of imports that are not named as their key
     "yaml": "python3-yaml",
     "zstandard": "mcap-ros2-support",
 }
-OPTIONAL = {"argcomplete", "distributed", "h5py", "joblib", "pyarrow", "rich", "rosbags"}  # extras, no dependency
-ONLY_BY_PIP = {"diptest", "distributed", "mujoco", "pyarrow"}  # no key of rosdep
+OPTIONAL = {
+    "argcomplete",
+    "distributed",
+    "ezdxf",
+    "h5py",
+    "joblib",
+    "pyarrow",
+    "rich",
+    "rosbags",
+}  # extras, no dependency
+ONLY_BY_PIP = {"diptest", "distributed", "ezdxf", "mujoco", "pyarrow"}  # no key of rosdep
 IMPORTS = re.compile(
     r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)"
     r"|(?:importorskip|import_module)\([\"'](\w+)[\w.]*[\"'][,)]",
@@ -239,7 +248,8 @@ def test_every_console_script_has_an_executable_for_ros2_run():
     scripts = dict(line.split(" = ") for line in given["entry_points"]["console_scripts"])
     (installed,) = (files for folder, files in given["data_files"] if folder == "lib/push_predictor")
     assert sorted(installed) == sorted(f"scripts/run/{name}" for name in scripts)
-    for name, place in scripts.items():
+    for name in scripts:
         path = REPOSITORY / "scripts" / "run" / name
         assert os.access(path, os.X_OK) and f'/../../bin/{name}"' in path.read_text()
-        assert f'exec python3 -m {place.partition(":")[0]} "$@"' in path.read_text()
+        module = "push_predictor.cli" if name == "push_predictor" else f"push_predictor.nodes.{name}"
+        assert f'exec python3 -m {module} "$@"' in path.read_text()

@@ -30,10 +30,10 @@ from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import ellipse, near_symmetry, rectangle, shape_outline, stretched, transformed
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import contacts_of
-from push_predictor.recordings.checks.outline_findings import fit_rig, outline_findings
+from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig
+from push_predictor.recordings.checks.outline.findings import fit_rig, outline_findings
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.rigs.estimate import estimate_rig

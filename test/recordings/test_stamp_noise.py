@@ -33,7 +33,7 @@ from push_predictor.models.train import train_model
 from push_predictor.online.sensors.topic_report import stamp_figures
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.read import read_recording, require_rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
@@ -116,7 +116,7 @@ def test_exact_stamps_of_irregular_samples_are_no_jitter(share: float) -> None:
 # --- regular stamps ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("sd", "left"), [(1.0, 0.15), (2.0, 0.3), (3.0, 0.9)])
+@pytest.mark.parametrize(("sd", "left"), [(1.3, 0.2), (2.0, 0.3), (3.0, 0.9)])
 def test_regular_stamps_are_near_the_true_times(sd: float, left: float) -> None:
     true = grid(2000)
     stamp = np.maximum.accumulate(noisy(true, sd) - np.arange(2000)) + np.arange(2000)
@@ -126,12 +126,12 @@ def test_regular_stamps_are_near_the_true_times(sd: float, left: float) -> None:
 
 def test_a_slow_drift_of_the_rate_is_kept() -> None:
     true = np.asarray(START + np.cumsum(10 * MS + np.linspace(0.0, 0.2 * MS, 3000)), dtype=np.int64)
-    assert np.std(regular(noisy(true, 1.0)) - true) < 0.2 * MS
+    assert np.std(regular(noisy(true, 1.3)) - true) < 0.26 * MS
 
 
 def test_missing_samples_are_counted() -> None:
     true = np.delete(grid(2000), [300, 301, 700, 1100, 1101, 1102, 1500])
-    stamp = noisy(true, 1.0)
+    stamp = noisy(true, 1.3)
     noise = stamp_noise(stamp[:DECIDING])
     assert noise is not None
     found = missing_before(stamp, noise)
@@ -141,11 +141,11 @@ def test_missing_samples_are_counted() -> None:
         1097: 3,
         1494: 1,
     }
-    assert np.std(regular(stamp) - true) < 0.2 * MS
+    assert np.std(regular(stamp) - true) < 0.26 * MS
 
 
 def test_no_sample_is_missing_in_a_regular_stream() -> None:
-    for sd in (1.0, 2.0):
+    for sd in (1.3, 2.0):
         noise = stamp_noise(noisy(grid(3000), sd))
         assert noise is not None and width(noise) < width(replace(noise, jitter=2 * noise.jitter))
         assert not missing_before(noisy(grid(3000), sd), noise).any()
@@ -154,15 +154,15 @@ def test_no_sample_is_missing_in_a_regular_stream() -> None:
 
 def test_a_gap_separates_the_lines_on_either_side() -> None:
     true = np.concatenate([grid(400), grid(400) + 4_055 * MS])  # not a multiple of the period
-    error = (regular(noisy(true, 1.0)) - true) / MS
-    assert np.abs(error).max() < 1.0, "at the ends a line is less certain"
+    error = (regular(noisy(true, 1.3)) - true) / MS
+    assert np.abs(error).max() < 1.3, "at the ends a line is less certain"
 
 
 def test_data_that_are_missing_separate_the_lines_too() -> None:
     true = np.concatenate([grid(200), grid(200) + 2_004 * MS])
-    whole = samples(noisy(true, 1.0))
+    whole = samples(noisy(true, 1.3))
     whole.interrupted[200] = True
-    assert np.abs(RegularStamps().take(whole, final=True).stamp - true).max() < 1.2 * MS
+    assert np.abs(RegularStamps().take(whole, final=True).stamp - true).max() < 1.56 * MS
 
 
 def test_jitter_that_begins_later_is_replaced_from_the_next_samples_on() -> None:
@@ -179,7 +179,7 @@ def test_a_short_stream_is_decided_by_what_there_is() -> None:
     assert np.array_equal(regular(few), few)
 
 
-@pytest.mark.parametrize("sd", [0.0, 0.2, 1.0, 2.0])
+@pytest.mark.parametrize("sd", [0.0, 0.2, 1.3, 2.0])
 @pytest.mark.parametrize("portion", [3, DECIDING])
 def test_the_stamps_do_not_depend_on_the_portions(sd: float, portion: int) -> None:
     rng = np.random.default_rng(3)
@@ -189,7 +189,7 @@ def test_the_stamps_do_not_depend_on_the_portions(sd: float, portion: int) -> No
 
 
 def test_the_stamps_do_not_depend_on_how_many_are_fitted_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    stamp = noisy(grid(700), 1.0)
+    stamp = noisy(grid(700), 1.3)
     whole = regular(stamp)
     monkeypatch.setattr(regular_stamps, "ROWS", 90)
     assert np.array_equal(regular(stamp), whole)
@@ -204,7 +204,7 @@ def test_regular_stamps_increase(sd: float, seed: int, missing: list[int]) -> No
 
 
 def test_few_samples_are_kept() -> None:
-    taker, stamp = RegularStamps(), noisy(grid(4000), 1.0)
+    taker, stamp = RegularStamps(), noisy(grid(4000), 1.3)
     for first in range(0, 4000, 50):
         taker.take(samples(stamp[first : first + 50]))
         segment = taker._segment
@@ -244,7 +244,7 @@ def test_undisturbed_recordings_keep_their_stamps(name: str) -> None:
 
 
 def rows(stream: Any, begin: int, end: int) -> Any:
-    return type(stream)(*(column[begin:end] for column in vars(stream).values()))
+    return taken(stream, slice(begin, end))
 
 
 @cache

@@ -30,7 +30,7 @@ from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import RECORD_NAME, Rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.topics import Topics
 
 Message = tuple[int, str, bytes]  # log time, topic, CDR
@@ -48,7 +48,7 @@ def short_recording(seconds: float = SECONDS, after: float = 0.0) -> Recording:
 
     def cut(stream: Any) -> Any:
         kept = (stream.stamp >= begin) & (stream.stamp < end)
-        return replace(stream, **{name: value[kept] for name, value in vars(stream).items()})
+        return taken(stream, kept)
 
     return replace(whole, slider=cut(whole.slider), pusher=cut(whole.pusher), wrench=cut(whole.wrench), scalars={})
 

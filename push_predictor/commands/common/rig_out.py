@@ -42,7 +42,7 @@ def check_rig_out(options: argparse.Namespace) -> None:
 
 def write_corrected_rig(options: argparse.Namespace, found: Mapping[str, tuple[Finding, ...]]) -> None:
     """Write the rig that the findings correct, if --rig-out asks for it. Raises RecordingError where none can be."""
-    from push_predictor.recordings.checks.corrected_rig import corrected_rig, prevents_correction
+    from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
     from push_predictor.recordings.load import known_rig
     from push_predictor.recordings.rig import load_rig, save_rig
 

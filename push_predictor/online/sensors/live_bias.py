@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.online.sensors.portions import joined, set_back
+from push_predictor.online.sensors.portions import set_back
 from push_predictor.online.sensors.posed_wrench import Wrenches
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.streams import PoseStream, joined
 from push_predictor.recordings.windows.free_motion import free_motion
 from push_predictor.types import Array
 

@@ -15,23 +15,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields
-from typing import TypeVar
-
-import numpy as np
-
-from push_predictor.recordings.streams import PoseStream, WrenchStream
+from push_predictor.recordings.streams import PoseStream
 
 CLOCK_SET = 1_000_000_000  # ns by which stamps go back where a replay loops
-
-Stream = TypeVar("Stream", PoseStream, WrenchStream)
-
-
-def joined(portions: Sequence[Stream]) -> Stream:
-    """One stream of consecutive portions, at least one."""
-    first = portions[0]
-    return type(first)(*(np.concatenate([getattr(s, field.name) for s in portions]) for field in fields(first)))
 
 
 def set_back(before: PoseStream, after: PoseStream) -> bool:

@@ -23,12 +23,12 @@ import numpy as np
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.shapes import mirror_image
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.corrected_rig import corrected_rig, prevents_correction
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import contacts_of
-from push_predictor.recordings.checks.outline_causes import Cause, cause_of, is_separate
-from push_predictor.recordings.checks.outline_findings import fit_rig, value_of
-from push_predictor.recordings.checks.outline_fit import (
+from push_predictor.recordings.checks.outline.causes import Cause, cause_of, is_separate
+from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
+from push_predictor.recordings.checks.outline.findings import fit_rig, value_of
+from push_predictor.recordings.checks.outline.fit import (
     LAG,
     SIZE,
     TIP,

@@ -28,7 +28,7 @@ from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.types import Array, IntArray
 
 SHARE = 0.05  # of the period: less jitter stays, as a window hardly feels it
-LEAST = 0.7e-3  # s; less jitter stays: it moves a tip at 50 mm/s by no more than a tracker's noise
+LEAST = 0.9e-3  # s; less jitter stays: it moves a tip at 50 mm/s by no more than a tracker's noise
 LARGEST_SHARE = 1.0  # of the period: with more, the order of samples is lost
 FEWEST = 10  # stamps from which jitter is estimated
 DECIDING = 101  # stamps that decide whether a stream has noise

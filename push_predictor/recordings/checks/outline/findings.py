@@ -20,7 +20,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.outline_causes import (
+from push_predictor.recordings.checks.outline.causes import (
     DOUBT,
     LAG_ALLOWANCE,
     LENGTH_ALLOWANCE,
@@ -31,7 +31,7 @@ from push_predictor.recordings.checks.outline_causes import (
     is_shifted,
     is_turned,
 )
-from push_predictor.recordings.checks.outline_fit import (
+from push_predictor.recordings.checks.outline.fit import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,

@@ -24,7 +24,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from push_predictor.recordings.checks.outline_fit import (
+from push_predictor.recordings.checks.outline.fit import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
