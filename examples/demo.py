@@ -14,7 +14,7 @@
 
 """The whole workflow: train, predict, replay, validate online, report, close the residual loop. `make demo` runs this.
 
-Three models are trained on one recording. One node then replays another recording, at twenty times its speed, on the
+Three models are trained on one recording. One node then replays another recording, at forty times its speed, on the
 topics of a motion tracker and a force sensor. A second node predicts. A third finds the pushes in the topics, requests
 predictions and compares them with the outcomes. Last, the rig changes during a replay: the alarm fires, the cause is
 traced, and the extended model is loaded (examples/loop.py).
@@ -53,11 +53,11 @@ ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
 OUT = ROOT / "out" / "demo"
 KINDS = ("vhgp", "gp", "analytical")  # the first is the main model
-RATE = 20.0
+RATE = 40.0
 AGREEMENT = 1e-9  # m, rad: room for rounding only
 SEED = 3  # of the hidden change; `python -m examples.demo 7` draws another one
 PATIENCE = 120.0  # s, for the replay and the last predictions
-SHARES = (24.0, 16.0, 12.0, *loop.SHARES)  # s of the stages on two idle cores
+SHARES = (28.0, 14.0, 16.0, *loop.SHARES)  # s of the stages on two idle cores
 CONTENTS = """You will see
   - three models learn from a recording of pushes, and predict another one online, in real nodes;
   - their errors with intervals, and a report with figures;
