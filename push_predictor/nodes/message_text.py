@@ -37,7 +37,7 @@ def definition_of(kind: str) -> str:
 
 def _lines(kind: str) -> tuple[str, list[str]]:
     """The fields of a type as text, and the message types of its fields."""
-    fields: dict[str, str] = message_class(kind).get_fields_and_field_types()  # type: ignore[attr-defined]
+    fields: dict[str, str] = message_class(kind).get_fields_and_field_types()  # type: ignore[attr-defined]  # all have it
     lines, nested = [], []
     for name, text in fields.items():
         sequence = _SEQUENCE.fullmatch(text)

@@ -29,7 +29,7 @@ from repository import REPOSITORY
 from synthetic import START, Push, rows, translating_push, wrench_rows
 
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.stamp_order import LOOKAHEAD
@@ -50,10 +50,6 @@ PLACES = st.floats(0.02, 0.98)
 SENSORS = ("slider", "pusher", "wrench")
 EXAMPLES = int(os.environ.get("FAULT_EXAMPLES", "8"))
 OFTEN = settings(max_examples=EXAMPLES, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
-
-
-def taken(stream: Stream, keep: np.ndarray) -> Stream:
-    return rows(stream, keep) if isinstance(stream, PoseStream) else wrench_rows(stream, keep)
 
 
 def of(recording: Recording, name: str) -> Stream:
@@ -448,9 +444,9 @@ def test_single_clock_set_back_does_not_block_the_other_streams() -> None:
     windows: list[PushWindow] = []
     for begin in range(0, len(pusher), 100):
         part = slice(begin, begin + 100)
-        finder.add_wrench(taken(recording.wrench, part))  # type: ignore[arg-type] # a slice does as well
-        finder.add_pusher(rows(alone, part))  # type: ignore[arg-type] # a slice does as well
-        finder.add_slider(rows(recording.slider, part))  # type: ignore[arg-type] # a slice does as well
+        finder.add_wrench(taken(recording.wrench, part))
+        finder.add_pusher(taken(alone, part))
+        finder.add_slider(taken(recording.slider, part))
         windows += finder.take_ready()
         assert sum(len(stamp) for _, stamp, _ in finder._postponed) < 10_000
     windows += finder.finish()

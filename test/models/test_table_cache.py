@@ -100,7 +100,7 @@ def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, loaded_be
     for _ in range(loaded_before):
         load_served(file)
     served = load_served(file)
-    regressions = served.model.predictor.base.regressions  # type: ignore[attr-defined]
+    regressions = served.model.predictor.base.regressions  # type: ignore[attr-defined]  # of a VHGP
     assert not any("_posterior" in vars(regression) for regression in regressions)
     outside = served.model.training.inputs[:1] + [10.0, 0.0, 0.0]
     found = served.predict_rows(outside, served.model.training.duration[:1])

@@ -84,7 +84,7 @@ def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() 
     service.calls.append("first")
     ended_run(session, finish)
     session.written()
-    report.busy = True  # type: ignore[misc]
+    report.busy = True  # type: ignore[misc]  # a fake, where it is no property
     finish.answer()
     assert not service.responses and not finish.requested, "nobody waits for the end of the next run"
     session.open(0.2)

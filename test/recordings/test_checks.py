@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from checked_bags import bag, found, rig_of
 from lab_bags import Lab, pose_values
 from mistakes import (
     BAGS,
@@ -46,17 +46,13 @@ from mistakes import (
     w_first,
     without_orientation,
 )
-from repository import REPOSITORY
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
-from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.samples import slider_stream
-from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.write import write_recording
@@ -64,21 +60,6 @@ from push_predictor.types import Array
 
 SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
-
-
-@cache
-def bag(name: str) -> Recording:
-    return read_recording(REPOSITORY / "bags" / name)
-
-
-def rig_of(name: str) -> Rig:
-    rig = bag(name).rig
-    assert rig is not None
-    return rig
-
-
-def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
-    return {finding.name: finding for finding in check_recording(recording, rig)}
 
 
 def bag_apothem(name: str) -> float:

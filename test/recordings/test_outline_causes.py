@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
+from checked_bags import bag, found, rig_of
 from mistakes import tracked
-from repository import REPOSITORY
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.geometry.frames import rotate, wrap_angle
@@ -34,7 +33,6 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import contacts_of
 from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.outline.findings import fit_rig, outline_findings
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.rigs.estimate import estimate_rig
 from push_predictor.recordings.streams import Recording
@@ -42,21 +40,6 @@ from push_predictor.recordings.streams import Recording
 BAGS = ("circle_pu", "ellipse_plywood", "hexagon_delrin", "square_abs_repeats", "square_abs_test")
 OVAL, ROUND, HEXAGON, SQUARE, ONE_SIDE = "ellipse_plywood", "circle_pu", "hexagon_delrin", "square_abs_test", BAGS[3]
 NOWHERE = (0.0, 0.0)
-
-
-@cache
-def bag(name: str) -> Recording:
-    return read_recording(REPOSITORY / "bags" / name)
-
-
-def rig_of(name: str) -> Rig:
-    rig = bag(name).rig
-    assert rig is not None
-    return rig
-
-
-def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
-    return {finding.name: finding for finding in check_recording(recording, rig)}
 
 
 def other_world(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:

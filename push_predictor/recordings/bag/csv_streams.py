@@ -97,7 +97,7 @@ def _files(folder: Path) -> list[Path]:
 
 def _parquet_is_read() -> bool:
     try:
-        import pyarrow.parquet  # noqa: F401
+        import pyarrow.parquet  # noqa: F401 (whether it can be imported is the question)
     except ImportError:
         return False
     return True

@@ -33,7 +33,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
-from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 
 HIDING = ("wrench_absent", "wrench_unrelated")  # a force that is missing in contacts: these are not found
 
@@ -73,10 +73,12 @@ def checked_recording(recording: Recording) -> CheckedData:
     found = check_recording(recording, rig)
     if any(finding.severity == "refused" for finding in found):
         return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
-    used = recording
+    used, windows = recording, find_windows(recording, rig)
     if any(finding.name in HIDING for finding in found):
-        used, found = _without_wrench(recording, rig, found)
-    table = windows_to_table(find_windows(used, rig))
+        some, used = windows, replace(recording, wrench=None)
+        windows = find_windows(used, rig)
+        found = _with_hidden(found, _pushes(some), _pushes(windows))
+    table = windows_to_table(windows)
     if all(finding.severity == "note" for finding in found):
         found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
     coverage = coverage_of(table, rig.outline, rig.pusher_radius)
@@ -84,13 +86,14 @@ def checked_recording(recording: Recording) -> CheckedData:
     return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
 
 
-def _without_wrench(recording: Recording, rig: Rig, found: Sequence[Finding]) -> tuple[Recording, tuple[Finding, ...]]:
-    """The recording without a wrench that hides pushes, and the findings with their number."""
-    alone = replace(recording, wrench=None)
-    some, every = (len({window.push_id for window in find_windows(each, rig)}) for each in (recording, alone))
+def _with_hidden(found: Sequence[Finding], some: int, every: int) -> tuple[Finding, ...]:
+    """The findings, with the numbers of pushes that are found with a wrench that hides the others, and without it."""
     hides = f" With this wrench, contact is found in {some} of {every} pushes. `--wrench-topic none` does without it."
-    told = [replace(each, advice=each.advice + hides) if each.name in HIDING else each for each in found]
-    return alone, tuple(told)
+    return tuple(replace(each, advice=each.advice + hides) if each.name in HIDING else each for each in found)
+
+
+def _pushes(windows: Sequence[PushWindow]) -> int:
+    return len({window.push_id for window in windows})
 
 
 def _checked_table(name: str, table: PushTable, rig: Rig | None) -> CheckedData:

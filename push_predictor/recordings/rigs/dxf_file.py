@@ -59,7 +59,7 @@ def _package() -> ModuleType:
         import ezdxf
     except ImportError:
         raise RigError(MISSING) from None
-    return ezdxf  # type: ignore[no-any-return]
+    return ezdxf  # type: ignore[no-any-return]  # Any where the optional package is missing
 
 
 def _add(entity: Any, drawing: Drawing, lines: list[Array]) -> None:

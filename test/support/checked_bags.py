@@ -1,0 +1,42 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recordings in bags/, and what `check` finds in a recording."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from repository import REPOSITORY
+
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+
+
+@cache
+def bag(name: str) -> Recording:
+    return read_recording(REPOSITORY / "bags" / name)
+
+
+def rig_of(name: str) -> Rig:
+    rig = bag(name).rig
+    assert rig is not None
+    return rig
+
+
+def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
+    return {finding.name: finding for finding in check_recording(recording, rig)}
