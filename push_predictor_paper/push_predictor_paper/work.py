@@ -20,10 +20,14 @@ The cache belongs to one state of the sources: after a change of a module that m
 from __future__ import annotations
 
 import hashlib
+import signal
+import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, Protocol, TypeVar
 
 import joblib
@@ -82,11 +86,34 @@ class Work:
         parallel = joblib.Parallel(n_jobs=self._cores, return_as="generator_unordered", batch_size=1)
         results: dict[int, Result] = {}
         pieces = (joblib.delayed(_numbered)(i, kept, arguments) for i, arguments in enumerate(calls))
-        for i, result in parallel(pieces):
-            results[i] = result
-            if self._watch is not None:
-                self._watch.advance()
+        with _interruption() as interrupted:
+            for i, result in parallel(pieces):
+                results[i] = result
+                if self._watch is not None:
+                    self._watch.advance()
+                if interrupted:
+                    raise KeyboardInterrupt
         return [results[i] for i in range(len(calls))]
+
+
+@contextmanager
+def _interruption() -> Iterator[list[int]]:
+    """The signals of an interruption so far: joblib swallows the KeyboardInterrupt that comes while it stores."""
+    signals: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield signals
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        signals.append(number)
+        handler(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield signals
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 @cache

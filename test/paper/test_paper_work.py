@@ -140,6 +140,22 @@ def test_results_before_an_interruption_are_kept(pieces, tmp_path: Path, cores: 
     assert len(lines(log)) <= count + cores  # at most what was being written when it ended is made again
 
 
+def test_an_interruption_that_storing_swallows_ends_the_work_all_the_same(pieces, tmp_path: Path, monkeypatch) -> None:
+    def interrupted_while_storing(*_: object) -> None:
+        with contextlib.suppress(BaseException):  # as joblib does
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("joblib._store_backends.StoreBackendMixin.store_metadata", interrupted_while_storing)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, calls_of(tmp_path / "log", 3))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert lines(tmp_path / "log") == [0]
+
+
 def started(folder: Path, log: Path, cores: int, count: int) -> subprocess.Popen[bytes]:
     """Another process at the same work, leader of its own group."""
     program = textwrap.dedent(
