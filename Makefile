@@ -14,6 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Matrices of a thousand rows gain nothing from a second thread, and two processes lose much by it.
 export OPENBLAS_NUM_THREADS ?= 1
 export PYTHONUNBUFFERED := 1
+PACKAGES := $(VENV)/.dependencies
 unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo test lint style types suite docs bags clean
@@ -27,15 +28,18 @@ test: style
 
 lint: style types
 
-style: $(VENV)/.installed
+# What only the tests need is installed beside the compilation of the messages.
+test lint style types suite: PACKAGES := $(VENV)/.tools
+
+style: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(VENV)/.installed
+types: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/mypy
 
 # Four workers on two cores: tests of nodes wait for each other's messages half of their time.
-suite: $(VENV)/.installed
+suite: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 docs: $(VENV)/.docs
@@ -65,12 +69,16 @@ $(VENV)/.wheel: $(VENV)/.python $(INTERFACES)
 
 # Python compiles what is imported: a tenth of these packages. tf2_msgs is not on PyPI.
 $(VENV)/.dependencies: $(VENV)/.python setup.py push_predictor_paper/setup.py scripts/install_interfaces.sh scripts/install_tf2_msgs.sh
-	$(BIN)/pip install -qq --no-compile 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces '.[report,live,import,test]' ./push_predictor_paper
+	$(BIN)/pip install -qq --no-compile 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces '.[report,live]' ./push_predictor_paper
 	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/install_tf2_msgs.sh
 	touch $@
 
+$(VENV)/.tools: $(VENV)/.dependencies
+	$(BIN)/pip install -qq --no-compile '.[import,test]'
+	touch $@
+
 $(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) setup.py push_predictor_paper/setup.py
-	$(MAKE) -j 2 $(VENV)/.wheel $(VENV)/.dependencies
+	$(MAKE) -j 2 $(VENV)/.wheel $(PACKAGES)
 	$(BIN)/pip install -qq --force-reinstall --no-deps $(VENV)/wheels/*.whl
 	touch $@
 
