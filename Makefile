@@ -1,5 +1,6 @@
 # make demo   learn, serve, replay, validate, report, trace a change: the main job, end to end
-# make test   lint, types, tests
+# make test   lint, types, tests but for the long ones
+# make test-all  those too: whole studies, many repetitions, hours of a rig
 # make docs   the documentation site in out/site; a broken link fails
 # All build .venv themselves and write into ignored folders only.
 
@@ -15,21 +16,25 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export OPENBLAS_NUM_THREADS ?= 1
 export PYTHONUNBUFFERED := 1
 PACKAGES := $(VENV)/.dependencies
+MARKERS := -m "not long"
 unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint style types suite docs bags clean
+.PHONY: demo test test-all lint style types suite docs bags clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m examples.demo
 
 # Types beside the suite: mypy, 40 s of one core on a new machine, needs no other result.
 test: style
-	$(MAKE) --no-print-directory -j 2 types suite
+	$(MAKE) --no-print-directory -j 2 types suite MARKERS='$(MARKERS)'
+
+test-all: MARKERS :=
+test-all: test
 
 lint: style types
 
 # What only the tests need is installed beside the compilation of the messages.
-test lint style types suite: PACKAGES := $(VENV)/.tools
+test test-all lint style types suite: PACKAGES := $(VENV)/.tools
 
 style: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/ruff check .
@@ -40,7 +45,7 @@ types: $(VENV)/.installed $(VENV)/.tools
 
 # Four workers on two cores: tests of nodes wait for each other's messages half of their time.
 suite: $(VENV)/.installed $(VENV)/.tools
-	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(MARKERS)
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] = ()) -> int:
     seed = int(arguments[0]) if arguments else SEED
     print(CONTENTS, flush=True)
     stages = Stages(SHARES)
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), os.nice, (10,)) as beside:  # after all nodes
         stages.begin(f"Train {len(KINDS)} models on {TRAINING.relative_to(ROOT)}.")
         hidden = beside.submit(make_hidden, OUT, seed)  # simulated in the meantime; no other part reads it yet
         paths = _trained(KINDS)
@@ -90,8 +90,12 @@ def main(arguments: Sequence[str] = ()) -> int:
         largest = max(_largest_difference(model, k, *results[k]) for k, model in enumerate(models))
         agree = largest <= AGREEMENT
         print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
-        pages = _report(models, results, f"predictions differ by at most {largest:.1e} m or rad")
-        pages += loop.close_the_loop(paths[0], models[0].name, OUT, hidden.result(), stages)
+        _print_summary([comparison for _, comparison in results])
+        change = hidden.result()
+        difference = f"predictions differ by at most {largest:.1e} m or rad"
+        report = beside.submit(_report, models, results, difference)  # drawn in the meantime
+        closed = loop.close_the_loop(paths[0], models[0].name, OUT, change, stages)
+        pages = [*report.result(), *closed]
     print(f"\nDone in {stages.elapsed:.0f} s. Open:")
     for page, shows in pages:
         print(f"  {page}   {shows}")
@@ -155,15 +159,13 @@ def _largest_difference(model: PushModel, number: int, windows: Sequence[PushWin
 def _report(
     models: Sequence[PushModel], results: Sequence[tuple[list[PushWindow], Comparison]], agreement: str
 ) -> list[Page]:
-    """Print the scores and write the report; its pages."""
+    """Write the report; its pages."""
     comparisons = [comparison for _, comparison in results]
-    _print_summary(comparisons)
     windows = results[0][0]
     readme_picture(OUT / "overview.png", models[0], windows_to_table(windows))
     facts = {"online and offline": agreement, "replay rate": f"{RATE:g}"}
     alarm = json.loads((OUT / "online" / "validation.json").read_text())["alarm"]
     page = report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts, alarm)
-    print(f"   Report with pictures: {page}\n", flush=True)
     fitted = [Page(OUT / f"{kind}.ladder.html", f"how the mechanics under {kind} were fitted") for kind in KINDS]
     return [
         Page(page, "the scores of the three models, with figures"),
@@ -189,6 +191,7 @@ def _print_summary(comparisons: Sequence[Comparison]) -> None:
             f"{score['nlpd']['total']:8.2f} {_span(spans['nlpd'], 2):18s}"
             f"{shares['dx']:17.2f}{shares['dy']:7.2f}{shares['dtheta']:8.2f}"
         )
+    print(flush=True)
 
 
 def _span(interval: dict[str, float], digits: int) -> str:

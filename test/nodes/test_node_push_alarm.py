@@ -52,14 +52,14 @@ from push_predictor_interfaces.msg import PushAlarm
 
 pytestmark = pytest.mark.slow
 
-PUSHES = 30
-CHANGE_AT = 8
+PUSHES = 16
+CHANGE_AT = 5
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def more_friction(moment: Moment) -> Array:
-    """The contact friction, tripled from push CHANGE_AT on."""
-    return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.5, 0.0)
+def tilted(moment: Moment) -> Array:
+    """The force on the slider of a table that is tilted by 3 degrees from push CHANGE_AT on."""
+    return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.4, 0.0)[:, None] * [0.0, 1.0, 0.0]
 
 
 def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES) -> Path:
@@ -70,13 +70,13 @@ def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A model, a recording like those it was trained on, and one in which the friction changes."""
+    """A model, a recording like those it was trained on, and one whose table is tilted meanwhile."""
     folder = tmp_path_factory.mktemp("alarm")
     training = [record(folder / "training", seed=1, pushes=50)]
     options = TrainingOptions(n_train=100)
     model = train_model(load_data(training), load_rig_for(training), "gp", name="gp", options=options)
     save_model(model, folder / "gp.pushmodel")
-    changed = record(folder / "changed", seed=2, changes=Changes(contact_friction=more_friction))
+    changed = record(folder / "changed", seed=2, changes=Changes(pull=tilted))
     return {"model": folder / "gp.pushmodel", "clean": record(folder / "clean", seed=3), "changed": changed}
 
 
