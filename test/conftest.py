@@ -81,13 +81,18 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data; order the files."""
+    """Mark tests: `ros` if the module imports ROS, `measured` if they read measured data, `slow` if they are long.
+
+    Order the files.
+    """
     needs_ros = {path: bool(NEEDS_ROS.search(path.read_text())) for path in {item.path for item in items}}
     for item in items:
         if needs_ros[item.path]:
             item.add_marker(pytest.mark.ros)
         if "measured_data" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.measured)
+        if item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.slow)
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     place = _places(needs_ros, slow)
     items.sort(key=lambda item: place[item.path])

@@ -31,6 +31,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 
 
+@pytest.mark.long
 def test_example_reaches_the_region(capsys, tmp_path):
     recording, path = [plan_around_obstacles.TRAINING], tmp_path / "gp.pushmodel"
     few = TrainingOptions(n_train=200)

@@ -383,7 +383,7 @@ def test_mechanism_is_removed_only_inside_the_context() -> None:
         pass
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     """No effect, an effect of the library and a change of the wrench, each on 60 pushes."""
     data, hidden, results = (tmp_path / name for name in ("data", "truth", "results"))

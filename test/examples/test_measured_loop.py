@@ -128,7 +128,7 @@ def test_share_of_no_pushes_is_refused(tmp_path: Path) -> None:
     assert refused.value.code == 2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_steel_block_runs_through_the_nodes_and_is_too_short_for_a_trace(
     measured_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -100,7 +100,7 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
 # --- many hours ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours(tmp_path: Path):
     """The long form: 24 recorded hours. A few seconds are too short for memory."""
     data = [HEXAGON]

@@ -186,7 +186,10 @@ def validated_online(recording: Path, names: list[str], domain: int, out: Path) 
 
 
 # Of each block a run that its models were not trained on, or that turns as no other; a ROS 1 bag; a single window.
-@pytest.mark.parametrize("run", ["Al_block_metal_4", "St_block_metal_3", BAG, HEXAGON])
+LONG = [pytest.param(run, marks=pytest.mark.long) for run in ("St_block_metal_3", BAG)]
+
+
+@pytest.mark.parametrize("run", ["Al_block_metal_4", HEXAGON, *LONG])
 def test_online_validation_of_a_measured_push_equals_offline(
     measured_data: Path,
     imported: dict[str, Path],

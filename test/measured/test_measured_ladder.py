@@ -20,6 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.measured.ladder import load, mlab, textbook
 from push_predictor.evaluation.estimate import total_nmse
@@ -32,6 +33,8 @@ from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.extension.held_out_gain import compared
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.trace import trace
+
+pytestmark = pytest.mark.long
 
 EVEN = 0.0451  # m: mean distance from the centre of an even triangle
 # Mean distance (m) of the support points from the centre, by recording; 2 and 6 lay flat.

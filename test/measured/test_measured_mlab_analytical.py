@@ -120,6 +120,7 @@ def test_load_shares_equal_even_pressure_where_the_load_is_even(pushes, surface)
     )
 
 
+@pytest.mark.long
 def test_the_fitted_lengths_order_the_supports_as_their_load_shares_do(fitted):
     by_support = {}
     for surface, support in ON_POINTS:
@@ -130,6 +131,7 @@ def test_the_fitted_lengths_order_the_supports_as_their_load_shares_do(fitted):
         assert length == pytest.approx(loaded(support).length, rel=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("surface", "support"), [*ON_POINTS, ("plywood", "patch")])
 def test_a_fit_improves_on_even_pressure(pushes, fitted, surface, support):
     table, found = pushes(surface, support), fitted(surface, support)

@@ -246,7 +246,7 @@ def test_section_compares_all_three_kinds_with_the_paper(compared):
     json.dumps(compared.data, allow_nan=False)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_informed_models_stand_next_to_the_paper_s_three(tmp_path):
     corpus = made_up_corpus(speeds=(0.02,))
     study = replace(made_up_study(tmp_path, replace(PLAN, sizes=(20,))), simulated=corpus)

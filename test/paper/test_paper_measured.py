@@ -139,7 +139,7 @@ def corpus(copy: Path, scratch: Path) -> Corpus:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_copy_of_the_mit_set_is_one_corpus_with_a_set_of_every_shape_on_every_surface(corpus: Corpus) -> None:
     assert corpus.origin == "measured"
     assert set(corpus.sets) == set(PAIRS)

@@ -243,7 +243,7 @@ def test_skips_draws_without_any_such_push() -> None:
     assert np.isnan(estimated(np.full(4, np.nan)).low)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_section_of_a_small_study(tmp_path: Path) -> None:
     """Four findings, tables of every bracket and speed, a picture, numbers that JSON can hold."""
     study = replace(paper_studies.made_up_study(tmp_path), plan=FEW)

@@ -97,7 +97,7 @@ def test_study_has_the_sets_and_repetitions_of_the_plan(tmp_path: Path) -> None:
     assert commanded == {"plywood": [12] * 15, "abs": [11] * 15}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_each_claim_has_verdict_and_numbers(made: Path) -> None:
     content = json.loads((made / "paper.json").read_text())
     assert set(content["sections"]) == CLAIMS
@@ -108,7 +108,7 @@ def test_each_claim_has_verdict_and_numbers(made: Path) -> None:
             assert re.search(r"\d", finding["sentence"]), finding
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_page_is_self_contained_and_warns_that_it_is_quick(made: Path) -> None:
     page = (made / "paper.html").read_text()
     for key in CLAIMS:
@@ -122,7 +122,7 @@ def test_page_is_self_contained_and_warns_that_it_is_quick(made: Path) -> None:
     assert "Made with <code>--quick</code>" in page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_questions_beyond_the_paper_have_their_own_table(made: Path) -> None:
     page = (made / "paper.html").read_text()
     paper, ours = re.findall(r'<table class="verdicts">.*?</table>', page, re.DOTALL)
@@ -134,7 +134,7 @@ def test_questions_beyond_the_paper_have_their_own_table(made: Path) -> None:
     assert ours.count("<tr><td>") == sum(finding["origin"] == "beyond the paper" for finding in findings) > 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_each_claim_has_its_number_in_the_summary(made: Path) -> None:
     page, content = (made / "paper.html").read_text(), json.loads((made / "paper.json").read_text())
     for section in content["sections"].values():
@@ -144,7 +144,7 @@ def test_each_claim_has_its_number_in_the_summary(made: Path) -> None:
             assert f"<td>{escape(finding['number'])}</td>" in page, finding
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_verdicts_with_too_little_data_are_grey_and_say_why(made: Path) -> None:
     page, content = (made / "paper.html").read_text(), json.loads((made / "paper.json").read_text())
     lacking = {key for key, section in content["sections"].items() if section["too_little_data"]}
@@ -158,14 +158,14 @@ def test_verdicts_with_too_little_data_are_grey_and_say_why(made: Path) -> None:
     assert sum(counted) == grey
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_headings_state_the_place_in_the_paper(made: Path) -> None:
     page = (made / "paper.html").read_text()
     assert '<h2 id="modality">Single pushes: histograms and modes (paper: figure 10)</h2>' in page
     assert "nugget in the noise process (beyond the paper)</h2>" in page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_files_of_tables_equal_the_tables_of_the_page(made: Path) -> None:
     page, content = (made / "paper.html").read_text(), json.loads((made / "paper.json").read_text())
     tables = [(f"{key}_{n}", t) for key, s in content["sections"].items() for n, t in enumerate(s["tables"], 1)]
@@ -182,13 +182,13 @@ def test_files_of_tables_equal_the_tables_of_the_page(made: Path) -> None:
         assert latex.count(r" \\") == len(rows) + 1 and r"\begin{tabular}{l" in latex
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_page_contains_no_nan(made: Path) -> None:
     page = (made / "paper.html").read_text()
     assert "nan" not in re.sub(r"base64,[^\"]+", "", page).lower().split()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
     content = json.loads((made / "paper.json").read_text())
     for section in content["sections"].values():
@@ -196,7 +196,7 @@ def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
             assert not ("simulated:" in table["caption"] and "measured:" in table["caption"])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_second_report_reads_the_cache_and_is_the_same(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -247,7 +247,7 @@ def test_scores_of_folds_are_pooled() -> None:
 # ---- the section
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_section_has_table_and_picture_and_a_note_for_a_set_too_small(tmp_path: Path) -> None:
     study = Study(
         replace(QUICK, seeds=1), Work(tmp_path / "work", cores=1), tmp_path, corpus(), (corpus(10, "measured"),), {}

@@ -34,7 +34,7 @@ def code() -> str:
     return "\n".join(re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_code_runs_from_a_bag_to_a_choice(tmp_path: Path):
     (tmp_path / "bags").symlink_to(BAGS)
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
