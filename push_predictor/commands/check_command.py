@@ -76,10 +76,10 @@ def run(options: argparse.Namespace) -> None:
         save_topics_of(options, [path for path in options.data if not checked[str(path)].refused])
         if options.page is not None:
             write_check_page(options.page, checked)
-    failing = ("refused", "warning") if options.strict else ("refused",)
-    wrong = [f"{path}: {each.name}" for path, of in checked.items() for each in of.findings if each.severity in failing]
+    mistakes = [(path, each) for path, of in checked.items() for each in of.findings if each.severity != "note"]
+    wrong = [f"{path}: {each.name}" for path, each in mistakes if options.strict or each.severity == "refused"]
     content = {
-        "sound": not wrong,
+        "sound": not mistakes,
         "data": {path: [each.record() for each in of.findings] for path, of in checked.items()},
         "about": {path: check_json(of) for path, of in checked.items()},
     }

@@ -52,7 +52,9 @@ def test_few_pushes_are_a_note_with_what_to_record_next(capsys: pytest.CaptureFi
 
 def test_the_json_contains_the_coverage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BAG, "--json", "-"]) == 0
-    coverage = json.loads(capsys.readouterr().out)["about"][BAG]["coverage"]
+    content = json.loads(capsys.readouterr().out)
+    assert content["sound"], "notes are no mistakes"
+    coverage = content["about"][BAG]["coverage"]
     assert (coverage["pushes"], coverage["windows"]) == (10, sum(coverage["windows_by_side"]))
 
 
@@ -60,6 +62,8 @@ def test_a_warning_fails_only_with_strict(tmp_path: Path, capsys: pytest.Capture
     rig = wrong_rig(tmp_path, 1.04)
     assert main(["check", BAG, "--rig", rig]) == 0
     assert "warning  outline_size" in capsys.readouterr().out
+    assert main(["check", BAG, "--rig", rig, "--json", "-"]) == 0
+    assert not json.loads(capsys.readouterr().out)["sound"]
     assert main(["check", BAG, "--rig", rig, "--strict"]) == 1
     assert capsys.readouterr().err.splitlines()[-1] == f"push_predictor check: {BAG}: outline_size"  # after progress
 
