@@ -90,7 +90,8 @@ class TabulatedModel:
 
         Of an extended model the base is tabulated. Its effects are computed and added, unless they have a table.
         """
-        return replace(self._predicted(inputs, duration, covariates), tails=self.model.predictor.tails)
+        found, tails = self._predicted(inputs, duration, covariates), self.model.predictor.tails
+        return found if found.tails is tails else replace(found, tails=tails)
 
     def _predicted(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
         if self.effects is None:
@@ -121,13 +122,20 @@ class TabulatedModel:
 
     def _computed(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
         if self.domain is None:
-            return self._exact.predict_rows(inputs, duration, covariates)
+            return self._exactly(Push(inputs, duration, covariates or {}))
         push, predictor = Push(inputs, duration, covariates or {}), self._exact.predictor
         prediction = self._of_base(self._learnt(self.domain, inputs, duration), push)
         if not predictor.effects:
             return prediction
         moments = predictor.with_effects(_moments(prediction), push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
+
+    def _exactly(self, push: Push) -> Prediction:
+        """Predictions of the model itself. Where its base is mechanics, the domain of one push is found in numbers."""
+        if len(push.inputs) > 1 or not isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
+            return self._exact.predict_rows(push.inputs, push.duration, push.covariates)
+        inside = self._in_domain(push.inputs) & self.model.covariates_seen(push)
+        return Prediction(*self._exact.predictor.moments(push), inside)
 
     def predict_one(self, push: PushRequest) -> Prediction:
         """The same for one push (n = 1)."""
