@@ -37,6 +37,7 @@ class ModelRegistry:
 
     def __init__(self) -> None:
         self._lock = Lock()  # `complete` runs in another thread than `load`
+        self._completing = Lock()  # and not in two at once, which would compute the same
         self._models: dict[str, TabulatedModel] = {}
         self._files: dict[str, Path] = {}
         self._chosen = ""
@@ -97,11 +98,11 @@ class ModelRegistry:
 
         Models predict as before until theirs is done. cancelled: asked before each model.
         """
-        for name, known in self._models.items():
-            if cancelled():
-                return
-            self._replace(name, known, completed(known))
-            del known
+        with self._completing:
+            for name, known in self._models.items():
+                if cancelled():
+                    return
+                self._replace(name, known, completed(known))
         return_memory()
 
     def _replace(self, name: str, known: TabulatedModel, found: TabulatedModel) -> None:

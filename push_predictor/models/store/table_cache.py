@@ -25,7 +25,8 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from push_predictor.blas_threads import one_blas_thread
@@ -56,8 +57,10 @@ def load_served(path: Path) -> TabulatedModel:
     served = load_at_once(path)
     if served.base_how != NO_TABLE_YET:
         return served
-    tabulated = _computed(served.model)
+    with _naming(path):
+        tabulated = _computed(served.model)
     tabulated.free_matrices()
+    return_memory()
     return tabulated
 
 
@@ -69,17 +72,24 @@ def load_at_once(path: Path) -> TabulatedModel:
     `completed` adds the tables. Raises ModelFileError.
     """
     model = load_model(path, check=False)
-    try:
+    with _naming(path):
         # The model of a kept table was checked before the table was computed.
         served = _read(model, path) or _without_tables(load_model(path))
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         served.predict_rows(first.inputs, first.duration, first.covariates)
+    return served
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Name the file of a model that cannot predict. Raises ModelFileError."""
+    try:
+        yield
     except ModelFileError:
         raise
     except Exception as error:
         raise ModelFileError(f"{path}: the model cannot predict ({type(error).__name__}: {error})") from None
-    return served
 
 
 @one_blas_thread()
