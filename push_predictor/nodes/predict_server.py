@@ -46,6 +46,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import run
+from push_predictor.nodes.server.background import in_background
 from push_predictor.nodes.server.model_services import handle_list_models, handle_load_model
 from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
 from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
@@ -56,7 +57,6 @@ from push_predictor.nodes.server.status import NO_MODEL, server_status
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
 from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor.nodes.server.trace_action import TraceAction
-from push_predictor.online.background import in_background
 from push_predictor.online.periodic_thread import PeriodicThread
 from push_predictor.online.request_statistics import RequestStatistics
 from push_predictor.resources import SHIPPED

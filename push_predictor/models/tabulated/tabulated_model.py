@@ -66,7 +66,8 @@ class TabulatedModel:
     base_how: in words, how its base predicts. effects: the table of its effects, None if they are computed;
     effects_how: the same in words. single: predicts single pushes of the base outside its table; None: the model does.
 
-    A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
+    A push gets the same prediction alone as among others: to rounding in the domain, outside it to the tolerances of
+    table_accuracy. Made by `tabulate`.
     """
 
     model: PushModel

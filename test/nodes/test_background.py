@@ -22,7 +22,7 @@ import threading
 
 import pytest
 
-from push_predictor.online.background import NICENESS, in_background
+from push_predictor.nodes.server.background import NICENESS, in_background
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="priorities of threads")
