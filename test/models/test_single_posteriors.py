@@ -29,9 +29,9 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated import single_posteriors as module
 from push_predictor.models.tabulated.prediction_table import on_grid
-from push_predictor.models.tabulated.single_posteriors import SinglePosteriors, accuracy_of, single_posteriors
+from push_predictor.models.tabulated.single_push import posteriors as module
+from push_predictor.models.tabulated.single_push.posteriors import SinglePosteriors, accuracy_of, single_posteriors
 from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,

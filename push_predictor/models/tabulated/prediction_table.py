@@ -38,11 +38,11 @@ from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation, correlations, covariances
-from push_predictor.models.tabulated.covariance_numbers import moments_in_numbers
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.tabulated.push_chart import Chart, Whole
+from push_predictor.models.tabulated.single_push.moments import moments_in_numbers
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.table_sides import Side, table_sides
 from push_predictor.types import Array

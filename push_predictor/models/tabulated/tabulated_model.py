@@ -49,7 +49,7 @@ from push_predictor.models.tabulated.effect_table import EffectTable
 from push_predictor.models.tabulated.effect_table_build import build_effect_table
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.single_effects import SingleEffects
-from push_predictor.models.tabulated.single_posteriors import SinglePosteriors, single_posteriors
+from push_predictor.models.tabulated.single_push.posteriors import SinglePosteriors, single_posteriors
 from push_predictor.models.tabulated.table_accuracy import TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import FeatureBox, TabulatedDomain, feature_box, tabulated_domain
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior

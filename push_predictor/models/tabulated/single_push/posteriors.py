@@ -34,9 +34,9 @@ from push_predictor.models.gaussian_process.kernels import SquaredExponential
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.covariance_numbers import moments_in_numbers
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression
 from push_predictor.models.tabulated.prediction_table import on_grid
+from push_predictor.models.tabulated.single_push.moments import moments_in_numbers
 from push_predictor.models.tabulated.table_accuracy import TableAccuracy, compared_with, outside_pushes
 from push_predictor.types import Array, IntArray
 
