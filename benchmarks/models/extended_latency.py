@@ -80,7 +80,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the pushes (default 1)")
     options = parser.parse_args()
     learnt, table = base_model(), made_up_table(options.pushes, options.seed)
-    bases = {"GP": learnt, "GP about mechanics": informed_model(learnt), "analytical": analytical_model(learnt)}
+    table_of_base = learnt.training
+    bases = {"GP": learnt, "GP about mechanics": informed_model(learnt), "analytical": analytical_model(table_of_base)}
     print(
         "| base | effects | base, us | before, us | now, us | ratio "
         "| means apart: median | 99 % | covariances: 99 % | build, s |"

@@ -62,9 +62,9 @@ def base_model() -> PushModel:
     return train_model(made_up_table(300, 0), square_rig(), "gp", name="base")
 
 
-def analytical_model(base: PushModel) -> PushModel:
-    """The analytical model of the same windows."""
-    return train_model(base.training, square_rig(), "analytical", name="analytical")
+def analytical_model(table: PushTable) -> PushModel:
+    """The analytical model of these windows."""
+    return train_model(table, square_rig(), "analytical", name="analytical")
 
 
 def informed_model(base: PushModel) -> PushModel:

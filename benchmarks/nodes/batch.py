@@ -16,7 +16,8 @@
 
     python -m benchmarks.nodes.batch [--model FILE] [--sizes N ...] [--seconds S] [--domain D]
 
-Without --model a VHGP of 1000 simulated windows is trained first (some 10 s). A call is timed from arrays of pushes to
+Without --model a VHGP of 1000 simulated windows is trained first (some 10 s), and an analytical model is measured after
+it. A call is timed from arrays of pushes to
 arrays of predictions: request, transport, prediction, response, unpacking. Single calls run between the batches. Last:
 how long single calls take while the server computes the longest batch.
 """
@@ -32,10 +33,12 @@ from time import perf_counter, sleep
 import numpy as np
 from rclpy.client import Client
 
+from benchmarks.models.made_up_models import analytical_model, made_up_table
 from benchmarks.nodes.server_under_test import Caller, caller, graph, load, model_files, predict_server, single_requests
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.nodes.server.prediction_services import MAX_EXACT
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 SIZES = (1, 10, 100, 1000, 5000, 20_000, 100_000, 1_000_000)
@@ -47,14 +50,23 @@ def main() -> int:
     """Measure and print."""
     arguments = _arguments()
     with ExitStack() as stack:
-        path = arguments.model or stack.enter_context(model_files(1000))[0]
+        paths = [arguments.model] if arguments.model else stack.enter_context(model_files(1000))
+        if not arguments.model:
+            paths.append(paths[0].with_name("analytical.pushmodel"))
+            save_model(analytical_model(made_up_table(300, 0)), paths[-1])
         stack.enter_context(graph(arguments.domain))
-        server = stack.enter_context(predict_server(path))
-        client, model = stack.enter_context(caller()), load_model(path)
-        print(f"{model.name}: {model.kind}, {len(model.training)} windows; load average {load()} before")
-        _measure(client, model, arguments.sizes, arguments.seconds, server)
-        print(f"load average {load()} after")
+        for path in paths:
+            _measure_model(path, arguments.sizes, arguments.seconds)
     return 0
+
+
+def _measure_model(path: Path, sizes: list[int], seconds: float) -> None:
+    model = load_model(path)
+    with predict_server(path) as server, caller() as client:
+        print(f"{model.name}: {model.kind}, {len(model.training)} windows; load average {load()} before")
+        learnt = model.predictor.learnt
+        _measure(client, model, [size for size in sizes if learnt or size <= MAX_EXACT], seconds, server)
+        print(f"load average {load()} after")
 
 
 def _measure(client: Caller, model: PushModel, sizes: list[int], seconds: float, server: int) -> None:

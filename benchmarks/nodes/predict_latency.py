@@ -16,9 +16,10 @@
 
     python -m benchmarks.nodes.predict_latency [--pin] [--model FILE] [--calls N] [--domain D]
 
-Without --model two VHGPs are trained first, of 100 and of 1000 simulated windows (some 20 s), each for its own server:
-both should take equally long. All servers run at the same time and are called in turns, in short blocks, so that they
-share the machine's load, which is printed.
+Without --model these kinds of push are compared, each with its own server: of VHGPs of 100 and of 1000 simulated
+windows (trained first, some 20 s), of the latter outside its domain, of an analytical model, and of that model with an
+effect, inside and outside the table of the effect. All servers run at the same time and are called in turns, in short
+blocks, so that they share the machine's load, which is printed.
 
 Two empty services: `empty` is a plain rclpy node with a std_srvs/Trigger. `empty, direct` is answered by a separate
 thread, as predict_push is: the rest of predict_push is the prediction and its larger messages.
@@ -34,8 +35,10 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from tempfile import TemporaryDirectory
+from time import process_time, sleep
 from typing import Any
 
 import numpy as np
@@ -43,20 +46,26 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from benchmarks.models.extended_latency import EFFECTS
+from benchmarks.models.made_up_models import analytical_model, extended_model, made_up_table
 from benchmarks.nodes.server_under_test import (
     DEPTH,
     Caller,
     caller,
     graph,
     load,
-    model_files,
+    outside_requests,
     predict_server,
     process,
     single_requests,
+    trained_vhgp,
 )
+from msg_adapters.predictions import push_from_request
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.request import PushRequest
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.table_cache import as_served, keep_tables
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, with_single_posteriors
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor_interfaces.srv import PredictPush
@@ -64,6 +73,10 @@ from push_predictor_interfaces.srv import PredictPush
 BLOCK = 20
 WARM_UP = 200
 SIZES = (100, 1000)  # windows
+REQUESTS = 200  # different ones of each kind
+EFFECT, LATE = "friction, linear", 2000.0  # of EFFECTS; s, twice the time of the training pushes
+SETTLING = 15.0  # s, until the servers have computed all that makes predictions fast
+ROUNDS = 5
 
 
 class EmptyServer(Node):
@@ -102,8 +115,7 @@ def main() -> int:
     if arguments.serve:
         return run(f"{arguments.serve}_server", SERVERS[arguments.serve], ["--ros-args"])
     with ExitStack() as stack:
-        paths = [arguments.model] if arguments.model else stack.enter_context(model_files(*SIZES))
-        models = [load_model(path) for path in paths]
+        cases = [_of_file(arguments.model)] if arguments.model else _cases(Path(stack.enter_context(_folder())))
         cores = os.sched_getaffinity(0)
         if arguments.pin:
             os.sched_setaffinity(0, {max(cores)})
@@ -111,73 +123,118 @@ def main() -> int:
         numbers = [
             stack.enter_context(process("-m", "benchmarks.nodes.predict_latency", "--serve", name)) for name in SERVERS
         ]
-        numbers += [stack.enter_context(predict_server(path, f"/server_{k}")) for k, path in enumerate(paths)]
+        numbers += [stack.enter_context(predict_server(case.path, f"/server_{k}")) for k, case in enumerate(cases)]
         if arguments.pin:  # at once: threads inherit it
             for number in numbers:
                 os.sched_setaffinity(number, {min(cores)})
-        _measure(stack.enter_context(caller()), models, arguments.calls)
+        _measure(stack.enter_context(caller()), cases, arguments.calls)
     return 0
 
 
-def _measure(client: Caller, models: list[PushModel], calls: int) -> None:
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A kind of push: its name, the model and its file, and requests."""
+
+    name: str
+    path: Path
+    model: PushModel
+    requests: list[PredictPush.Request]
+
+
+def _of_file(path: Path) -> Case:
+    model = load_model(path)
+    return Case(f"{model.name}, n = {len(model.training)}", path, model, single_requests(model, REQUESTS))
+
+
+def _folder() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="push_model_")
+
+
+def _cases(folder: Path) -> list[Case]:
+    small, large = (trained_vhgp(size) for size in SIZES)
+    analytical = analytical_model(made_up_table(300, 0))
+    extended = extended_model(analytical, *EFFECTS[EFFECT])
+    kinds = {
+        f"VHGP, n = {SIZES[0]}": (small, single_requests(small, REQUESTS)),
+        f"VHGP, n = {SIZES[1]}": (large, single_requests(large, REQUESTS)),
+        f"VHGP, n = {SIZES[1]}, outside": (large, outside_requests(large, REQUESTS)),
+        "analytical": (analytical, single_requests(analytical, REQUESTS)),
+        "with an effect": (extended, single_requests(extended, REQUESTS)),
+        "effect, outside its table": (extended, _beyond(single_requests(extended, REQUESTS))),
+    }
+    found = []
+    for k, (name, (model, requests)) in enumerate(kinds.items()):
+        path = folder / f"{k}.pushmodel"
+        save_model(model, path)
+        keep_tables(model, path)
+        found.append(Case(name, path, model, requests))
+    return found
+
+
+def _beyond(requests: list[PredictPush.Request]) -> list[PredictPush.Request]:
+    """The same pushes, later than all training pushes."""
+    for request in requests:
+        request.covariate_values = [LATE]
+    return requests
+
+
+def _measure(client: Caller, cases: list[Case], calls: int) -> None:
     count = calls + WARM_UP
     asked: dict[str, tuple[Client, list[Any]]] = {
-        "empty": (client.client(Trigger, "empty"), [Trigger.Request()] * count),
-        "empty, direct": (client.client(Trigger, "direct"), [Trigger.Request()] * count),
+        "empty": (client.client(Trigger, "empty"), [Trigger.Request()]),
+        "empty, direct": (client.client(Trigger, "direct"), [Trigger.Request()]),
     }
-    for k, model in enumerate(models):
-        asked[f"predict_push, n = {len(model.training)}"] = (
-            client.client(PredictPush, f"/server_{k}/predict_push"),
-            single_requests(model, count),
-        )
+    for k, case in enumerate(cases):
+        asked[case.name] = (client.client(PredictPush, f"/server_{k}/predict_push"), case.requests)
+    sleep(SETTLING)
     taken: dict[str, list[float]] = {name: [] for name in asked}
     before = load()
     for start in range(0, count, BLOCK):
         for name, (service, requests) in asked.items():
-            taken[name] += [client.timed(service, request)[0] for request in requests[start : start + BLOCK]]
+            block = (requests[k % len(requests)] for k in range(start, start + BLOCK))
+            taken[name] += [client.timed(service, request)[0] for request in block]
     print(f"{calls} calls of each service, one at a time; load average {before} before, {load()} after")
     _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in taken.items()})
-    for k, model in enumerate(models):
+    for k, case in enumerate(cases):
         status = client.reported(f"/server_{k}/")
         times = f"p50 {status['callback_p50_us']} us, p99 {status['callback_p99_us']} us"
-        print(f"callback in the server, n = {len(model.training)}: {times}")
-    for model in models:
-        _in_this_process(model)
+        print(f"callback in the server, {case.name:28s} {times}")
+    for case in cases:
+        _in_this_process(case)
 
 
 def _report(times: dict[str, np.ndarray]) -> None:
     rows = {name: np.percentile(values, [50, 95, 99]) for name, values in times.items()}
-    print(f"{'round trip, us':24s}{'p50':>9s}{'p95':>9s}{'p99':>9s}   p50 / empty's   / direct's")
+    print(f"{'round trip, us':28s}{'p50':>9s}{'p95':>9s}{'p99':>9s}   p50 / empty's   / direct's")
     for name, row in rows.items():
         ratios = [row[0] / rows[floor][0] for floor in ("empty", "empty, direct")]
-        print(f"{name:24s}" + "".join(f"{value:9.0f}" for value in row) + f"{ratios[0]:16.2f}{ratios[1]:13.2f}")
+        print(f"{name:28s}" + "".join(f"{value:9.0f}" for value in row) + f"{ratios[0]:16.2f}{ratios[1]:13.2f}")
 
 
-def _in_this_process(model: PushModel) -> None:
-    start = perf_counter()
-    tabulated = tabulate(model)
-    made = perf_counter() - start
-    print(f"{model.name}, {len(model.training)} windows, {tabulated.how}; made in {made:.2f} s")
-    print(
-        f"  in this process, p50: tabulated model {_model_time(tabulated):.0f} us, exact model "
-        f"{_model_time(model):.0f} us"
-    )
+def _in_this_process(case: Case) -> None:
+    """Print processor time of predictions without ROS: the time of a busy machine goes to others."""
+    tabulated = with_single_posteriors(as_served(case.model))
+    pushes = [push_from_request(request) for request in case.requests]
+    table, exact = (_processor_time(model, pushes) for model in (tabulated, case.model))
+    print(f"{case.name}: {tabulated.how}")
+    print(f"  in this process, processor time: as served {table:.0f} us, exact model {exact:.0f} us")
 
 
-def _model_time(model: PushModel | TabulatedModel) -> float:
-    training = model.model.training if isinstance(model, TabulatedModel) else model.training
-    inputs, duration = training.inputs[:200], training.duration[:200]
-    times = []
-    for k in range(len(inputs)):
-        start = perf_counter()
-        model.predict_rows(inputs[k : k + 1], duration[k : k + 1])
-        times.append(perf_counter() - start)
-    return float(np.median(times)) * 1e6
+def _processor_time(model: PushModel | TabulatedModel, pushes: list[PushRequest]) -> float:
+    """Of one prediction, us: the least of some rounds over all pushes."""
+    arrays = [push.arrays for push in pushes]
+    rounds = []
+    for _ in range(ROUNDS):
+        start = process_time()
+        for inputs, duration, covariates in arrays:
+            model.predict_rows(inputs, duration, covariates)
+        rounds.append((process_time() - start) / len(arrays))
+    return min(rounds) * 1e6
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", type=Path, help="a model file (default: train two)")
+    parser.add_argument("--model", type=Path, help="a model file (default: the kinds above)")
     parser.add_argument("--calls", type=int, default=2000, help="calls of each service (default 2000)")
     parser.add_argument("--domain", type=int, default=77, help="ROS domain to run in (default 77)")
     parser.add_argument("--pin", action="store_true", help="client on one core, servers on another")

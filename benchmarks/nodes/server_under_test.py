@@ -39,6 +39,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
+from push_predictor.models.tabulated.table_accuracy import outside_pushes
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -153,18 +154,26 @@ def model_files(*sizes: int) -> Iterator[list[Path]]:
     with tempfile.TemporaryDirectory(prefix="push_model_") as folder:
         paths = [Path(folder) / f"vhgp_{size}.pushmodel" for size in sizes]
         for size, path in zip(sizes, paths, strict=True):
-            save_model(_trained(size), path)
+            save_model(trained_vhgp(size), path)
         yield paths
 
 
 def single_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
     """Requests for `count` of the model's training pushes, drawn at random."""
-    table = model.training
-    rows = np.random.default_rng(0).integers(0, len(table), count)
+    rows = model.training.take(np.random.default_rng(0).integers(0, len(model.training), count))
+    needed = [rows.covariates[name].tolist() for name in model.needs]
     return [
-        PredictPush.Request(velocity=v, contact=c, angle=a, duration=d)
-        for (v, c, a), d in zip(table.inputs[rows].tolist(), table.duration[rows].tolist(), strict=True)
+        PredictPush.Request(
+            velocity=v, contact=c, angle=a, duration=d, covariate_names=list(model.needs), covariate_values=values
+        )
+        for (v, c, a), d, *values in zip(rows.inputs.tolist(), rows.duration.tolist(), *needed, strict=True)
     ]
+
+
+def outside_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
+    """Requests for `count` pushes outside the model's domain."""
+    inputs, duration = outside_pushes(model, count), model.usual_duration
+    return [PredictPush.Request(velocity=v, contact=c, angle=a, duration=duration) for v, c, a in inputs.tolist()]
 
 
 def load() -> str:
@@ -172,7 +181,8 @@ def load() -> str:
     return "{:.1f} {:.1f} {:.1f}".format(*os.getloadavg())
 
 
-def _trained(count: int) -> PushModel:
+def trained_vhgp(count: int) -> PushModel:
+    """A VHGP of so many simulated windows of the MIT square."""
     rng = np.random.default_rng(0)
     rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
     inputs = rng.uniform([0.01, 0.0, -1.2], [0.05, 1.0, 1.2], (count, 3))

@@ -60,6 +60,32 @@ def _on_polygon(outline: Outline) -> Nearest:
     squared = np.sum(along**2, axis=1)
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.sqrt(squared)[:, None]
     edges = [tuple(row) for row in np.column_stack([outline.vertices, ends[:, 1], along, squared, normals]).tolist()]
+    general = _on_any_polygon(edges)
+    after = np.roll(along, -1, axis=0)
+    if np.any(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0] <= 0.0):
+        return general
+    offsets = np.sum(outline.vertices * normals, axis=1)
+    # The foot on an edge, over its length from the first vertex, is linear in the point.
+    shares = along / squared[:, None]
+    starts = np.sum(outline.vertices * shares, axis=1)
+    lines = [tuple(row) for row in np.column_stack([normals, offsets, shares, starts]).tolist()]
+
+    def nearest(x: float, y: float) -> tuple[float, float, float, float, float]:
+        """Of a convex polygon: on the edge with the largest signed distance, unless a corner is nearest."""
+        most = -inf
+        for nx, ny, offset, share_x, share_y, start in lines:
+            if (distance := x * nx + y * ny - offset) > most:
+                most, normal_x, normal_y = distance, nx, ny
+                along_x, along_y, first = share_x, share_y, start
+        if most > 0.0 and not 0.0 < x * along_x + y * along_y - first < 1.0:
+            return general(x, y)
+        return x - most * normal_x, y - most * normal_y, normal_x, normal_y, most
+
+    return nearest
+
+
+def _on_any_polygon(edges: list[tuple[float, ...]]) -> Nearest:
+    """edges: x, y of the first vertex, y of the second, x, y from first to second, its square, outward normal x, y."""
 
     def nearest(x: float, y: float) -> tuple[float, float, float, float, float]:
         least, inside = inf, False

@@ -33,7 +33,7 @@ def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
     """
     if in_domain.all():
         return ""
-    first, count = int(np.argmin(in_domain)), len(in_domain)
+    first, count = int(in_domain.argmin()), len(in_domain)
     reason = _reason(model, push, first)
     if count == 1:
         return f"{OUT_OF_DOMAIN}: {reason}"
@@ -48,12 +48,19 @@ def _reason(model: PushModel, push: Push, row: int) -> str:
     for name, value, (low, high) in (("velocity", velocity, limits.velocity), ("angle", angle, limits.angle)):
         if not low <= value <= high:
             outside.append(_outside(name, value, f"{low:.4g} to {high:.4g}"))
+    if model.covariate_ranges:
+        outside += _outside_covariates(model, push, row)
+    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
+
+
+def _outside_covariates(model: PushModel, push: Push, row: int) -> list[str]:
     given = {name: column[row : row + 1] for name, column in push.covariates.items()}
     alone = model.predictor.completed(Push(push.inputs[row : row + 1], push.duration[row : row + 1], given))
-    for name, known in model.covariate_ranges.items():
-        if not known.contains(alone.covariates[name])[0]:
-            outside.append(_outside(f"covariate {name}", float(alone.covariates[name][0]), str(known)))
-    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
+    return [
+        _outside(f"covariate {name}", float(alone.covariates[name][0]), str(known))
+        for name, known in model.covariate_ranges.items()
+        if not known.contains(alone.covariates[name])[0]
+    ]
 
 
 def _outside(name: str, value: float, accepted: str) -> str:

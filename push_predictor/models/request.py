@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, pi
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -68,6 +68,11 @@ class PushRequest:
         """The arguments of PushModel.predict_rows: inputs (1, 3), duration (1,), covariates (1,) by name."""
         columns = {name: np.array([value]) for name, value in self.covariates.items()}
         return np.array([[self.velocity, self.contact, self.angle]]), np.array([self.duration]), columns
+
+
+def with_own_window(model: PushModel, push: PushRequest) -> PushRequest:
+    """The push with the duration that it means; see own_window."""
+    return push if push.duration else replace(push, duration=model.usual_duration)
 
 
 def own_window(model: PushModel, duration: float) -> float:

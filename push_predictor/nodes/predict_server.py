@@ -46,6 +46,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import run
+from push_predictor.nodes.server.background import in_background
 from push_predictor.nodes.server.model_services import handle_list_models, handle_load_model
 from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
 from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
@@ -107,6 +108,7 @@ class PredictServer(LifecycleNode):
             self.trigger_activate()
         self._starting = False
         self._start_threaded()
+        self._complete_models()
 
     def close(self) -> None:
         """End a trace and long requests, publish the last diagnostics."""
@@ -121,6 +123,14 @@ class PredictServer(LifecycleNode):
         self._destroy_services()
         super().destroy_node()
 
+    def _complete_models(self) -> None:
+        """Compute the tables that the models lack, in the background; they predict exactly meanwhile."""
+        registry = self._registry
+        in_background(lambda: registry.complete(self._closing.is_set), self._log_completion_error)
+
+    def _log_completion_error(self, error: Exception) -> None:
+        self.get_logger().error(f"a model predicts without its table: {error!r}")
+
     # --- transitions ----------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -134,7 +144,7 @@ class PredictServer(LifecycleNode):
         return super().on_configure(state)
 
     def _configure(self) -> None:
-        self._problems = self._registry.load_all(self.value("models"))
+        self._problems = self._registry.load_all(self.value("models"), at_once=self._starting)
         for problem in self._problems:
             self.get_logger().error(problem)
         if SHIPPED in self.value("models"):
@@ -145,6 +155,7 @@ class PredictServer(LifecycleNode):
         self._state = "inactive"
         if not self._starting:
             self._start_threaded()
+            self._complete_models()
 
     def _create_services(self) -> None:
         self._threaded = [
@@ -239,6 +250,7 @@ class PredictServer(LifecycleNode):
             return response
         self.get_logger().info(response.message)
         gc.collect()
+        self._complete_models()
         if request.make_default:
             self.set_parameters([Parameter("default_model", value=response.name)])
         if was_empty and self._state == "inactive" and self.value("autostart"):

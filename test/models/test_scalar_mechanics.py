@@ -30,7 +30,6 @@ from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.mechanics.scalar.contact import (
     LastContact,
-    ScalarTouch,
     driven_on_ellipsoid,
     driven_scalar,
 )
@@ -161,11 +160,11 @@ def test_contact_on_an_ellipsoid_in_closed_form_is_that_found_by_iteration():
     for _ in range(400):
         turn, normal_arm, left_arm, along, across = draw.uniform(-4.0, 4.0, 5)
         left, right = draw.uniform(0.0, 2.0, 2)
-        touch = ScalarTouch(np.cos(turn), np.sin(turn), normal_arm, left_arm, along, across)
+        touch = (np.cos(turn), np.sin(turn), normal_arm, left_arm, along, across)
         closed = driven_on_ellipsoid(touch, left, right)
         assert closed == pytest.approx(driven_scalar(lambda *load: load, touch, left, right, LastContact(), 1e-13))
         vx, vy, spin = closed
-        sideways = vy * touch.normal_x - vx * touch.normal_y + spin * left_arm
+        sideways = vy * touch[0] - vx * touch[1] + spin * left_arm
         slip = 0 if abs(sideways - across) < 1e-9 else int(np.sign(across - sideways))
         reached.add(slip if along > 0.0 else "leaving")
     assert reached == {"leaving", -1, 0, 1}

@@ -33,7 +33,17 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import table_cache, table_file
 from push_predictor.models.store.arrays_record import read_arrays
 from push_predictor.models.store.model_file import load_model, model_digest, save_model
-from push_predictor.models.store.table_cache import as_served, keep_tables, load_served, table_folder, tables_of
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.store.table_cache import (
+    NO_TABLE_YET,
+    as_served,
+    completed,
+    keep_tables,
+    load_at_once,
+    load_served,
+    table_folder,
+    tables_of,
+)
 from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.models.train import train_model
@@ -106,6 +116,60 @@ def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, loaded_be
     found = served.predict_rows(outside, served.model.training.duration[:1])
     assert np.all(np.isfinite(found.mean)) and not found.in_domain.any()
     assert all("_posterior" in vars(regression) for regression in regressions)
+
+
+def test_a_model_without_tables_predicts_exactly_until_they_are_computed(
+    file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry, rows = ModelRegistry(), model.training
+    assert registry.load_all([str(file)], at_once=True) == [] and not folder.exists()
+    at_once = registry.get("small")
+    assert registry.answering == [f"small: {NO_TABLE_YET}"] and not at_once.tabulated
+    exact = at_once.predict_rows(rows.inputs, rows.duration)
+    assert np.array_equal(exact.mean, model.predict_rows(rows.inputs, rows.duration).mean)
+    registry.complete()
+    after = registry.get("small")
+    assert after.tabulated and after.single is not None and only(folder).suffix == ".tables"
+    regressions = after.model.predictor.base.regressions  # type: ignore[attr-defined]  # of a VHGP
+    assert not any("_posterior" in vars(regression) for regression in regressions)
+    found = after.predict_rows(rows.inputs, rows.duration)
+    assert np.max(np.abs(found.mean - exact.mean) / exact.std) < 1e-3
+    monkeypatch.setattr(table_cache, "tabulate", never)
+    kept = load_at_once(file)  # the table is on disk now
+    assert kept.tabulated and kept.single is None and completed(kept).single is not None
+    assert completed(after) is after
+
+
+def test_completion_ends_when_it_is_cancelled(file: Path, folder: Path) -> None:
+    registry = ModelRegistry()
+    registry.load(file, at_once=True)
+    registry.complete(lambda: True)
+    assert registry.answering == [f"small: {NO_TABLE_YET}"]
+
+
+def test_completion_does_not_undo_what_was_loaded_meanwhile(
+    file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = file.with_name("other.pushmodel")
+    save_model(train_model(noisy_pushes(40), square_rig(), "analytical", name="other"), other)
+    registry = ModelRegistry()
+    registry.load(file, at_once=True)
+
+    def slowly(served: TabulatedModel) -> TabulatedModel:
+        registry.load(other, "small")
+        registry.load(other, "other")
+        return completed(served)
+
+    monkeypatch.setattr("push_predictor.models.store.model_registry.completed", slowly)
+    registry.complete()
+    assert registry.get("small").model.kind == "analytical" and registry.names == ["small", "other"]
+
+
+def test_a_prior_model_has_its_table_at_once(tmp_path: Path, folder: Path) -> None:
+    prior = train_model(empty_table(), square_rig(), "prior", name="prior")
+    few_draws = replace(prior, predictor=replace(prior.predictor, draws=prior.predictor.draws[:12]))
+    save_model(few_draws, tmp_path / "prior.model")
+    assert load_at_once(tmp_path / "prior.model").how.startswith("table of")
 
 
 def test_training_writes_the_table_next_to_the_model(

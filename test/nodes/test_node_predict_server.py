@@ -100,6 +100,22 @@ def test_serves_a_model_that_was_trained_on_no_push(tmp_path):
     np.testing.assert_allclose(answered.covariance, expected.covariance, rtol=1e-9)
 
 
+def test_tables_are_computed_while_the_server_answers(folder, tmp_path, monkeypatch):
+    """They change predictions by no more than their tolerance, and push and batch agree."""
+    monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(tmp_path))
+    outside = [0.3, 0.1, 1.4]
+    with server_of([folder / "vhgp.model"]) as running:
+        first = prediction_from_response(running.push(MANY[0]))
+        running.next_status(lambda s: "table of" in {p.key: p.value for p in s.values}["answers"])
+        after = prediction_from_response(running.push(MANY[0]))
+        exact = prediction_from_response(running.batch(np.array([outside])))
+        single = prediction_from_response(running.push(outside))
+    assert np.max(np.abs(after.mean - first.mean) / first.std) < 1e-3
+    assert np.max(np.abs(single.mean - exact.mean) / exact.std) < 1e-3
+    assert np.array_equal(single.in_domain, exact.in_domain) and not single.in_domain[0]
+    assert len(list(tmp_path.glob("*.tables"))) == 1
+
+
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
 def test_responses_equal_the_models_predictions(server, folder, kind):
     model = tabulate(load_model(folder / f"{kind}.model"))

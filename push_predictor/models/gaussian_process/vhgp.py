@@ -67,6 +67,10 @@ class VHGP:
         """The variational bound on the log marginal likelihood."""
         return self._posterior.bound
 
+    def free_matrices(self) -> None:
+        """Free the matrices, which the next prediction computes again."""
+        self.__dict__.pop("_posterior", None)  # a cached property
+
     @cached_property
     def _posterior(self) -> _Posterior:
         with one_blas_thread():

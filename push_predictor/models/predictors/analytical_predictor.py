@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
@@ -44,8 +42,8 @@ class AnalyticalPredictor(OfMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.physics.displacement(push.inputs, push.duration)
-        covariance = np.broadcast_to(self.covariance, (len(mean), 3, 3)).copy()
-        return Moments(mean, covariance, covariance.copy())
+        covariance, process_covariance = self.covariance[None].repeat(2 * len(mean), axis=0).reshape(2, -1, 3, 3)
+        return Moments(mean, covariance, process_covariance)
 
     def with_scalar_mechanics(self) -> AnalyticalPredictor:
         """See Predictor."""

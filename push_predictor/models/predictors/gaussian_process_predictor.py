@@ -27,6 +27,7 @@ from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, Kerne
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
@@ -181,6 +182,12 @@ class GaussianProcessPredictor(WithoutEffects):
     def without_mean(self) -> GaussianProcessPredictor:
         """The predictor of the residuals alone; itself if it has no mean."""
         return self if self.mean is None else replace(self, mean=None)
+
+    def free_matrices(self) -> None:
+        """Free what predictions would compute again."""
+        for regression in self.regressions:
+            if isinstance(regression, VHGP):
+                regression.free_matrices()
 
     def with_independent_outputs(self) -> GaussianProcessPredictor:
         """See Predictor."""

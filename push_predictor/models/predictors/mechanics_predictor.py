@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.of_mechanics import OfFittedMechanics
@@ -36,8 +34,8 @@ class MechanicsPredictor(OfFittedMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
-        covariance = np.broadcast_to(self.covariance, (len(mean), 3, 3)).copy()
-        return Moments(mean, covariance, covariance.copy())
+        covariance, process_covariance = self.covariance[None].repeat(2 * len(mean), axis=0).reshape(2, -1, 3, 3)
+        return Moments(mean, covariance, process_covariance)
 
     def with_scalar_mechanics(self) -> MechanicsPredictor:
         """See Predictor."""

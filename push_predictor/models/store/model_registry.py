@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from threading import Lock
 
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
 from push_predictor.models.store.model_file import is_model_file
-from push_predictor.models.store.table_cache import load_served
+from push_predictor.models.store.table_cache import completed, load_at_once, load_served, return_memory
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 from push_predictor.types import Array
@@ -30,11 +31,13 @@ from push_predictor.types import Array
 class ModelRegistry:
     """Loaded models in the order of loading.
 
-    A model is registered only after its file has been read completely and its table is built, so its predictions never
-    change while it is in use.
+    A model is registered only after its file has been read completely and it has predicted. `complete` adds what makes
+    its predictions fast; they change by no more than the tolerances of tabulated.table_accuracy.
     """
 
     def __init__(self) -> None:
+        self._lock = Lock()  # `complete` runs in another thread than `load`
+        self._completing = Lock()  # and not in two at once, which would compute the same
         self._models: dict[str, TabulatedModel] = {}
         self._files: dict[str, Path] = {}
         self._chosen = ""
@@ -73,29 +76,48 @@ class ModelRegistry:
         """The file of a loaded model."""
         return self._files[name]
 
-    def load(self, path: Path, name: str = "", *, replace: bool = True) -> str:
+    def load(self, path: Path, name: str = "", *, replace: bool = True, at_once: bool = False) -> str:
         """Load a model file under a name (empty: the name in the file) and return the name.
 
-        It replaces a model of that name, unless `replace` is false. Raises ModelFileError for a bad file and for a name
-        in use with `replace` false; the registry is then unchanged.
+        It replaces a model of that name, unless `replace` is false. at_once: leave the computation of missing tables to
+        `complete`. Raises ModelFileError for a bad file and for a name in use with `replace` false; the registry is
+        then unchanged.
         """
         path = _located(path)
-        tabulated = load_served(path)
+        tabulated = load_at_once(path) if at_once else load_served(path)
         name = name or tabulated.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is already used by {self._files[name]}, give another name")
-        # A new dictionary: other threads may be iterating over the old one.
-        self._files[name] = path
-        self._models = {**self._models, name: tabulated}
+        with self._lock:
+            self._files[name] = path
+            self._models = {**self._models, name: tabulated}  # other threads may be iterating over the old one
         return name
+
+    def complete(self, cancelled: Callable[[], bool] = lambda: False) -> None:
+        """Compute missing tables, and what predicts single pushes outside them; takes some seconds.
+
+        Models predict as before until theirs is done. cancelled: asked before each model.
+        """
+        with self._completing:
+            for name, known in self._models.items():
+                if cancelled():
+                    return
+                self._replace(name, known, completed(known))
+        return_memory()
+
+    def _replace(self, name: str, known: TabulatedModel, found: TabulatedModel) -> None:
+        """Register the model in place of a known one, unless another one has taken its name."""
+        with self._lock:
+            if self._models.get(name) is known:
+                self._models = {**self._models, name: found}
 
     @property
     def answering(self) -> list[str]:
         """One line per model: from a table or exactly."""
         return [f"{name}: {tabulated.how}" for name, tabulated in self._models.items()]
 
-    def load_all(self, places: Iterable[str]) -> list[str]:
-        """Load files, folders of files and, for SHIPPED, the shipped model.
+    def load_all(self, places: Iterable[str], *, at_once: bool = False) -> list[str]:
+        """Load files, folders of files and, for SHIPPED, the shipped model; at_once: see `load`.
 
         Returns one line for each model that could not be loaded; the others are loaded.
         """
@@ -107,7 +129,7 @@ class ModelRegistry:
                 problems.append(f"models[{index}]: {error}")
                 continue
             for path in files:
-                problems += self._problem(path)
+                problems += self._problem(path, at_once)
         return problems
 
     def describe(self, name: str) -> str:
@@ -125,9 +147,9 @@ class ModelRegistry:
         }
         return "; ".join(f"{key}={value}" for key, value in values.items())
 
-    def _problem(self, path: Path) -> list[str]:
+    def _problem(self, path: Path, at_once: bool) -> list[str]:
         try:
-            self.load(path, replace=False)
+            self.load(path, replace=False, at_once=at_once)
         except PushPredictorError as error:
             return [str(error)]
         return []

@@ -25,18 +25,26 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError
+from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, model_digest
 from push_predictor.models.store.table_file import FORMAT_VERSION, read_tables, write_tables
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
+from push_predictor.models.tabulated.tabulated_model import (
+    TabulatedModel,
+    tabulate,
+    with_effect_table,
+    with_single_posteriors,
+)
 
 FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
+NO_TABLE_YET = "exact: its table is being computed"
 MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
 
@@ -46,22 +54,52 @@ def load_served(path: Path) -> TabulatedModel:
 
     Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
+    served = load_at_once(path)
+    if served.base_how != NO_TABLE_YET:
+        return served
+    with _naming(path):
+        tabulated = _computed(served.model)
+    tabulated.free_matrices()
+    return_memory()
+    return tabulated
+
+
+@one_blas_thread()
+def load_at_once(path: Path) -> TabulatedModel:
+    """The same, but a model without tables on disk predicts by itself, and states that its table is missing.
+
+    A prior model gets its table: by itself it takes a thousand integrations for a push.
+    `completed` adds the tables. Raises ModelFileError.
+    """
     model = load_model(path, check=False)
-    try:
-        served = _read(model, path)
-        if served is None:  # the model of a kept table was checked before the table was computed
-            computed = _computed(load_model(path))
-            served = _read(model, path) or computed  # what is read goes without the matrices, which take 50 MB
-            del computed
-            _return_memory()
+    with _naming(path):
+        # The model of a kept table was checked before the table was computed.
+        served = _read(model, path) or _without_tables(load_model(path))
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         served.predict_rows(first.inputs, first.duration, first.covariates)
+    return served
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Name the file of a model that cannot predict. Raises ModelFileError."""
+    try:
+        yield
     except ModelFileError:
         raise
     except Exception as error:
         raise ModelFileError(f"{path}: the model cannot predict ({type(error).__name__}: {error})") from None
-    return served
+
+
+@one_blas_thread()
+def completed(served: TabulatedModel) -> TabulatedModel:
+    """A model of `load_at_once` with its tables, and fast for single pushes outside them; itself if complete."""
+    tabulated = _computed(served.model) if served.base_how == NO_TABLE_YET else served
+    if tabulated.single is None:
+        tabulated = with_single_posteriors(tabulated)
+    tabulated.free_matrices()
+    return tabulated
 
 
 @one_blas_thread()
@@ -113,6 +151,12 @@ def _read(model: PushModel, path: Path | None) -> TabulatedModel | None:
     return served
 
 
+def _without_tables(model: PushModel) -> TabulatedModel:
+    if isinstance(model.base.predictor, PriorPredictor):
+        return _computed(model)
+    return TabulatedModel(model, NO_TABLE_YET)
+
+
 def _computed(model: PushModel) -> TabulatedModel:
     """The model with its tables, which are kept; a folder that takes no files is no error."""
     served, digest = with_effect_table(tabulate(model)), model_digest(model)
@@ -123,7 +167,7 @@ def _computed(model: PushModel) -> TabulatedModel:
     return served
 
 
-def _return_memory() -> None:
+def return_memory() -> None:
     """Give the memory of the computation back: glibc would keep 100 MB for later."""
     gc.collect()
     with suppress(AttributeError, OSError):  # another C library

@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import exp, sqrt
+from math import exp
 from typing import TypeAlias
 
 import numpy as np
@@ -42,6 +42,7 @@ from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRe
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.tabulated.push_chart import Chart, Whole
+from push_predictor.models.tabulated.single_push.moments import moments_in_numbers
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.table_sides import Side, table_sides
 from push_predictor.types import Array
@@ -118,15 +119,9 @@ class PredictionTable:
         row by row.
         """
         values = self.spline.at(point[self.columns], box).tolist()
-        p, q, r = exp(values[6]), exp(values[7]), exp(values[8])
-        u, v, w = (max(value, least) for value, least in zip(values[3:6], self.least, strict=True))
-        mean, a, b, c = values[:3], u + p, v + q, w + r
-        if len(values) == 9:
-            return [*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r]
-        r12, r13, r23 = bounded_one(values[9:])
-        pq, pr, qr = r12 * sqrt(p * q), r13 * sqrt(p * r), r23 * sqrt(q * r)
-        ab, ac, bc = pq + r12 * sqrt(u * v), pr + r13 * sqrt(u * w), qr + r23 * sqrt(v * w)
-        return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
+        latent = [max(value, least) for value, least in zip(values[3:6], self.least, strict=True)]
+        process = exp(values[6]), exp(values[7]), exp(values[8])
+        return moments_in_numbers(values[:3], latent, process, bounded_one(values[9:]) if len(values) > 9 else None)
 
 
 def tabulate(
@@ -137,7 +132,7 @@ def tabulate(
     refinement: factor on the usual number of nodes and knots along each axis. Raises TooFineError, also for kernels
     that are not products over the axes.
     """
-    regressions = [_on_grid(regression) for regression in predictor.regressions]
+    regressions = [on_grid(regression) for regression in predictor.regressions]
     if not all(isinstance(kernel, SquaredExponential) for kernel, _ in _resolved(regressions, None)):
         raise TooFineError("only squared exponential kernels are products over the axes of a table")
     sides = table_sides(predictor.scaling, chart, low, high)
@@ -191,7 +186,8 @@ def _along_all(matrices: Sequence[Array], values: Array) -> Array:
     return values
 
 
-def _on_grid(regression: Regression) -> OnGrid:
+def on_grid(regression: Regression) -> OnGrid:
+    """The posteriors of any regression, to be evaluated on grids."""
     if isinstance(regression, ConstantNoise):
         return regression
     return sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)

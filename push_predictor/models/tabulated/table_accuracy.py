@@ -20,12 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain
 from push_predictor.types import Array
 
 MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
 COVARIANCE_TOLERANCE = 1e-2  # relative, of the variance of any combination of outputs
+STEEPEST = 1.57  # rad, angle of a push to be compared
 CHECKED = 250  # random pushes of the domain, and as many training pushes
 
 
@@ -63,11 +65,26 @@ class Probes:
         inside, table = domain.predict(self.inputs)
         if table is None:
             raise ValueError(f"pushes outside the table's domain: {self.inputs[~inside]}")
-        sd = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-        of_mean = np.max(np.abs(table.mean - self.mean) / sd)
-        of_outcome = relative_error(table.covariance, self.covariance)
-        of_process = relative_error(table.process_covariance, self.process_covariance)
-        return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+        return compared_with(self, table.mean, table.covariance, table.process_covariance)
+
+
+def compared_with(
+    exact: Probes | Prediction, mean: Array, covariance: Array, process_covariance: Array
+) -> TableAccuracy:
+    """The largest differences of means (n, 3) and covariances (n, 3, 3) from exact ones."""
+    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
+    of_mean = np.max(np.abs(mean - exact.mean) / sd)
+    of_outcome = relative_error(covariance, exact.covariance)
+    of_process = relative_error(process_covariance, exact.process_covariance)
+    return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+
+
+def outside_pushes(model: PushModel, count: int) -> Array:
+    """At most `count` pushes (n, 3) outside the domain, of all contacts and angles, from half to twice its speeds."""
+    speed = model.training.inputs[:, 0]
+    low, high = [0.5 * speed.min(), 0.0, -STEEPEST], [2.0 * speed.max(), 1.0, STEEPEST]
+    spread = np.random.default_rng(0).uniform(low, high, (20 * count, 3))
+    return np.asarray(spread[~model.in_domain(spread)][:count])
 
 
 def probed(model: PushModel, count: int = CHECKED) -> Probes:

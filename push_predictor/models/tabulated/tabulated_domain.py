@@ -39,6 +39,11 @@ class FeatureBox:
     low: Array
     high: Array
 
+    def features(self, push: Sequence[float]) -> list[float]:
+        """Features of one push, in plain numbers; see push_features."""
+        velocity, contact, angle = push
+        return [velocity, *map(float, self.chart.place_features(*self.chart.place_one(contact))), angle]
+
     def located(self, push: Sequence[float]) -> tuple[float, int] | None:
         """Place and box of one push in the domain, in plain numbers; else None."""
         velocity, contact, angle = push

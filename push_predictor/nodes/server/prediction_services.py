@@ -38,7 +38,7 @@ from push_predictor.models.domain_remark import domain_remark
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import PushRequest, check_request, check_requests, own_window
+from push_predictor.models.request import PushRequest, check_request, check_requests, own_window, with_own_window
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
@@ -54,7 +54,7 @@ def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) ->
     """Fill the response to PredictPush. Raises RequestError or PredictionError."""
     asked, residual = push_from_request(request), residual_from_request(request)
     tabulated = registry.get(request.model)
-    push = replace(asked, duration=own_window(tabulated.model, asked.duration))
+    push = with_own_window(tabulated.model, asked)
     check_request(tabulated.model, push)
     prediction = tabulated.predict_one(push)
     _check_finite(tabulated, prediction, 0)
@@ -119,7 +119,8 @@ def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int)
     """Raise PredictionError for the first push without a finite prediction; start: index of the chunk's first push."""
     if prediction.in_domain.all():
         return  # a model is finite between the pushes that it was trained on
-    finite = np.isfinite(prediction.mean).all(axis=1) & np.isfinite(prediction.covariance).all(axis=(1, 2))
+    # A sum is finite only if all of its terms are.
+    finite = np.isfinite(prediction.mean.sum(axis=1) + prediction.covariance.sum(axis=(1, 2)))
     if not finite.all():
         index = start + int(np.argmin(finite))
         raise PredictionError(

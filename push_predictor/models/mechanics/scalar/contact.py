@@ -17,21 +17,13 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import TypeAlias
 
 from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, ROOT_STEPS
 from push_predictor.models.mechanics.scalar.surface import Three, Twist
 
-
-class ScalarTouch(NamedTuple):
-    """One contact; see Touch."""
-
-    normal_x: float
-    normal_y: float
-    normal_arm: float
-    left_arm: float
-    along: float
-    across: float
+# One contact: normal_x, normal_y, normal_arm, left_arm, along, across; see Touch. A class would take longer to make.
+ScalarTouch: TypeAlias = tuple[float, float, float, float, float, float]
 
 
 class LastContact:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import atan2, cos, isfinite, log, sin, sqrt
 from typing import NamedTuple, TypeAlias
 
@@ -57,6 +58,15 @@ FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load"
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach.
 Rates: TypeAlias = tuple[float, float, float, float, float]
 Rate: TypeAlias = Callable[[float, float, float, float], Rates]
+
+
+class WorldVectors(NamedTuple):
+    """Vectors of the parameters that act in body or world: see parameters."""
+
+    stretch: tuple[float, float]
+    grain: tuple[float, float]
+    slope: tuple[float, float]
+    gradient: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +113,28 @@ class ScalarMechanics(FittedMechanics):
         ]
         return np.array(moved)
 
+    @cached_property
+    def world(self) -> WorldVectors:
+        """Vectors of the parameters that act in body or world."""
+        value = self.values.get
+        pairs = (
+            ("body_anisotropy", "body_anisotropy_diagonal"),
+            ("grain_x", "grain_diagonal"),
+            ("slope_x", "slope_y"),
+            ("gradient_x", "gradient_y"),
+        )
+        return WorldVectors(*((value(first, 0.0), value(second, 0.0)) for first, second in pairs))
+
+    @cached_property
+    def friction_changes(self) -> bool:
+        """Whether the contact friction changes along a push."""
+        return any(map(self.values.get, FRICTION_CHANGES))
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """See FittedMechanics."""
+        return super().needs
+
     def _surface(self, recording: float) -> ScalarSurface:
         key = recording, self.value("rim_exponent"), self.value("pressure_spread")
         if key not in self._surfaces:
@@ -123,15 +155,6 @@ def scalar_mechanics(fitted: FittedMechanics) -> ScalarMechanics:
         nearest=nearest_on(outline),
         contact_at=contact_on(outline),
     )
-
-
-class _World(NamedTuple):
-    """Vectors of the parameters that act in body or world: see parameters."""
-
-    stretch: tuple[float, float]
-    grain: tuple[float, float]
-    slope: tuple[float, float]
-    gradient: tuple[float, float]
 
 
 class _Push:
@@ -165,11 +188,11 @@ class _Push:
         self.speed = velocity * (1.0 + value("travel_share", 0.0))
         self.travel = self.speed * duration
         self.heading = heading - atan2(self.recorded[1], self.recorded[0])
-        self.friction, self.world = model.value("contact_friction"), _world(model)
+        self.friction, self.world = model.value("contact_friction"), model.world
         none = self.world.stretch == (0.0, 0.0)
         self.stretch = None if none else root_of_stretch(*self.world.stretch, surface.reach)  # without grain
         # What is the same all along the push is computed once; None if it is not.
-        self.cone = None if any(map(value, FRICTION_CHANGES)) else self._edges(self.friction)
+        self.cone = None if model.friction_changes else self._edges(self.friction)
         self.centre = None if self.world.gradient != (0.0, 0.0) else self._own_centre()
         same = self.world.grain == self.world.slope == (0.0, 0.0)
         self.twist = self._loaded(0.0) if same else None
@@ -200,7 +223,7 @@ class _Push:
             centre_x, centre_y = same_centre or self._centre(heading)
             arm_x, arm_y = (at_x - centre_x) / length, (at_y - centre_y) / length
             along = vx * nx + vy * ny
-            touch = ScalarTouch(nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, along, vy * nx - vx * ny)
+            touch = nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, along, vy * nx - vx * ny
             left, right = same_cone or self._friction(touch)
             if ellipsoid:
                 vx, vy, spin = driven_on_ellipsoid(touch, left, right)
@@ -226,12 +249,13 @@ class _Push:
     def _friction(self, touch: ScalarTouch) -> tuple[float, float]:
         """Coefficients of slip to the left and to the right; see friction_cone."""
         value, friction = self.model.values.get, self.friction
+        normal_x, normal_y, normal_arm, _, along, across = touch
         if by_angle := value("friction_by_angle", 0.0):
-            friction += by_angle * abs(atan2(touch.across, touch.along))
+            friction += by_angle * abs(atan2(across, along))
         if by_speed := value("friction_by_speed", 0.0):
-            friction += by_speed * log(max(self.speed * abs(touch.across), SLOWEST) / REFERENCE_SPEED)
+            friction += by_speed * log(max(self.speed * abs(across), SLOWEST) / REFERENCE_SPEED)
         if by_load := value("friction_by_load", 0.0):
-            friction -= by_load * log(self.surface.gauge(touch.normal_x, touch.normal_y, touch.normal_arm))
+            friction -= by_load * log(self.surface.gauge(normal_x, normal_y, normal_arm))
         return self._edges(friction)
 
     def _edges(self, friction: float) -> tuple[float, float]:
@@ -248,18 +272,6 @@ class _Push:
         if world.slope != (0.0, 0.0):
             pull = (*_turned(*world.slope, -turn), 0.0)
         return loaded(self.surface, stretch, pull, self.model.values.get("pushing_height", 0.0))
-
-
-def _world(model: ScalarMechanics) -> _World:
-    def pair(first: str, second: str) -> tuple[float, float]:
-        return model.values.get(first, 0.0), model.values.get(second, 0.0)
-
-    return _World(
-        pair("body_anisotropy", "body_anisotropy_diagonal"),
-        pair("grain_x", "grain_diagonal"),
-        pair("slope_x", "slope_y"),
-        pair("gradient_x", "gradient_y"),
-    )
 
 
 def _turned(x: float, y: float, angle: float) -> tuple[float, float]:
@@ -300,8 +312,9 @@ def _swept(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
 def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
     """Pose after the sweep; see fine_sweep.swept_finely."""
     pose, done, longest = (0.0, 0.0, 0.0), 0.0, min(travel, LONGEST_STEP)
-    first = rate(0.0, 0.0, 0.0, 0.0)
+    first: Rates | None = None
     while travel - done > 1e-12 * travel:
+        first = first or rate(*pose, done)
         step = min(longest, travel - done)
         if first[4] > 0.0 and first[3] >= TOUCHING:
             step = min(step, first[3])
@@ -310,8 +323,7 @@ def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> 
         fine = _advance(rate, middle, half, 0.5 * step, rate(*middle, half))
         allowed = accuracy * (_distance(fine, pose, length) + OF_TRAVEL_FINELY * travel)
         if _distance(fine, coarse, length) <= allowed:
-            pose, done, longest = fine, done + step, min(2.0 * step, LONGEST_STEP)
-            first = rate(*pose, done)
+            pose, done, longest, first = fine, done + step, min(2.0 * step, LONGEST_STEP), None
         else:
             longest = 0.5 * step
     return pose

@@ -1,0 +1,46 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Work in the background: of low priority, and no exception is lost."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+
+import pytest
+
+from push_predictor.nodes.server.background import NICENESS, in_background
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="priorities of threads")
+def test_work_runs_at_low_priority_and_leaves_that_of_others() -> None:
+    before, found = os.getpriority(os.PRIO_PROCESS, 0), []
+
+    def work() -> None:
+        found.append((threading.current_thread().daemon, os.getpriority(os.PRIO_PROCESS, threading.get_native_id())))
+
+    in_background(work, pytest.fail).join(10.0)
+    assert found == [(True, NICENESS)] and os.getpriority(os.PRIO_PROCESS, 0) == before
+
+
+def test_an_exception_is_reported() -> None:
+    failed: list[Exception] = []
+
+    def work() -> None:
+        raise ValueError("no table")
+
+    in_background(work, failed.append).join(10.0)
+    assert [str(error) for error in failed] == ["no table"]
