@@ -140,7 +140,7 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
 def test_the_perturbed_push_without_a_change_is_the_analytical_push(outline: str, duration: float) -> None:
     physics, push = physics_of(outline), pushes(150, duration=duration)
     expected = physics.displacement(push.inputs, push.duration)
-    error = displaced(physics, push, lambda state, amount: no_change(len(expected)), 0.0) - expected
+    error = displaced(physics, push, [(lambda state, amount: no_change(len(expected)), 0.0)])[0] - expected
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.01 * np.sqrt(np.mean(expected**2, axis=0)))
 
 

@@ -70,7 +70,7 @@ class Touches:
     def gaps(self, correction: Array) -> Array:
         """Gaps (n,) m between tip and outline, negative inside."""
         placed = self.placed(correction)
-        return placed.size * placed.nearest.distance - correction[TIP] - self.radius
+        return np.asarray(placed.size * placed.nearest.distance - correction[TIP] - self.radius)
 
     def slopes(self, correction: Array) -> Array:
         """Derivatives (n, 10) of the gaps by the correction.
