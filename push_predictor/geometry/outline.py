@@ -21,6 +21,7 @@ normals are those of the smooth curve.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,15 +42,20 @@ CENTRED = (0.0, 0.0, 0.0)  # pose of axes that are those of the body frame
 class Projection:
     """Nearest boundary points of n query points.
 
-    contact (n,), point (n, 2), outward normal (n, 2), signed distance (n,) in m (negative inside), at_vertex (n,):
-    whether a polygon's corner is nearest.
+    point (n, 2), outward normal (n, 2), signed distance (n,) in m (negative inside), at_vertex (n,): whether a
+    polygon's corner is nearest. contacts_of: computes the contacts, which the mechanics do not need.
     """
 
-    contact: Array
     point: Array
     normal: Array
     distance: Array
     at_vertex: BoolArray
+    contacts_of: Callable[[], Array]
+
+    @cached_property
+    def contact(self) -> Array:
+        """Contacts (n,)."""
+        return self.contacts_of()
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +216,8 @@ class Outline:
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
         normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
-        contact = self.contact_on_edge(edge, share)
-        return Projection(contact, points - away, normal, np.where(inside, -length, length), at_vertex)
+        distance = np.where(inside, -length, length)
+        return Projection(points - away, normal, distance, at_vertex, lambda: self.contact_on_edge(edge, share))
 
     def _contains(self, offset_x: Array, offset_y: Array) -> BoolArray:
         """Which of n points lie inside; offsets (V, n) of each from the vertices."""
@@ -257,10 +263,14 @@ class Outline:
         parameter = self._nearest_parameter(self._in_axes(points))
         nearest, normal = self._curve(parameter), self._curve_normal(parameter)
         distance = np.einsum("nj,nj->n", points - nearest, normal)
+        nowhere = np.zeros(len(points), dtype=np.bool_)
+        return Projection(nearest, normal, distance, nowhere, lambda: self._curve_contact(parameter))
+
+    def _curve_contact(self, parameter: Array) -> Array:
+        """Contacts (n,) of the curve's parameters (n,)."""
         turned = self._table[0] + (parameter - self._table[0]) % (2.0 * np.pi)
         contact = np.interp(turned, self._table, self._arc) / self.perimeter
-        contact = np.clip(contact, 0.0, np.nextafter(1.0, 0.0))
-        return Projection(contact, nearest, normal, distance, np.zeros(len(points), dtype=np.bool_))
+        return np.asarray(np.clip(contact, 0.0, np.nextafter(1.0, 0.0)))
 
     def _nearest_parameter(self, points: Array) -> Array:
         """Safeguarded Newton's method in the first quadrant, where the slope has a single root."""

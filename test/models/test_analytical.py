@@ -452,3 +452,25 @@ def test_the_support_of_a_moved_ellipse_moves_with_it() -> None:
     assert support.length == pytest.approx(uniform_support(own).length)
     expected = rotate(patch(own).points, np.array(pose[2])) + pose[:2]
     np.testing.assert_allclose(patch(moved).points, expected, atol=1e-15)
+
+
+# --- several models at once -------------------------------------------------------------------------------
+
+
+@EVERY_OUTLINE
+def test_models_that_differ_in_friction_and_support_are_computed_together_as_each_alone(outline: Outline) -> None:
+    model, (inputs, duration) = AnalyticalPush(outline, RADIUS, 0.25), pushes(20, seed=4)
+    (x, y), length = model.support.centre, model.support.length
+    others = [
+        replace(model, contact_friction=0.5),
+        replace(model, support=Support((x + 0.004, y), 0.9 * length)),
+        replace(model, contact_friction=0.0, support=Support((x, y - 0.003), 1.2 * length)),
+    ]
+    alone = [other.displacement(inputs, duration) for other in others]
+    np.testing.assert_allclose(model.displacements(others, inputs, duration), alone, atol=1e-9)
+
+
+def test_pushes_of_several_models_are_rejected_by_name_too() -> None:
+    model = AnalyticalPush(square(0.09), RADIUS)
+    with pytest.raises(RequestError, match="velocity"):
+        model.displacements([model], np.array([[-0.1, 0.1, 0.1]]), np.array([0.2]))

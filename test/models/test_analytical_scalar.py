@@ -107,6 +107,17 @@ def test_replaced_physics_keeps_prepared_outline() -> None:
         )
 
 
+@pytest.mark.parametrize("count", [3, FEW + 1])
+def test_several_models_equal_those_of_array_mechanics(count: int) -> None:
+    physics, (inputs, duration) = AnalyticalPush(OUTLINES["square"], 0.005), spread_pushes(count, seed=3)
+    changes = [{"contact_friction": 0.1}, {"support": SUPPORT}]
+    ours, theirs = (
+        model.displacements([replace(model, **change) for change in changes], inputs, duration)
+        for model in (scalar_analytical(physics), physics)
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-11)
+
+
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
 def test_responses_equal_those_of_array_mechanics(mechanism) -> None:
     physics = AnalyticalPush(OUTLINES["square"], 0.00475)

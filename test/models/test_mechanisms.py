@@ -28,8 +28,10 @@ from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import mechanics_of
+from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism, Push
-from push_predictor.models.mechanisms.perturbed import displaced, no_change
+from push_predictor.models.mechanisms.perturbed import Change, State, displaced, no_change
 from push_predictor.recordings.table import PushTable
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
 
@@ -140,8 +142,35 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
 def test_the_perturbed_push_without_a_change_is_the_analytical_push(outline: str, duration: float) -> None:
     physics, push = physics_of(outline), pushes(150, duration=duration)
     expected = physics.displacement(push.inputs, push.duration)
-    error = displaced(physics, push, lambda state, amount: no_change(len(expected)), 0.0) - expected
+    error = displaced(physics, push, [(lambda state, amount: no_change(len(expected)), 0.0)])[0] - expected
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.01 * np.sqrt(np.mean(expected**2, axis=0)))
+
+
+def test_changes_are_computed_together_as_each_alone() -> None:
+    physics, push = physics_of("rect1"), pushes(20)
+
+    def shifted(state: State, amount: float) -> Change:
+        return replace(no_change(20), centre=amount * state.load[:, :2])
+
+    def pulled(state: State, amount: float) -> Change:
+        return replace(no_change(20), pull=amount * state.bend)
+
+    tried = [(shifted, 0.002), (pulled, 0.05), (shifted, -0.001)]
+    alone = [displaced(physics, push, [each])[0] for each in tried]
+    np.testing.assert_allclose(displaced(physics, push, tried), alone, atol=1e-12)
+
+
+@pytest.mark.parametrize("mechanism", [m for m in REFINEMENTS if len(m.parameters) > 1], ids=lambda m: m.name)
+def test_a_refinement_responds_to_each_of_its_parameters(mechanism: Mechanism) -> None:
+    physics, push = physics_of("rect1"), pushes(20)
+    fitted, response = mechanics_of(physics), mechanism.response(physics, push)
+    for k, name in enumerate(mechanism.quantities):
+        size = 0.5 * PARAMETERS_BY_NAME[name].spread
+        more, less = (
+            fitted.displacement(push.inputs, push.duration, push.covariates, {name: np.full(20, end)})
+            for end in (size, -size)
+        )
+        np.testing.assert_allclose(response[:, :, k], (more - less) / (2.0 * size), rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -41,7 +41,7 @@ from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
-from push_predictor.residuals.selection.screening import block_scores, screen
+from push_predictor.residuals.selection.screening import Controlled, screen
 from push_predictor.residuals.selection.term_choice import TermChoice
 
 WINDOWS = 2
@@ -145,7 +145,8 @@ class TestFalseAlarms:
         drivers = [pushed / 40.0, pushed / 40.0 + 0.01 * walk, walk, walk**2, rng.normal(size=40)[pushed]]
         responses = [np.eye(3)[:, :1] * angle[:, None, None], np.eye(3) * (1.0 + angle[:, None, None])]
         columns = [response * driver[:, None, None] for response in responses for driver in drivers]
-        return float(screen([block_scores(z, c, basis, pushed) for c in columns], seed).p_value.min())
+        seen = Controlled.of(z, basis, pushed)
+        return float(screen([seen.unit_scores(c) for c in columns], seed).p_value.min())
 
 
 class TestNoEffect:

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from made_up_traces import pushes
@@ -26,12 +28,14 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.nuisance import Nuisance
+from push_predictor.residuals.evidence import standardised
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.residualizer import sums_by
+from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of, whitened_response
 from push_predictor.residuals.selection.baseline import baseline_of
 from push_predictor.residuals.selection.cross_validation import FOLDS, fit, gains_of
+from push_predictor.residuals.selection.screening import AT_ONCE, Scores, screen
 
 
 @pytest.fixture(scope="module")
@@ -100,3 +104,54 @@ def test_nuisance_columns_are_orthonormal_and_span_the_constant_effects(deployed
         apart = (flat - q @ (q.T @ flat)).reshape(len(columns), -1)
         left = apart - columns @ (columns.T @ apart)
         assert np.linalg.norm(left) < 1e-2 * np.linalg.norm(flat)
+
+
+def block_by_block(values: np.ndarray, rows: list[np.ndarray], hat: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """(1 - H)^-1/2 times the values (n, 3) of each block, with the part H of the hat matrix in its rows."""
+    adjusted = values.copy()
+    for block in rows:
+        part = hat(block)
+        size, vectors = np.linalg.eigh(np.eye(len(part)) - part)
+        root = vectors / np.sqrt(np.maximum(size, SINGULAR)) @ vectors.T
+        adjusted[block] = (root @ values[block].reshape(len(part), -1)).reshape(values[block].shape)
+    return adjusted
+
+
+def test_blocks_of_any_sizes_are_adjusted_each_for_itself() -> None:
+    rng = np.random.default_rng(0)
+    block = np.repeat([4, 1, 0, 9, 2], [3, 1, 3, 2, 20])
+    rows = [np.flatnonzero(block == b) for b in np.unique(block)]
+    residualizer = Residualizer(rng.normal(size=(29, 4)))
+    q, z = residualizer.q, rng.normal(size=(29, 3))
+    found = residualizer.blocks(z, block)
+    expected = block_by_block(residualizer(z), rows, lambda r: q[r] @ q[r].T)
+    np.testing.assert_allclose(found.adjusted, expected, atol=1e-12)
+    columns = np.linalg.qr(rng.normal(size=(87, 5)))[0]
+    there = columns.reshape(29, 3, 5)
+    flat = found.adjusted.ravel()
+    apart = (flat - columns @ (columns.T @ flat)).reshape(29, 3)
+    expected = block_by_block(apart, rows, lambda r: there[r].reshape(-1, 5) @ there[r].reshape(-1, 5).T)
+    np.testing.assert_allclose(found.orthogonal_to(columns).adjusted, expected, atol=1e-12)
+
+
+def test_candidates_are_screened_together_as_each_alone() -> None:
+    rng = np.random.default_rng(1)
+    rows = [rng.normal(size=(40, p)) * rng.uniform(0.1, 3.0, p) for p in rng.integers(0, 6, AT_ONCE + 9)]
+    scores = [Scores(each, each.sum(axis=0)) for each in rows]
+    together, alone = screen(scores, 3), [screen([score], 3) for score in scores]
+    np.testing.assert_allclose(together.statistic, [float(each.statistic[0]) for each in alone], rtol=1e-12)
+    largest = np.max([each.largest for each in alone], axis=0)
+    np.testing.assert_allclose(together.largest, largest, rtol=1e-9)
+    exceeded = np.mean(np.append(largest, np.inf) >= together.statistic[:, None], axis=1)
+    np.testing.assert_allclose(together.p_value, exceeded, rtol=1e-12)
+
+
+def test_responses_are_computed_once_for_the_same_windows(deployed: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    evidence, computed = evidence_of(deployed, pushes(20, 2)), []
+    known = standardised.mechanism_named
+    monkeypatch.setattr(standardised, "mechanism_named", lambda name: computed.append(name) or known(name))
+    both = [whitened_response(evidence, name) for name in ("pusher_travel", "contact_friction") * 2]
+    assert computed == ["pusher_travel", "contact_friction"]
+    assert both[0] is both[2] and both[1] is both[3]
+    some = whitened_response(evidence.take(np.arange(5)), "pusher_travel")
+    np.testing.assert_allclose(some, both[0][:5], atol=1e-9)

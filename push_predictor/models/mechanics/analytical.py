@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -66,9 +67,23 @@ class AnalyticalPush:
         (docs/reference/push.md); duration (n,) in s. The pusher's centre runs straight at constant velocity. Where the
         pusher slides off, the slider stays. Raises RequestError for a value that is not finite or goes back.
         """
-        velocity, contact, angle = np.asarray(inputs, dtype=np.float64).T
-        _check_request(velocity, contact, angle, np.asarray(duration, dtype=np.float64))
+        _check_request(inputs, duration)
         return self.mechanics.displacement({"contact_friction": self.contact_friction}, inputs, duration)
+
+    def displacements(self, others: Sequence[AnalyticalPush], inputs: Array, duration: Array) -> Array:
+        """Displacements (k, n, 3) by k models with other frictions and supports, computed as one set of pushes.
+
+        Raises RequestError as `displacement` does.
+        """
+        _check_request(inputs, duration)
+        k, n = len(others), len(inputs)
+        every = np.tile(inputs, (k, 1)), np.tile(duration, k)
+        centre = np.array([other.support.centre for other in others]) - self.support.centre
+        spread = np.log([other.support.length / self.support.length for other in others])
+        given = {"centre_x": centre[:, 0], "centre_y": centre[:, 1], "pressure_spread": spread}
+        given["contact_friction"] = np.array([other.contact_friction for other in others])
+        values = {name: np.repeat(value, n) for name, value in given.items()}
+        return self.mechanics.displacement(values, *every).reshape(k, n, 3)
 
     @property
     def mechanics(self) -> PushMechanics:
@@ -110,7 +125,8 @@ def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcom
     return _with(model, estimate)
 
 
-def _check_request(velocity: Array, contact: Array, angle: Array, duration: Array) -> None:
+def _check_request(inputs: Array, duration: Array) -> None:
+    (velocity, contact, angle), duration = np.asarray(inputs, np.float64).T, np.asarray(duration, np.float64)
     for name, values in (("contact", contact), ("angle", angle), ("velocity", velocity), ("duration", duration)):
         wrong = ~np.isfinite(values) | (name in ("velocity", "duration")) & (values < 0.0)
         if np.any(wrong):

@@ -16,9 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite
+
+import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.analytical import AnalyticalPush
@@ -41,6 +44,12 @@ class ScalarAnalyticalPush(AnalyticalPush):
         if not 0 < len(inputs) <= FEW or not _valid(inputs, duration):
             return super().displacement(inputs, duration)  # raises the error
         return self._scalar.displacement(inputs, duration)
+
+    def displacements(self, others: Sequence[AnalyticalPush], inputs: Array, duration: Array) -> Array:
+        """See AnalyticalPush."""
+        if len(inputs) > FEW:
+            return super().displacements(others, inputs, duration)
+        return np.stack([other.displacement(inputs, duration) for other in others])
 
     @cached_property
     def _scalar(self) -> ScalarMechanics:

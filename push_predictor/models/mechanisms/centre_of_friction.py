@@ -30,13 +30,13 @@ STEP = 0.002  # m
 def response(physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per metre along the body's x and y, (n, 3, 2)."""
 
-    def displaced(x: float, y: float) -> Array:
+    def displaced(x: float, y: float) -> AnalyticalPush:
         centre = (physics.support.centre[0] + x, physics.support.centre[1] + y)
-        moved = replace(physics, support=replace(physics.support, centre=centre))
-        return moved.displacement(push.inputs, push.duration)
+        return replace(physics, support=replace(physics.support, centre=centre))
 
-    columns = [displaced(x, y) - displaced(-x, -y) for x, y in ((STEP, 0.0), (0.0, STEP))]
-    return np.stack(columns, axis=2) / (2.0 * STEP)
+    ends = [displaced(sign * x, sign * y) for x, y in ((STEP, 0.0), (0.0, STEP)) for sign in (1.0, -1.0)]
+    moved = physics.displacements(ends, push.inputs, push.duration)
+    return np.moveaxis(moved[0::2] - moved[1::2], 0, 2) / (2.0 * STEP)
 
 
 CENTRE_OF_FRICTION = Mechanism(

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
@@ -29,8 +31,9 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per unit of the coefficient, (n, 3, 1): zero where the contact sticks."""
     low = max(physics.contact_friction - STEP, 0.0)
     high = physics.contact_friction + STEP
-    more, less = (replace(physics, contact_friction=mu).displacement(push.inputs, push.duration) for mu in (high, low))
-    return ((more - less) / (high - low))[:, :, None]
+    ends = [replace(physics, contact_friction=mu) for mu in (high, low)]
+    more, less = physics.displacements(ends, push.inputs, push.duration)
+    return np.asarray(((more - less) / (high - low))[:, :, None])
 
 
 CONTACT_FRICTION = Mechanism(

@@ -79,25 +79,41 @@ def no_change(n: int) -> Change:
 
 def response_to(changes: Sequence[ChangeOf], step: float, physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per unit of each change (n, 3, p), by central differences: change(state, amount), amount +- step."""
-    columns = [displaced(physics, push, c, step) - displaced(physics, push, c, -step) for c in changes]
-    return np.stack(columns, axis=2) / (2.0 * step)
+    moved = displaced(physics, push, [(change, amount) for change in changes for amount in (step, -step)])
+    return np.moveaxis(moved[0::2] - moved[1::2], 0, 2) / (2.0 * step)
 
 
-def displaced(physics: AnalyticalPush, push: Push, change: ChangeOf, amount: float) -> Array:
-    """Displacement (n, 3) in the push frame, as AnalyticalPush.displacement gives it without a change."""
-    velocity, contact, angle = push.inputs.T
+def displaced(physics: AnalyticalPush, push: Push, tried: Sequence[tuple[ChangeOf, float]]) -> Array:
+    """Displacements (k, n, 3) in the push frame under each of k changes by an amount, computed as one set of pushes.
+
+    Without a change, as AnalyticalPush.displacement gives it.
+    """
+    k, n = len(tried), len(push.inputs)
+
+    def together(state: State) -> Change:
+        states = (State(*(values[i * n : (i + 1) * n] for values in vars(state).values())) for i in range(k))
+        each = [change(part, amount) for part, (change, amount) in zip(states, tried, strict=True)]
+        return Change(*(np.concatenate(values) for values in zip(*(vars(one).values() for one in each), strict=True)))
+
+    moved = _swept(physics, np.tile(push.inputs, (k, 1)), np.tile(push.duration, k), together)
+    return moved.reshape(k, n, 3)
+
+
+def _swept(physics: AnalyticalPush, inputs: Array, duration: Array, change: Callable[[State], Change]) -> Array:
+    """Displacement (n, 3) with what differs at a state."""
+    velocity, contact, angle = inputs.T
     normal = physics.outline.inward_normal(contact)
     ahead = rotate(normal, angle)
     start = physics.outline.point(contact) - physics.pusher_radius * normal
-    path_length = velocity * push.duration
+    path_length = velocity * duration
     steps = max(FEWEST_STEPS, int(np.ceil(np.max(path_length, initial=0.0) / LONGEST_STEP)))
     step = path_length / steps
     pose = np.zeros((len(path_length), 3))
     for k in range(steps):
         begin, middle = (start + ((k + share) * step)[:, None] * ahead for share in (0.0, 0.5))
         half = 0.5 * step[:, None]
-        base, first = _rates(physics, pose, begin, ahead, change, amount)
-        _, second = _rates(physics, pose + half * first, middle, ahead, change, amount, before=(base, half))
+        base, first = _rates(physics, pose, begin, ahead, change)
+        _, second = _rates(physics, pose + half * first, middle, ahead, change, before=(base, half))
         pose = pose + step[:, None] * second
     heading = np.arctan2(ahead[:, 1], ahead[:, 0])
     return np.column_stack([rotate(pose[:, :2], -heading), pose[:, 2]])
@@ -118,8 +134,7 @@ def _rates(
     pose: Array,
     tip: Array,
     ahead: Array,
-    change: ChangeOf,
-    amount: float,
+    change: Callable[[State], Change],
     before: tuple[Array, Array] | None = None,
 ) -> tuple[Array, Array]:
     """Change of the pose (n, 3) per metre of the tip's path, by the base model and with the change.
@@ -133,7 +148,7 @@ def _rates(
     twist, load, slip = _solve(physics, touch, no_change(len(turn)))
     base = _in_first_frame(twist, turn)
     bend = np.zeros_like(base) if before is None else (base - before[0]) / np.maximum(before[1], np.finfo(float).tiny)
-    differs = change(State(turn, load, slip, bend), amount)
+    differs = change(State(turn, load, slip, bend))
     return base, _in_first_frame(_solve(physics, touch, differs)[0], turn)
 
 

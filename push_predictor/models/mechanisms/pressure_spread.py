@@ -29,12 +29,10 @@ STEP = 0.05  # of the logarithm
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per unit of the logarithm of c, (n, 3, 1)."""
-
-    def displaced(step: float) -> Array:
-        support = replace(physics.support, length=physics.support.length * float(np.exp(step)))
-        return replace(physics, support=support).displacement(push.inputs, push.duration)
-
-    return ((displaced(STEP) - displaced(-STEP)) / (2.0 * STEP))[:, :, None]
+    supports = (replace(physics.support, length=physics.support.length * float(np.exp(s))) for s in (STEP, -STEP))
+    ends = [replace(physics, support=support) for support in supports]
+    more, less = physics.displacements(ends, push.inputs, push.duration)
+    return np.asarray(((more - less) / (2.0 * STEP))[:, :, None])
 
 
 PRESSURE_SPREAD = Mechanism(

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
@@ -25,8 +27,9 @@ STEP = 0.02  # of the path length
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per unit of the relative change of the pusher's path length, (n, 3, 1)."""
-    more, less = (physics.displacement(push.inputs, share * push.duration) for share in (1.0 + STEP, 1.0 - STEP))
-    return ((more - less) / (2.0 * STEP))[:, :, None]
+    duration = np.concatenate([share * push.duration for share in (1.0 + STEP, 1.0 - STEP)])
+    more, less = np.split(physics.displacement(np.tile(push.inputs, (2, 1)), duration), 2)
+    return np.asarray(((more - less) / (2.0 * STEP))[:, :, None])
 
 
 PUSHER_TRAVEL = Mechanism(

@@ -30,8 +30,9 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.motion import body_velocity, motion_of
 from push_predictor.recordings.checks.outline.causes import frames_apart
 from push_predictor.recordings.checks.outline.findings import FEWEST_PUSHES, fit_rig, outline_findings, unchecked
-from push_predictor.recordings.checks.outline.fit import Contacts, OutlineFit
+from push_predictor.recordings.checks.outline.fit import OutlineFit
 from push_predictor.recordings.checks.outline.mirrors import MIRRORS, reflected
+from push_predictor.recordings.checks.outline.touches import Contacts
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions

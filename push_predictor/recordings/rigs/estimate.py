@@ -28,18 +28,8 @@ from push_predictor.recordings.checks.frames import contacts_of
 from push_predictor.recordings.checks.outline.causes import Cause, cause_of, is_separate
 from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
 from push_predictor.recordings.checks.outline.findings import fit_rig, value_of
-from push_predictor.recordings.checks.outline.fit import (
-    LAG,
-    SIZE,
-    TIP,
-    WEAK,
-    YAW,
-    OutlineFit,
-    X,
-    Y,
-    fit_outline_and,
-    fit_tip,
-)
+from push_predictor.recordings.checks.outline.fit import WEAK, OutlineFit, fit_outline_and, fit_tip
+from push_predictor.recordings.checks.outline.touches import LAG, SIZE, TIP, YAW, X, Y
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 

@@ -46,8 +46,10 @@ class Residualizer:
         adjusted = residual.copy() if noise is None else self(noise)
         if self.q.shape[1]:
             for rows in _rows_of(block):
-                values, vectors = np.linalg.eigh(np.eye(len(rows)) - self.q[rows] @ self.q[rows].T)
-                adjusted[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ adjusted[rows])
+                own = self.q[rows]  # (b, k, m)
+                values, vectors = np.linalg.eigh(np.eye(rows.shape[1]) - own @ own.transpose(0, 2, 1))
+                scaled = vectors / np.sqrt(np.maximum(values, SINGULAR))[:, None, :]
+                adjusted[rows] = scaled @ (vectors.transpose(0, 2, 1) @ adjusted[rows])
         return ResidualBlocks(residual, adjusted, block)
 
 
@@ -71,16 +73,20 @@ class ResidualBlocks:
         residual, adjusted = (part.reshape(self.residual.shape) for part in parts)
         rows_of = columns.reshape(*self.residual.shape, -1)
         for rows in _rows_of(self.block):
-            there = rows_of[rows].reshape(-1, columns.shape[1])
-            adjusted[rows] = _unshrunk(there, adjusted[rows].ravel()).reshape(len(rows), -1)
+            there = rows_of[rows].reshape(len(rows), -1, columns.shape[1])
+            adjusted[rows] = _unshrunk(there, adjusted[rows].reshape(len(rows), -1)).reshape(*rows.shape, -1)
         return ResidualBlocks(residual, adjusted, self.block)
 
 
 def _unshrunk(columns: Array, values: Array) -> Array:
-    """(1 - H)^-1/2 times values (k,), H the part of the hat matrix in a block; columns (k, q) orthonormal over all."""
+    """(1 - H)^-1/2 times values (b, k), H the part of the hat matrix in a block.
+
+    columns (b, k, q): those of each of b blocks, orthonormal over all.
+    """
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
     factor = 1.0 / np.sqrt(np.maximum(1.0 - size**2, SINGULAR)) - 1.0
-    return np.asarray(values + left @ (factor * (left.T @ values)))
+    inside = left.transpose(0, 2, 1) @ values[:, :, None]
+    return np.asarray(values + (left @ (factor[:, :, None] * inside))[:, :, 0])
 
 
 def sums_by(block: IntArray, values: Array) -> Array:
@@ -90,8 +96,11 @@ def sums_by(block: IntArray, values: Array) -> Array:
 
 
 def _rows_of(block: IntArray) -> list[IntArray]:
+    """Rows (b, k) of the blocks of k rows, for each k: equal blocks are computed together."""
     order = np.argsort(block, kind="stable")
-    return np.split(order, _starts(block[order])[1:])
+    rows = np.split(order, _starts(block[order])[1:])
+    sizes = sorted({len(each) for each in rows})
+    return [np.array([each for each in rows if len(each) == size]) for size in sizes]
 
 
 def _starts(ordered: IntArray) -> IntArray:

@@ -77,6 +77,11 @@ class Evidence:
         return undisturbed(self.mechanics, self.push)
 
     @cached_property
+    def responses(self) -> dict[str | None, Array]:
+        """Those that are known, by mechanism; see whitened_response."""
+        return {}
+
+    @cached_property
     def thinned(self) -> tuple[IntArray, Evidence]:
         """Indices of at most MOST_FITTED windows spread over the session, and their evidence; enough for a fit."""
         rows = np.linspace(0, len(self.table) - 1, min(MOST_FITTED, len(self.table))).astype(np.int64)
@@ -140,6 +145,12 @@ def whitener_of(covariance: Array) -> Array:
 
 def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
     """Standardised outcome per unit of a mechanism's parameters (n, 3, p); None is the generic polynomial."""
+    if mechanism not in evidence.responses:
+        evidence.responses[mechanism] = _whitened_response(evidence, mechanism)
+    return evidence.responses[mechanism]
+
+
+def _whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
     physics, push = evidence.physics, evidence.push
     response = (
         generic_responses(physics, push, evidence_scale(evidence))

@@ -117,18 +117,12 @@ class Baseline:
         return {}
 
     def _response(self, mechanism: str | None) -> Array:
-        if mechanism not in self._responses:
-            self._responses[mechanism] = whitened_response(self.evidence, mechanism)
-        return self._responses[mechanism]
+        return whitened_response(self.evidence, mechanism)
 
     @cached_property
     def _nuisance(self) -> Nuisance:
         mechanisms = [name for name in usable(self.evidence) if name is not None]
         return Nuisance(self.evidence, self.inputs, mechanisms, self._response)
-
-    @cached_property
-    def _responses(self) -> dict[str | None, Array]:
-        return {}
 
 
 def baseline_of(model: PushModel, mechanics: Mechanics, inputs: Array | None = None) -> Baseline:

@@ -30,7 +30,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.drivers import CATEGORIES, PLACE, standard_basis, two_dimensional
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.selection.cross_validation import Judged, gains_of
+from push_predictor.residuals.selection.cross_validation import HeldOutGains, Judged
 from push_predictor.types import Array, IntArray
 
 MOST_PLACES = 60  # that are tried near the best of these
@@ -46,11 +46,11 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
     A step is then moved to the place between two windows, near the one that was tried, where it gains most.
     """
     residualizer = Residualizer(controls)
-    residual = residualizer(z)
+    gains = HeldOutGains.of(residualizer(z), block)
 
     def judged(basis: DriverBasis) -> Judged:
         tried = with_basis(candidate, basis, table)
-        return Judged(tried, gains_of(residual, residualizer(tried.columns), block))
+        return Judged(tried, gains.of_columns(residualizer(tried.columns)))
 
     chosen = simplest([judged(basis) for basis in bases_for(candidate, table)])
     return _moved(chosen, table.covariates[candidate.covariate], judged) if _is_step(chosen) else chosen
@@ -66,10 +66,11 @@ def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray
     values = table.covariates[name]
     growing = [standard_basis(kind, name, values) for kind in ("linear", "logarithmic")]
     growing[0] = replace(growing[0], centre=(float(values.min()),))
+    gains = HeldOutGains.of(z, block)
 
     def judged(basis: DriverBasis) -> Judged:
         tried = with_basis(candidate, basis, table)
-        return Judged(tried, gains_of(z, tried.columns, block))
+        return Judged(tried, gains.of_columns(tried.columns))
 
     steps = [judged(DriverBasis("step", (name,), place=place)) for place in step_places(values)]
     step = _moved(max(steps, key=_gain), values, judged)

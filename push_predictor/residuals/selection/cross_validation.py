@@ -30,7 +30,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import ExactFit
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.selection.screening import TINY
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5
 
@@ -61,7 +61,8 @@ def judge(candidates: Sequence[Candidate], z: Array, controls: Array, block: Int
     """Candidates with their gains on residuals z (n, 3), best first; the controls (n, m) are regressed out of both."""
     residualizer = Residualizer(controls)
     residual = residualizer(z)
-    judged = [Judged(c, gains_of(residual, residualizer(c.columns), block)) for c in candidates]
+    gains = HeldOutGains.of(residual, block)
+    judged = [Judged(c, gains.of_columns(residualizer(c.columns))) for c in candidates]
     return sorted(judged, key=lambda j: -j.gain)
 
 
@@ -90,34 +91,62 @@ def log_gains(before: Array, after: Array, block: IntArray) -> Array:
 
 
 def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:
-    """Gain per block: log density of the residuals after minus before, each output with its own variance.
+    """Gain per block: log density of the residuals after minus before, each output with its own variance."""
+    return HeldOutGains.of(residual, block).of_columns(flat)
 
-    A fold's fit needs only sums over the other folds: these are those over all rows without the fold's own.
+
+@dataclass(frozen=True, eq=False)
+class HeldOutGains:
+    """Gains of columns on residuals (n, 3): what is the same for all columns is computed once.
+
+    block (n,): of each row; numbers: of the blocks, ascending. fold (n,): number among the folds that are used; used
+    (f, b): the blocks that a fold's fit is made of. before (n,): log density of the residuals, with the variance of the
+    other folds.
     """
-    every, of_block = folds_of(block), folds_of(np.unique(block))
-    used, fold = np.unique(every, return_inverse=True)
-    if len(used) < 2:
-        return np.zeros(len(of_block))
-    scores, own = _scores(flat, residual, block), [_information(flat[fold == k]) for k in range(len(used))]
-    total = np.sum(own, axis=0)
-    fits = [_coefficients(scores[of_block != k], total - part, shrunk=True) for k, part in zip(used, own, strict=True)]
-    after = residual - np.stack([_fitted(flat, coefficients) for coefficients in fits])  # (folds, n, 3)
-    rest = (fold != np.arange(len(used))[:, None]).astype(np.float64)
-    rest /= rest.sum(axis=1, keepdims=True)
-    old, new = rest @ residual**2, np.stack([mean @ square for mean, square in zip(rest, after**2, strict=True)])
-    held_out = after[fold, np.arange(len(fold))]
-    gains = _log_density(held_out, new[fold]) - _log_density(residual, old[fold])
-    return sums_by(block, gains[:, None])[:, 0]
+
+    residual: Array
+    block: IntArray
+    fold: IntArray
+    used: BoolArray
+    before: Array
+
+    @staticmethod
+    def of(residual: Array, block: IntArray) -> HeldOutGains:
+        """Folds of the blocks, which take turns."""
+        numbers, fold = np.unique(folds_of(block), return_inverse=True)
+        used = folds_of(np.unique(block)) != numbers[:, None]
+        if len(numbers) < 2:
+            return HeldOutGains(residual, block, fold, used, np.zeros(len(residual)))
+        variance = _of_others(np.sum(residual**2, axis=0), residual, fold, len(numbers))
+        return HeldOutGains(residual, block, fold, used, _log_density(residual, variance[fold]))
+
+    def of_columns(self, flat: Array) -> Array:
+        """Gain (b,) per block of columns (n, 3, p): fitted on the other folds, the log density after minus before.
+
+        A fold's fit needs only sums over the other folds: these are those over all rows without the fold's own.
+        """
+        folds, blocks = self.used.shape
+        if folds < 2:
+            return np.zeros(blocks)
+        own = np.stack([_information(flat[self.fold == k]) for k in range(folds)])
+        coefficients = _shrunk(_scores(flat, self.residual, self.block), own.sum(axis=0) - own, self.used)
+        fitted = coefficients @ flat.reshape(-1, flat.shape[2]).T
+        after = self.residual - fitted.reshape(folds, *self.residual.shape)
+        held_out = after[self.fold, np.arange(len(self.fold))]
+        variance = _of_others(np.sum(after**2, axis=1), held_out, self.fold, folds)
+        gains = _log_density(held_out, variance[self.fold]) - self.before
+        return sums_by(self.block, gains[:, None])[:, 0]
+
+
+def _of_others(total: Array, held_out: Array, fold: IntArray, folds: int) -> Array:
+    """Mean squares (f, 3) outside each fold; total (3,) or (f, 3): sums over all rows, held_out (n, 3): those in it."""
+    inside = (fold == np.arange(folds)[:, None]).astype(np.float64)
+    return np.asarray((total - inside @ held_out**2) / (len(fold) - inside.sum(axis=1))[:, None])
 
 
 def _scores(flat: Array, residual: Array, block: IntArray) -> Array:
     """Sums (b, p) over each block of columns (n, 3, p) times residuals (n, 3)."""
     return sums_by(block, np.einsum("nkp,nk->np", flat, residual))
-
-
-def _fitted(flat: Array, coefficients: Array) -> Array:
-    """Sum (n, 3) of columns (n, 3, p) times coefficients (p,)."""
-    return np.asarray(flat.reshape(-1, len(coefficients)) @ coefficients).reshape(len(flat), 3)
 
 
 def _information(flat: Array) -> Array:
@@ -128,19 +157,32 @@ def _information(flat: Array) -> Array:
 
 def _coefficients(scores: Array, information: Array, *, shrunk: bool) -> Array:
     """Coefficients (p,) from the blocks' scores (b, p) and the columns' information (p, p)."""
+    if shrunk:
+        return np.asarray(_shrunk(scores, information[None], np.ones((1, len(scores)), dtype=np.bool_))[0])
+    root = _root(information)
+    return np.asarray(root @ (scores @ root).sum(axis=0))
+
+
+def _shrunk(scores: Array, information: Array, used: BoolArray) -> Array:
+    """Shrunk coefficients (f, p) of f fits, by the scores (b, p) of the blocks that each uses (f, b).
+
+    information (f, p, p). The factor is 1 - noise / (noise + signal), of James and Stein; the noise is the spread of
+    the blocks' scores about their mean.
+    """
+    root, part = _root(information), used[:, :, None].astype(np.float64)
+    each = scores @ root * part
+    estimate = each.sum(axis=1)
+    size, mean = np.sum(estimate**2, axis=1), estimate / part.sum(axis=1)
+    noise = np.sum(((each - mean[:, None, :]) * part) ** 2, axis=(1, 2))
+    factor = np.where(size > 0.0, np.maximum(0.0, 1.0 - noise / np.where(size > 0.0, size, 1.0)), 0.0)
+    return np.asarray((root @ (estimate * factor[:, None])[:, :, None])[:, :, 0])
+
+
+def _root(information: Array) -> Array:
+    """Square root (..., p, p) of the pseudoinverse of information (..., p, p); zero along what is not determined."""
     values, vectors = np.linalg.eigh(information)
-    keep = values > TINY * max(values[-1], np.finfo(float).tiny)
-    root = vectors[:, keep] / np.sqrt(values[keep])
-    each = scores @ root
-    estimate = each.sum(axis=0)
-    return np.asarray(root @ (estimate * (_james_stein(estimate, each) if shrunk else 1.0)))
-
-
-def _james_stein(estimate: Array, each: Array) -> float:
-    """1 - noise / (noise + signal); the noise is the spread of the blocks' scores about their mean."""
-    size = float(estimate @ estimate)
-    noise = float(np.sum((each - each.mean(axis=0)) ** 2))
-    return max(0.0, 1.0 - noise / size) if size > 0.0 else 0.0
+    keep = values > TINY * np.maximum(values[..., -1:], np.finfo(float).tiny)
+    return np.asarray(vectors * np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)[..., None, :])
 
 
 def _log_density(residuals: Array, variance: Array) -> Array:

@@ -33,6 +33,7 @@ from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Resid
 from push_predictor.types import Array, IntArray
 
 DRAWS = 1999
+AT_ONCE = 32  # candidates whose draws are computed together: their table stays small
 TINY = 1e-6  # relative; directions of a candidate that the inputs explain are dropped
 
 
@@ -79,10 +80,14 @@ class Scores:
 def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
     """Screen candidates by their scores, each in coordinates in which its information is the identity."""
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, len(scores[0].rows)))
-    statistic, largest = np.empty(len(scores)), np.full(DRAWS, -np.inf)
-    for k, score in enumerate(scores):
-        statistic[k], drawn = _statistics(score, signs)
-        np.maximum(largest, drawn, out=largest)
+    statistic, largest = np.full(len(scores), -np.inf), np.full(DRAWS, -np.inf)
+    scales = {k: scale for k, score in enumerate(scores) if (scale := moments(score)) is not None}
+    for first in range(0, len(scales), AT_ONCE):
+        part = list(scales)[first : first + AT_ONCE]
+        unit, freedom = np.array([scales[k] for k in part]).T
+        statistic[part] = _normal(np.array([scores[k].total @ scores[k].total for k in part]) / unit, freedom)
+        drawn = _squares_drawn([scores[k].rows for k in part], signs)
+        np.maximum(largest, _normal(drawn / unit, freedom).max(axis=1), out=largest)
     exceeded = np.sum(largest[None, :] >= statistic[:, None], axis=1)
     return Screened(statistic, (1.0 + exceeded) / (1.0 + DRAWS), largest)
 
@@ -128,15 +133,10 @@ def raw_scores(blocks: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
     return Scores(rows, x.T @ blocks.residual.ravel()), x.T @ x
 
 
-def _statistics(score: Scores, signs: Array) -> tuple[float, Array]:
-    """Sum of squares explained as observed, and with the signs of each draw, as standard normal values."""
-    scale = moments(score)
-    if scale is None:
-        return -np.inf, np.full(len(signs), -np.inf)
-    unit, freedom = scale
-    observed = np.array(score.total @ score.total)
-    drawn = np.sum((signs @ score.rows) ** 2, axis=1)
-    return float(_normal(observed / unit, freedom)), _normal(drawn / unit, freedom)
+def _squares_drawn(rows: Sequence[Array], signs: Array) -> Array:
+    """Sums of squares (draws, k) that k candidates explain with the signs of each draw; rows (b, p) of each."""
+    starts = np.cumsum([0, *(each.shape[1] for each in rows[:-1])])
+    return np.asarray(np.add.reduceat((signs @ np.hstack(rows)) ** 2, starts, axis=1))
 
 
 def moments(score: Scores) -> tuple[float, float] | None:
@@ -147,7 +147,7 @@ def moments(score: Scores) -> tuple[float, float] | None:
     return None if variance <= 1e-12 * mean**2 else (variance / (2.0 * mean), 2.0 * mean**2 / variance)
 
 
-def _normal(chi_squared: Array, freedom: float) -> Array:
-    """Nearly standard normal values of a chi-squared variable (Wilson and Hilferty 1931)."""
+def _normal(chi_squared: Array, freedom: Array) -> Array:
+    """Nearly standard normal values of chi-squared variables (..., k), freedom (k,) (Wilson and Hilferty 1931)."""
     spread = 2.0 / (9.0 * freedom)
     return np.asarray((np.cbrt(chi_squared / freedom) - (1.0 - spread)) / np.sqrt(spread))

@@ -20,12 +20,16 @@ slip begins or ends, at a corner, where contact is lost. Half steps do not.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, TOUCHING, RateOf, size_of
 from push_predictor.types import Array, IntArray
 
 OF_TRAVEL_FINELY = 0.01  # of the accuracy: the error of a step that is allowed for the whole travel
+
+Rates: TypeAlias = tuple[Array, Array, Array]  # see RateOf
 
 
 def swept_finely(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Array:
@@ -37,9 +41,8 @@ def swept_finely(rate_of: RateOf, travel: Array, length: Array, accuracy: float)
         first = rate_of(rows, before, at)
         step = np.minimum(longest[rows], travel[rows] - at)
         step = np.where((first[1] >= TOUCHING) & (first[2] > 0.0), np.minimum(step, first[1]), step)
-        coarse = _advance(rate_of, rows, before, at, step, first)
-        middle = _advance(rate_of, rows, before, at, 0.5 * step, first)
         half = at + 0.5 * step
+        coarse, middle = _both(rate_of, rows, before, at, step, first)
         fine = _advance(rate_of, rows, middle, half, 0.5 * step, rate_of(rows, middle, half))
         allowed = accuracy * (size_of(fine - before, length[rows]) + OF_TRAVEL_FINELY * travel[rows])
         agree = size_of(fine - coarse, length[rows]) <= allowed
@@ -50,9 +53,15 @@ def swept_finely(rate_of: RateOf, travel: Array, length: Array, accuracy: float)
     return pose
 
 
-def _advance(
-    rate_of: RateOf, rows: IntArray, pose: Array, done: Array, step: Array, first: tuple[Array, Array, Array]
-) -> Array:
+def _both(rate_of: RateOf, rows: IntArray, pose: Array, done: Array, step: Array, first: Rates) -> tuple[Array, Array]:
+    """Poses (k, 3) after the step and after half of it, computed as one set of pushes."""
+    rate, gap, nearing = (np.concatenate([part, part]) for part in first)
+    pose, done, steps = np.concatenate([pose, pose]), np.concatenate([done, done]), np.concatenate([step, 0.5 * step])
+    after = _advance(rate_of, np.concatenate([rows, rows]), pose, done, steps, (rate, gap, nearing))
+    return after[: len(step)], after[len(step) :]
+
+
+def _advance(rate_of: RateOf, rows: IntArray, pose: Array, done: Array, step: Array, first: Rates) -> Array:
     """Poses (k, 3) after one step (k,) m of the classical Runge-Kutta method; first: the rates where it begins."""
     h, half = step[:, None], done + 0.5 * step
     k2, *_ = rate_of(rows, pose + 0.5 * h * first[0], half)

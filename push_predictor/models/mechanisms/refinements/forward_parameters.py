@@ -40,11 +40,13 @@ def _of(mechanics: Callable[[AnalyticalPush], FittedMechanics], *quantities: str
     def response(physics: AnalyticalPush, push: Push) -> Array:
         fitted, n = mechanics(physics), len(push.inputs)
 
-        def displaced(name: str, step: float) -> Array:
-            return fitted.displacement(push.inputs, push.duration, push.covariates, {name: np.full(n, step)})
-
         steps = {name: STEP * BY_NAME[name].spread for name in quantities}
-        columns = [(displaced(name, step) - displaced(name, -step)) / (2.0 * step) for name, step in steps.items()]
+        ends = [(name, sign * step) for name, step in steps.items() for sign in (1.0, -1.0)]
+        changes = {name: np.repeat([step * (name == own) for own, step in ends], n) for name in quantities}
+        inputs, duration = np.tile(push.inputs, (len(ends), 1)), np.tile(push.duration, len(ends))
+        covariates = {name: np.tile(column, len(ends)) for name, column in push.covariates.items()}
+        moved = fitted.displacement(inputs, duration, covariates, changes).reshape(-1, 2, n, 3)
+        columns = [(more - less) / (2.0 * step) for (more, less), step in zip(moved, steps.values(), strict=True)]
         return np.stack(columns, axis=2)
 
     return response

@@ -24,21 +24,18 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from push_predictor.recordings.checks.outline.fit import (
+from push_predictor.recordings.checks.outline.fit import TIE, OutlineFit, fit_frames, fit_outline_and
+from push_predictor.recordings.checks.outline.touches import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
     SIZE,
     STRETCH,
-    TIE,
     TIP,
     YAW,
     Contacts,
-    OutlineFit,
     X,
     Y,
-    fit_frames,
-    fit_outline_and,
 )
 from push_predictor.recordings.rig import Rig
 

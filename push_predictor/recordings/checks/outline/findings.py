@@ -31,22 +31,19 @@ from push_predictor.recordings.checks.outline.causes import (
     is_shifted,
     is_turned,
 )
-from push_predictor.recordings.checks.outline.fit import (
+from push_predictor.recordings.checks.outline.fit import TIE, OutlineFit, fit_outline, fit_tip
+from push_predictor.recordings.checks.outline.touches import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
     LAG,
     SIZE,
     STRETCH,
-    TIE,
     TIP,
     YAW,
     Contacts,
-    OutlineFit,
     X,
     Y,
-    fit_outline,
-    fit_tip,
 )
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array

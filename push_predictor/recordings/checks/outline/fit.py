@@ -29,13 +29,25 @@ from typing import TypeAlias
 import numpy as np
 from scipy.optimize import least_squares
 
-from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
+from push_predictor.geometry.frames import to_world, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import near_symmetry, stretched, transformed
+from push_predictor.geometry.shapes import near_symmetry, transformed
+from push_predictor.recordings.checks.outline.touches import (
+    FRAME_X,
+    FRAME_Y,
+    FRAME_YAW,
+    LAG,
+    SIZE,
+    TIP,
+    YAW,
+    Contacts,
+    Touches,
+    X,
+    Y,
+)
 from push_predictor.types import Array, BoolArray, IntArray
 
 Gaps: TypeAlias = Callable[[Array], Array]
-YAW, X, Y, SIZE, LAG, TIP, FRAME_YAW, FRAME_X, FRAME_Y, STRETCH = range(10)
 SIMILARITY = (YAW, X, Y, SIZE, LAG)
 FRAMES = (FRAME_YAW, FRAME_X, FRAME_Y)
 MOST_SAMPLES = 1200  # evenly drawn: more change the result by less than its standard deviation
@@ -45,29 +57,12 @@ LARGEST = 0.01  # m; a larger gap counts as this much in the cost
 CORNER = 0.003  # m
 SHORT = 0.3  # of the median number of samples
 DISTURBED = 0.001  # m; the spread from which on world frames are sought that are far apart
+MOST_EVALUATIONS = 40  # of the gaps by a fit
 STARTS = 12  # turns from which the fit begins
 # Prior sd of what the contacts do not determine, in the units of OutlineFit.
 WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3])
 TIE = 1.3  # ratio of the gaps up to which the smallest turn is preferred: an almost symmetric outline has several
 MOST_PUSHES = 0.8  # share of the pushes that lie within `spread`: a push in five may be disturbed
-
-
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """n samples in contact.
-
-    tips (n, 2) m and velocities (n, 2) m/s of the tip in the slider's frame; push (n,): number of the push; poses
-    (n, 3) of the slider in the world frame: x, y (m) and heading (rad).
-    """
-
-    tips: Array
-    velocities: Array
-    push: IntArray
-    poses: Array
-
-    def at(self, rows: IntArray | BoolArray) -> Contacts:
-        """The chosen samples: indices, or a mask (n,)."""
-        return Contacts(self.tips[rows], self.velocities[rows], self.push[rows], self.poses[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,51 +191,47 @@ def _fit(
 ) -> OutlineFit:
     middle = outline.centroid  # a turn about it shifts nothing, so that both are known as well as they can be
     centred = transformed(outline, shift=(-middle[0], -middle[1]))
-    touches = _Touches(contacts, middle)
+    touches = Touches(_drawn(contacts), centred, radius, middle)
     free = np.isin(np.arange(len(WEAK)), parameters)
     free[YAW] &= centred.rotational_symmetry != 0
-
-    def gaps(free_part: Array) -> Array:
-        return touches.project(centred, _full(free, free_part))[0] - radius
-
-    def residuals(free_part: Array) -> Array:
-        return np.concatenate([gaps(free_part) / NOISE, free_part / WEAK[free]])
-
-    tried = starts(near_symmetry(centred), lambda full: residuals(full[free]))
-    part = _best([_refined(residuals, start[free]) for start in tried], gaps)
-    estimate, sd = _full(free, part), _full(free, _deviation(gaps, part, touches.push, WEAK[free]))
-    left, contact = touches.project(centred, estimate)
-    push_gaps, places = _by_push(touches.push, left - radius, contact)
+    problem = _Problem(touches, free)
+    tried = starts(near_symmetry(centred), lambda full: problem.residuals(full[free]))
+    part = _best([_refined(problem, start[free]) for start in tried], problem.gaps)
+    estimate, sd = _full(free, part), _full(free, _deviation(problem, part))
+    gaps = touches.gaps(estimate)
+    push_gaps, places = _by_push(touches.push, gaps, touches.placed(estimate).nearest.contact)
     if turns := centred.rotational_symmetry:
         estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
-    gap = float(np.median(np.abs(left - radius)))
     samples = np.unique(touches.push, return_counts=True)[1]
-    return OutlineFit(estimate, sd, gap, _cost(gaps, part), push_gaps, places, samples, touches.centre)
+    gap, cost = float(np.median(np.abs(gaps))), _cost(problem.gaps, part)
+    return OutlineFit(estimate, sd, gap, cost, push_gaps, places, samples, touches.centre)
 
 
-class _Touches:
-    """Evenly drawn contacts, and their distances from a corrected outline whose centroid is the origin."""
+def _drawn(contacts: Contacts) -> Contacts:
+    """Evenly drawn contacts, at most MOST_SAMPLES."""
+    return contacts.at(np.unique(np.linspace(0, len(contacts.tips) - 1, MOST_SAMPLES).astype(np.int64)))
 
-    def __init__(self, contacts: Contacts, middle: Array) -> None:
-        drawn = contacts.at(np.unique(np.linspace(0, len(contacts.tips) - 1, MOST_SAMPLES).astype(np.int64)))
-        self.push, self._drawn, self._middle = drawn.push, drawn, middle
-        self._world = to_world(drawn.tips, drawn.poses)
-        self.centre = np.asarray(self._world.mean(axis=0))
 
-    def project(self, outline: Outline, correction: Array) -> tuple[Array, Array]:
-        """Distances (n,) of the tips' centres, less the correction of the radius, and contacts (n,)."""
-        yaw, x, y, growth, lag, thicker, *frame, stretch = correction.tolist()
-        size = 1.0 + max(growth, -0.9)
-        own = rotate(self._tips(*frame) - self._middle - lag * self._drawn.velocities - [x, y], np.array(-yaw)) / size
-        found = stretched(outline, stretch).project(own)
-        return size * found.distance - thicker, found.contact
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Gaps (n,) m by the free parameters, part (p,); the residuals are gaps and parameters in units of their scale."""
 
-    def _tips(self, yaw: float, x: float, y: float) -> Array:
-        """The tips in the slider's frame, after a turn about the centre and a shift in the world frame."""
-        if yaw == x == y == 0.0:
-            return self._drawn.tips
-        turned = self.centre + rotate(self._world - self.centre, np.array(yaw)) + [x, y]
-        return to_body(turned, self._drawn.poses)
+    touches: Touches
+    free: BoolArray
+
+    def gaps(self, part: Array) -> Array:
+        return self.touches.gaps(_full(self.free, part))
+
+    def slopes(self, part: Array) -> Array:
+        """Derivatives (n, p) of the gaps."""
+        return self.touches.slopes(_full(self.free, part))[:, self.free]
+
+    def residuals(self, part: Array) -> Array:
+        return np.concatenate([self.gaps(part) / NOISE, part / WEAK[self.free]])
+
+    def jacobian(self, part: Array) -> Array:
+        """Derivatives (n + p, p) of the residuals."""
+        return np.vstack([self.slopes(part) / NOISE, np.diag(1.0 / WEAK[self.free])])
 
 
 def _full(free: BoolArray, part: Array) -> Array:
@@ -273,19 +264,20 @@ def _starts(turns: int, residuals: Gaps) -> list[Array]:
     return [start[0], *start[1:][np.argsort(cost)[:2]]]
 
 
-def _refined(residuals: Gaps, start: Array) -> Array:
-    return np.asarray(least_squares(residuals, start, loss="soft_l1", x_scale=0.01, max_nfev=40).x)
+def _refined(problem: _Problem, start: Array) -> Array:
+    found = least_squares(
+        problem.residuals, start, jac=problem.jacobian, loss="soft_l1", x_scale=0.01, max_nfev=MOST_EVALUATIONS
+    )
+    return np.asarray(found.x)
 
 
 def _cost(gaps: Gaps, part: Array) -> float:
     return float(np.mean(np.minimum(np.abs(gaps(part)), LARGEST)))
 
 
-def _deviation(gaps: Gaps, part: Array, push: IntArray, weak: Array) -> Array:
+def _deviation(problem: _Problem, part: Array) -> Array:
     """Standard deviations by the sandwich formula with pushes as clusters, and the prior where data are lacking."""
-    gap = gaps(part)
-    steps = 1e-5 * np.eye(len(part))
-    slope = np.column_stack([(gaps(part + step) - gaps(part - step)) / 2e-5 for step in steps])
+    gap, slope, push, weak = problem.gaps(part), problem.slopes(part), problem.touches.push, WEAK[problem.free]
     weight = 1.0 / np.sqrt(1.0 + (gap / NOISE) ** 2)
     noise = max(float(np.median(np.abs(gap))) * 1.5, 1e-5)
     bread = np.linalg.inv(slope.T @ (weight[:, None] * slope) + np.diag(noise**2 / weak**2))

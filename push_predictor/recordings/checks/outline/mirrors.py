@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, to_world
-from push_predictor.recordings.checks.outline.fit import Contacts
+from push_predictor.recordings.checks.outline.touches import Contacts
 
 RIGHT_HANDED = "Use right-handed frames, seen from above."
 IN_ORDER = "Give x before y, in right-handed frames seen from above."

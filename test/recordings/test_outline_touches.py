@@ -1,0 +1,55 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The derivatives of the gaps between tip and outline are those of the gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from checked_bags import bag, rig_of
+
+from push_predictor.geometry.shapes import transformed
+from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.outline.fit import WEAK
+from push_predictor.recordings.checks.outline.touches import SIZE, SMALLEST, Touches
+
+CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06])
+STEP = 1e-6
+NEAR_CORNERS = 0.02  # share of the tips whose nearest side changes within a step
+
+
+def touches(name: str, turn: float = 0.0) -> Touches:
+    rig, contacts = rig_of(name), contacts_of(bag(name), rig_of(name))
+    assert contacts is not None
+    x, y = rig.outline.centroid
+    return Touches(contacts, transformed(rig.outline, turn, (-x, -y)), rig.pusher_radius, rig.outline.centroid)
+
+
+@pytest.mark.parametrize(
+    ("name", "turn"), [("hexagon_delrin", 0.0), ("ellipse_plywood", 0.0), ("ellipse_plywood", 0.4)]
+)
+def test_slopes_are_the_derivatives_of_the_gaps(name: str, turn: float) -> None:
+    placed, steps = touches(name, turn), STEP * np.eye(len(WEAK))
+    slopes = placed.slopes(CORRECTION)
+    for k, step in enumerate(steps):
+        difference = (placed.gaps(CORRECTION + step) - placed.gaps(CORRECTION - step)) / (2.0 * STEP)
+        assert np.quantile(np.abs(difference - slopes[:, k]), 1.0 - NEAR_CORNERS) < 1e-6
+
+
+def test_a_size_that_no_slider_has_changes_nothing() -> None:
+    placed, tiny, smallest = touches("hexagon_delrin"), np.zeros(len(WEAK)), np.zeros(len(WEAK))
+    tiny[SIZE], smallest[SIZE] = SMALLEST - 0.2, SMALLEST
+    assert not placed.slopes(tiny)[:, SIZE].any()
+    np.testing.assert_array_equal(placed.gaps(tiny), placed.gaps(smallest))
