@@ -43,7 +43,7 @@ _NUGGET_SD = (np.log(1e-3), np.log(3.0))
 _REFUSED = 1e10
 _SEARCH_TOLERANCE = 2e-2  # nats
 _FINAL_TOLERANCE = 1e-4
-_STOP = 1e-4
+_STOP = 0.03  # nats
 
 # Weak Gaussian priors on the logarithms. Without them the bound of 100 rows often peaks at far too confident a
 # noise model, or at a homoscedastic one. The signal stays near the homoscedastic fit, the noise varies by a
