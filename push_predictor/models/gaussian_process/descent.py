@@ -21,10 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from push_predictor.types import Array, IntArray
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Cost = Callable[[Array], tuple[float, Array]]
 
@@ -38,11 +42,15 @@ class Minimum:
 
     point: Array
     width: Array
+    cost: float
 
 
 @dataclass(frozen=True)
 class Descent:
-    """A bounded minimisation: box (D, 2) of the variables, most iterations, relative decrease at which it ends."""
+    """A bounded minimisation: box (D, 2) of the variables, most iterations, decrease in one of them at which it ends.
+
+    stop: of a cost in nats.
+    """
 
     box: Array
     most_iterations: int
@@ -52,9 +60,18 @@ class Descent:
         """The local minimum reached from a point of the box."""
         from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
 
-        options = {"maxiter": self.most_iterations, "ftol": self.stop}
-        found = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options)
-        return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())))
+        lowest = [np.inf]
+
+        def end_of_iteration(intermediate_result: OptimizeResult) -> None:
+            before, lowest[0] = lowest[0], float(intermediate_result.fun)
+            if before - lowest[0] < self.stop:
+                raise StopIteration
+
+        options = {"maxiter": self.most_iterations, "ftol": 0.0}
+        found = minimize(
+            cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options, callback=end_of_iteration
+        )
+        return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())), float(found.fun))
 
     def refine(self, cost: Cost, rough: Minimum) -> Minimum:
         """The local minimum reached from that of a third of the rows, in units that suit the first steps."""
@@ -65,7 +82,7 @@ class Descent:
             return value, gradient * unit
 
         found = Descent(self.box / unit[:, None], self.most_iterations, self.stop).run(scaled, rough.point / unit)
-        return Minimum(found.point * unit, found.width * unit)
+        return Minimum(found.point * unit, found.width * unit, found.cost)
 
 
 def part_of_rows(n: int) -> IntArray | None:

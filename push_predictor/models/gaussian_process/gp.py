@@ -23,7 +23,7 @@ import scipy
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.cross_validation import held_out_errors
-from push_predictor.models.gaussian_process.descent import Cost, Descent, part_of_rows
+from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum, part_of_rows
 from push_predictor.models.gaussian_process.kernels import (
     DEFAULT_CHOICE,
     ArdKernel,
@@ -43,7 +43,8 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
-_STOP = 1e-8
+_STOP = 1e-3  # nats
+_ROUGH_STOP = 0.05  # nats, of the descents that are compared
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 
@@ -133,29 +134,26 @@ def fit_gp(
     check_rows(inputs, outputs)
     d = inputs.shape[1]
     box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    descent = Descent(box, most_iterations, _STOP)
-    first = _first(inputs, outputs, choice.family, descent)
-    # On all rows from the start: likelihoods have several maxima, and a subset of rows may lead to another one.
-    found = descent.run(_cost(inputs, outputs, choice.family), first)
+    rough = _rough(inputs, outputs, choice.family, Descent(box, most_iterations, _ROUGH_STOP))
+    found = Descent(box, most_iterations, _STOP).refine(_cost(inputs, outputs, choice.family), rough)
     return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
 
 
-def _first(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Array:
-    """Where to begin: at unit lengthscales, or with one of them short if a subset of rows clearly favours it.
+def _rough(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Minimum:
+    """A minimum of part of the rows, from unit lengthscales, or with one of them short if that is clearly better.
 
     On a polygon the outcome jumps from side to side. From a long lengthscale the search may take the jumps for noise.
     """
-    d = inputs.shape[1]
+    d, rows = inputs.shape[1], part_of_rows(len(outputs))
     usual = np.append(np.zeros(d + 1), np.log(0.3))
-    if len(outputs) < _FEWEST_FOR_SHORT:
-        return usual
-    rows = part_of_rows(len(outputs))
     part = slice(None) if rows is None else rows
     cost = _cost(inputs[part], outputs[part], family)
-    short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)]
-    reached = [cost(descent.run(cost, start).point)[0] for start in (usual, *short)]
-    best = int(np.argmin(reached))
-    return usual if best == 0 or reached[best] > reached[0] - _SURELY else short[best - 1]
+    if len(outputs) < _FEWEST_FOR_SHORT:
+        return descent.run(cost, usual)
+    reached = [descent.run(cost, usual)]
+    reached += [descent.run(cost, usual + _SHORT * np.eye(d + 2)[k]) for k in range(d)]
+    best = min(reached, key=lambda minimum: minimum.cost)
+    return best if best.cost < reached[0].cost - _SURELY else reached[0]
 
 
 def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:
@@ -169,8 +167,8 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
     alpha = ridge.residual(outputs / noise)
     constant = len(outputs) * np.log(2.0 * np.pi * noise)
     value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
-    weights = ridge.precision()
-    scipy.linalg.blas.dger(-1.0, alpha, alpha, a=weights.T, overwrite_a=1)
+    weights = ridge.upper_precision()
+    scipy.linalg.blas.dsyr(-1.0, alpha, lower=1, a=weights.T, overwrite_a=1)
     of_noise = -noise * np.trace(weights)
     return value, np.append(-0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
 

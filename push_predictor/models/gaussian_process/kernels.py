@@ -25,15 +25,13 @@ with all of them at once.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.triangles import BLOCK, mirror_upper, upper_blocks
 from push_predictor.types import Array
-
-_BLOCK = 64
 
 KernelFamily = Literal["squared_exponential", "matern52"]
 
@@ -66,7 +64,11 @@ class ArdKernel(ABC):
 
     def matrix(self, inputs: Array) -> Array:
         """Kernel between all rows of inputs (n, D), shape (n, n), exactly symmetric."""
-        return self.cross(inputs, inputs)
+        z = self._scaled(inputs)
+        kernel = np.empty((len(z), len(z)))
+        for rows, columns in upper_blocks(len(z)):
+            kernel[rows, columns] = self._values(_exponents(z[rows], z[columns]))
+        return mirror_upper(kernel)
 
     def cross(self, left: Array, right: Array) -> Array:
         """Kernel between the rows of left (n, D) and right (m, D), shape (n, m)."""
@@ -74,24 +76,22 @@ class ArdKernel(ABC):
         if len(a) == 1:
             return self._values(-0.5 * ((a - b) ** 2).sum(axis=1)[None, :])
         kernel = np.empty((len(a), len(b)))
-        for rows, exponents in _exponents(a, b):
-            kernel[rows] = self._values(exponents)
+        for start in range(0, len(a), BLOCK):
+            kernel[start : start + BLOCK] = self._values(_exponents(a[start : start + BLOCK], b))
         return kernel
 
     def gradient(self, inputs: Array, matrix: Array, weights: Array) -> Array:
         """sum_ij weights_ij d matrix_ij / d(log_lengthscales, log_sd), shape (D + 1,).
 
-        inputs (n, D); matrix is `self.matrix(inputs)`; weights (n, n) symmetric.
+        inputs (n, D); matrix is `self.matrix(inputs)`; weights (n, n) symmetric, of which the upper triangle is read.
         """
         z = self._scaled(inputs)
         of_lengthscales, of_sd = np.zeros(z.shape[1]), 0.0
-        for rows, exponents in _exponents(z, z):
-            contracted = weights[rows] * matrix[rows]
-            of_sd += 2.0 * float(contracted.sum())
-            contracted = self._sloped(contracted, weights[rows], exponents)
-            # sum_ij G_ij (z_i - z_j)^2 = 2 sum_ij G_ij (z_i^2 - z_i z_j) for a symmetric G
-            square = contracted.sum(axis=1) @ (z[rows] * z[rows])
-            of_lengthscales += 2.0 * (square - (z[rows] * (contracted @ z)).sum(axis=0))
+        for rows, columns in upper_blocks(len(z)):
+            contracted = weights[rows, columns] * matrix[rows, columns]
+            _count_once(contracted)
+            of_sd += 4.0 * float(contracted.sum())
+            of_lengthscales += 2.0 * _spread(self._sloped(contracted, z[rows], z[columns]), z[rows], z[columns])
         return np.append(of_lengthscales, of_sd)
 
     def _scaled(self, inputs: Array) -> Array:
@@ -107,8 +107,11 @@ class ArdKernel(ABC):
         """The kernel at exponents -r^2 / 2, whose memory it may use."""
 
     @abstractmethod
-    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
-        """Weights times the kernel's derivative wrt the exponents; contracted is weights times the kernel."""
+    def _sloped(self, contracted: Array, a: Array, b: Array) -> Array:
+        """Weights times the kernel's derivative wrt the exponents.
+
+        contracted: weights times the kernel, whose memory it may use; a, b: the scaled rows that it is between.
+        """
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ class SquaredExponential(ArdKernel):
         exponents += 2.0 * self.log_sd
         return np.asarray(np.exp(exponents, out=exponents))
 
-    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
+    def _sloped(self, contracted: Array, a: Array, b: Array) -> Array:
         return contracted
 
 
@@ -132,12 +135,26 @@ class Matern52(ArdKernel):
     smooth = False
 
     def _values(self, exponents: Array) -> Array:
-        t = np.sqrt(-10.0 * exponents)
-        return np.asarray((1.0 + t * (1.0 + t / 3.0)) * np.exp(2.0 * self.log_sd - t))
+        t = _root(exponents)
+        polynomial = t / 3.0
+        polynomial += 1.0
+        polynomial *= t
+        polynomial += 1.0
+        np.subtract(2.0 * self.log_sd, t, out=t)
+        polynomial *= np.exp(t, out=t)
+        return polynomial
 
-    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
-        t = np.sqrt(-10.0 * exponents)
-        return np.asarray(weights * (5.0 / 3.0 * (1.0 + t)) * np.exp(2.0 * self.log_sd - t))
+    def _sloped(self, contracted: Array, a: Array, b: Array) -> Array:
+        # 5/3 (1 + t) over (1 + t + t^2 / 3), which is the kernel's polynomial
+        t = _root(_exponents(a, b))
+        steeper = t + 1.0
+        t *= t
+        t /= 3.0
+        t += steeper
+        steeper *= 5.0 / 3.0
+        contracted *= steeper
+        contracted /= t
+        return contracted
 
 
 _FAMILIES: dict[KernelFamily, type[ArdKernel]] = {"squared_exponential": SquaredExponential, "matern52": Matern52}
@@ -149,11 +166,27 @@ def ard_kernel(family: KernelFamily, log_lengthscales: Array, log_sd: float) -> 
     return _FAMILIES[family](log_lengthscales, log_sd)
 
 
-def _exponents(a: Array, b: Array) -> Iterator[tuple[slice, Array]]:
-    """-1/2 |a_i - b_j|^2 of the rows of a (n, D) and b (m, D), block by block of a's rows, to stay in the cache."""
-    of_a, of_b = 0.5 * (a * a).sum(axis=1)[:, None], 0.5 * (b * b).sum(axis=1)
-    for start in range(0, len(a), _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        exponents = a[rows] @ b.T
-        exponents -= of_a[rows] + of_b
-        yield rows, np.minimum(exponents, 0.0, out=exponents)  # at r = 0 rounding may leave a tiny positive one
+def _exponents(a: Array, b: Array) -> Array:
+    """-1/2 |a_i - b_j|^2 of the rows of a (n, D) and b (m, D), shape (n, m)."""
+    exponents = a @ b.T
+    exponents -= 0.5 * (a * a).sum(axis=1)[:, None] + 0.5 * (b * b).sum(axis=1)
+    return np.minimum(exponents, 0.0, out=exponents)  # at r = 0 rounding may leave a tiny positive one
+
+
+def _root(exponents: Array) -> Array:
+    """5^1/2 r, in the memory of the exponents -r^2 / 2."""
+    exponents *= -10.0
+    return np.asarray(np.sqrt(exponents, out=exponents))
+
+
+def _count_once(block: Array) -> None:
+    """Clear the block (k, m) of an upper triangle below the diagonal and halve it there: twice its sum is the whole."""
+    square = block[:, : len(block)]
+    square[:] = np.triu(square)
+    square.flat[:: len(block) + 1] *= 0.5
+
+
+def _spread(weights: Array, a: Array, b: Array) -> Array:
+    """sum_ij weights_ij (a_i - b_j)^2 for each input, shape (D,)."""
+    squares = weights.sum(axis=1) @ (a * a) + weights.sum(axis=0) @ (b * b)
+    return np.asarray(squares - 2.0 * (a * (weights @ b)).sum(axis=0))

@@ -178,7 +178,7 @@ class Bound:
 
     def _signal_gradient(self) -> Array:
         problem = self.problem
-        weights = self.signal.ridge.precision()
+        weights = self.signal.ridge.upper_precision()
         _subtract_square(weights, self.alpha)
         jitter = -problem.parameters.jitter * float(np.trace(weights))
         gradient = -problem.parameters.signal.gradient(problem.inputs, problem.signal_kernel.matrix, weights)
@@ -187,7 +187,7 @@ class Bound:
 
     def _noise_gradient(self) -> Array:
         problem = self.problem
-        weights = self.noise_ridge.precision()
+        weights = self.noise_ridge.upper_precision()
         # b gb' + gb b' - b b' with gb the optimal weights, as one symmetric difference of squares
         _subtract_square(weights, self.optimal_weights)
         _subtract_square(weights, self.optimal_weights - self.mean_weights, -1.0)
@@ -202,5 +202,5 @@ def sites_from(precisions: Array, noise_mean: Array) -> Sites:
 
 
 def _subtract_square(matrix: Array, vector: Array, sign: float = 1.0) -> None:
-    """Subtract sign vector vector' in place."""
-    scipy.linalg.blas.dger(-sign, vector, vector, a=matrix.T, overwrite_a=1)
+    """Subtract sign vector vector' from the upper triangle of a C-ordered matrix, in place."""
+    scipy.linalg.blas.dsyr(-sign, vector, lower=1, a=matrix.T, overwrite_a=1)

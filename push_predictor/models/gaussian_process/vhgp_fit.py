@@ -41,9 +41,10 @@ _NOISE_SD = (np.log(1e-3), np.log(3.0))
 _NOISE_MEAN = (np.log(1e-8), np.inf)  # open, see gp.py
 _NUGGET_SD = (np.log(1e-3), np.log(3.0))
 _REFUSED = 1e10
-_SEARCH_TOLERANCE = 2e-2  # nats
-_FINAL_TOLERANCE = 1e-4
-_STOP = 1e-4
+_SEARCH_TOLERANCE = 5e-2  # nats
+_FIRST_TOLERANCE = 0.5  # far from the maximum
+_FINAL_TOLERANCE = 1e-3
+_STOP = 0.15  # nats
 
 # Weak Gaussian priors on the logarithms. Without them the bound of 100 rows often peaks at far too confident a
 # noise model, or at a homoscedastic one. The signal stays near the homoscedastic fit, the noise varies by a
@@ -150,7 +151,8 @@ class _Search:
         try:
             problem = VhgpProblem.of(self.inputs, self.outputs, parameters)
             goal = penalty - self.best.cost if self.best else None
-            bound = maximise_over_noise(problem, self._start(problem), _SEARCH_TOLERANCE, goal=goal)
+            tolerance = _SEARCH_TOLERANCE if self.best else _FIRST_TOLERANCE
+            bound = maximise_over_noise(problem, self._start(problem), tolerance, goal=goal)
         except (np.linalg.LinAlgError, FloatingPointError):
             return _REFUSED, np.zeros_like(vector)
         cost = penalty - bound.value

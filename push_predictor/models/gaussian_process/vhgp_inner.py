@@ -28,7 +28,8 @@ from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, Vhgp
 from push_predictor.types import Array
 
 _SHORTEST_STEP = 1.0 / 64.0
-_PART = 0.02
+_PART = 0.1
+_USUAL_SHARE, _LARGEST_SHARE = 0.25, 0.8  # gain of a step over that of the step before
 
 
 def maximise_over_noise(
@@ -41,15 +42,28 @@ def maximise_over_noise(
     Raises LinAlgError or FloatingPointError where the bound is not finite even at a fresh start.
     """
     bound = _first(problem, start)
-    steps = _Steps()
+    steps, progress = _Steps(), _Progress()
     for _ in range(most_steps):
         value, sites, target = bound.value, bound.sites, bound.optimal_sites
         del bound  # frees its matrices before the next ones are computed
         bound, accepted = _improved(problem, value, sites, steps.next(sites, target), target, tolerance)
         enough = tolerance if goal is None else max(tolerance, _PART * abs(bound.value - goal))
-        if not accepted or bound.value - value < enough:
+        if not accepted or progress.remaining(bound.value - value) < enough:
             return bound
     return bound
+
+
+class _Progress:
+    """The gain that further steps can bring, if each brings the same share of the one before, as the last two did."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+
+    def remaining(self, gain: float) -> float:
+        """Expected gain of all further steps, nats, after a step that gained this much."""
+        last, self._last = self._last, gain
+        share = _USUAL_SHARE if last is None or last <= 0.0 else min(gain / last, _LARGEST_SHARE)
+        return gain * max(share, _USUAL_SHARE) / (1.0 - max(share, _USUAL_SHARE))
 
 
 def _first(problem: VhgpProblem, start: Sites | None) -> Bound:
