@@ -52,7 +52,7 @@ from push_predictor.models.mechanics.scalar.surface import (
 from push_predictor.types import Array
 
 MOST_SURFACES = 64  # that are kept prepared
-FEW = 16  # pushes: as fast as an array of them
+FEW = 200  # pushes: as fast as an array of them
 FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load")  # along a push
 
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach.
