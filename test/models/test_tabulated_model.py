@@ -43,7 +43,7 @@ from push_predictor.models.tabulated.table_accuracy import (
     relative_error,
 )
 from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_single_posteriors
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -366,7 +366,7 @@ def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> N
     save_model(model, tmp_path / "m.model")
     registry, loaded = ModelRegistry(), LoadModel.Response()
     handle_load_model(registry, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
-    expected = tabulate(model)
+    expected = with_single_posteriors(tabulate(model))
     assert expected.tabulated and expected.how in loaded.message and registry.answering == [f"a vhgp: {expected.how}"]
     inputs = inside(model, 40)
     inputs[0, 0] = 0.2  # outside the domain

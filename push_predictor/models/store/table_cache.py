@@ -55,11 +55,8 @@ def load_served(path: Path) -> TabulatedModel:
     Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
     served = load_at_once(path)
-    if served.base_how != NO_TABLE_YET:
-        return served
     with _naming(path):
-        tabulated = _computed(served.model)
-    tabulated.free_matrices()
+        tabulated = completed(served)
     return_memory()
     return tabulated
 
@@ -95,9 +92,7 @@ def _naming(path: Path) -> Iterator[None]:
 @one_blas_thread()
 def completed(served: TabulatedModel) -> TabulatedModel:
     """A model of `load_at_once` with its tables, and fast for single pushes outside them; itself if complete."""
-    tabulated = _computed(served.model) if served.base_how == NO_TABLE_YET else served
-    if tabulated.single is None:
-        tabulated = with_single_posteriors(tabulated)
+    tabulated = _with_single(_computed(served.model) if served.base_how == NO_TABLE_YET else served)
     tabulated.free_matrices()
     return tabulated
 
@@ -105,7 +100,7 @@ def completed(served: TabulatedModel) -> TabulatedModel:
 @one_blas_thread()
 def as_served(model: PushModel) -> TabulatedModel:
     """The model as the server predicts with it: with the tables of its base and of its effects."""
-    return _read(model, None) or _computed(model)
+    return _with_single(_read(model, None) or _computed(model))
 
 
 @one_blas_thread()
@@ -149,6 +144,10 @@ def _read(model: PushModel, path: Path | None) -> TabulatedModel | None:
     with suppress(OSError):
         os.utime(kept)  # the least recently used ones are deleted
     return served
+
+
+def _with_single(tabulated: TabulatedModel) -> TabulatedModel:
+    return tabulated if tabulated.single is not None else with_single_posteriors(tabulated)
 
 
 def _without_tables(model: PushModel) -> TabulatedModel:

@@ -64,10 +64,9 @@ class TabulatedModel:
     """A model with its table. domain and error are None if there is no table.
 
     base_how: in words, how its base predicts. effects: the table of its effects, None if they are computed;
-    effects_how: the same in words. single: predicts single pushes of the base outside its table; None: the model does.
+    effects_how: the same in words. single: predicts pushes of the base outside its table; None: the model does.
 
-    A push gets the same prediction alone as among others: to rounding in the domain, outside it to the tolerances of
-    table_accuracy. Made by `tabulate`.
+    A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
     """
 
     model: PushModel
@@ -208,12 +207,12 @@ class TabulatedModel:
         return Prediction(*predictor.about_mean(_moments(learnt), push), learnt.in_domain)
 
     def _outside(self, inputs: Array, duration: Array) -> Prediction:
-        """The prediction for one push outside the table."""
+        """Predictions for pushes outside the table."""
         if self.single is None:
             return self._residual.predict_rows(inputs, duration)
-        numbers = np.array(self.single.moments(self._box.features(inputs[0].tolist())))
-        covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
-        return Prediction(numbers[None, :3], covariance, process_covariance, np.array([False]))
+        numbers = np.array([self.single.moments(self._box.features(row)) for row in inputs.tolist()])
+        covariance, process_covariance = numbers[:, 3:].reshape(-1, 2, 3, 3).swapaxes(0, 1)
+        return Prediction(numbers[:, :3], covariance, process_covariance, np.zeros(len(inputs), dtype=np.bool_))
 
     def _learnt(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         """Predictions of what the base has learnt, from the table where it can."""
@@ -222,10 +221,10 @@ class TabulatedModel:
         inside, prediction = domain.predict(inputs)
         if prediction is not None:
             return prediction
-        exact = self._residual.predict_rows(inputs[~inside], duration[~inside])
+        outside = self._outside(inputs[~inside], duration[~inside])
         if not inside.any():
-            return exact
-        return _merged(inside, self._learnt(domain, inputs[inside], duration[inside]), exact)
+            return outside
+        return _merged(inside, self._learnt(domain, inputs[inside], duration[inside]), outside)
 
 
 def tabulate(model: PushModel) -> TabulatedModel:
@@ -255,7 +254,7 @@ def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy)
 
 
 def with_single_posteriors(tabulated: TabulatedModel) -> TabulatedModel:
-    """The same, faster for single pushes outside its table, if that is accurate; takes about a second for 1000 rows."""
+    """The same, faster for pushes outside its table, if that is accurate; takes about a second for 1000 rows."""
     if tabulated.domain is None:
         return tabulated
     return replace(tabulated, single=single_posteriors(without_mean(tabulated.model.base)))

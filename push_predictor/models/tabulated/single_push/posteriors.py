@@ -42,6 +42,7 @@ from push_predictor.types import Array, IntArray
 
 NEGLIGIBLE = 2e-4  # of the smallest noise variance: prior variance of f that is neglected
 NEGLIGIBLE_IN_NOISE = 5e-3  # the same of a log noise variance
+FAR_ABOVE_NOISE = 1e3  # prior variance over noise variance from which on single precision is too coarse
 SINGLE: np.dtype[Any] = np.dtype(np.float32)
 DOUBLE: np.dtype[Any] = np.dtype(np.float64)
 CHECKED = 100  # pushes outside the domain
@@ -145,7 +146,8 @@ class _Stack:
             inputs.append(posterior.inputs.T * inverse)
             part = slice(start, start := start + len(posterior.inputs))
             weights = (posterior.kernel.variance * posterior.weights).astype(precision)
-            factor: Array = np.ascontiguousarray(root.T, dtype=SINGLE)
+            fine = posterior.prior_variance > FAR_ABOVE_NOISE * float(posterior.noise_variances.min())
+            factor: Array = np.ascontiguousarray(root.T, dtype=DOUBLE if fine else SINGLE)
             parts.append(_Part(part, weights, pivots, factor, posterior.prior_variance, posterior.least_variance))
         if not parts:
             return cls(np.empty((0, 0)), np.empty((0, 0)), [])
@@ -164,7 +166,7 @@ class _Stack:
         found = []
         for part in self.parts:
             row = kernel[part.inputs]
-            half = part.factor @ row[part.pivots].astype(SINGLE)
+            half = part.factor @ row[part.pivots].astype(part.factor.dtype)
             found.append((float(part.weights @ row), max(part.prior - float(half @ half), part.least)))
         return found
 
