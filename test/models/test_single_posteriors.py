@@ -132,6 +132,17 @@ def test_comparison_covers_all_that_differs() -> None:
     assert not accuracy_of(shifted, model).accepted
 
 
+@pytest.mark.parametrize("wrong", ["covariance", "process_covariance"])
+def test_both_covariances_are_compared(wrong: str) -> None:
+    model = trained("square", "gp")
+    inputs = outside_pushes(model, 3)
+    exact = model.predict_rows(inputs, np.full(3, 0.2))
+    both = {
+        name: getattr(exact, name) * (1.02 if name == wrong else 1.0) for name in ("covariance", "process_covariance")
+    }
+    assert compared_with(exact, exact.mean, **both).covariance == pytest.approx(0.02)
+
+
 def test_pushes_outside_are_of_all_kinds() -> None:
     model = trained("square", "gp")
     inputs = outside_pushes(model, 200)
