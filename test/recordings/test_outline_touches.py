@@ -22,7 +22,7 @@ from checked_bags import bag, rig_of
 
 from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.checks.frames import contacts_of
-from push_predictor.recordings.checks.outline.fit import WEAK
+from push_predictor.recordings.checks.outline.fit import WEAK, _Problem
 from push_predictor.recordings.checks.outline.touches import SIZE, SMALLEST, Touches
 
 CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06])
@@ -53,3 +53,13 @@ def test_a_size_that_no_slider_has_changes_nothing() -> None:
     tiny[SIZE], smallest[SIZE] = SMALLEST - 0.2, SMALLEST
     assert not placed.slopes(tiny)[:, SIZE].any()
     np.testing.assert_array_equal(placed.gaps(tiny), placed.gaps(smallest))
+
+
+def test_a_fit_knows_the_derivatives_of_the_prior_too() -> None:
+    free = np.arange(len(WEAK)) < 5
+    problem, part = _Problem(touches("ellipse_plywood"), free), CORRECTION[free]
+    for k, step in enumerate(STEP * np.eye(len(part))):
+        difference = (problem.residuals(part + step) - problem.residuals(part - step)) / (2.0 * STEP)
+        np.testing.assert_allclose(problem.jacobian(part)[:, k], difference, rtol=1e-4, atol=1e-3)
+    prior = problem.jacobian(part)[-len(part) :]
+    np.testing.assert_allclose(prior, np.diag(1.0 / WEAK[free]))

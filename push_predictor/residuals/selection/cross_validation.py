@@ -99,15 +99,16 @@ def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:
 class HeldOutGains:
     """Gains of columns on residuals (n, 3): what is the same for all columns is computed once.
 
-    block (n,): of each row; numbers: of the blocks, ascending. fold (n,): number among the folds that are used; used
-    (f, b): the blocks that a fold's fit is made of. before (n,): log density of the residuals, with the variance of the
-    other folds.
+    block (n,): of each row. fold (n,): number among the folds that are used; used (f, b): the blocks of a fold's fit;
+    weights (f, n): of their rows, for a mean. before (n,): log density of the residuals, with the variance of
+    the other folds.
     """
 
     residual: Array
     block: IntArray
     fold: IntArray
     used: BoolArray
+    weights: Array
     before: Array
 
     @staticmethod
@@ -115,10 +116,12 @@ class HeldOutGains:
         """Folds of the blocks, which take turns."""
         numbers, fold = np.unique(folds_of(block), return_inverse=True)
         used = folds_of(np.unique(block)) != numbers[:, None]
+        weights = (fold != np.arange(len(numbers))[:, None]).astype(np.float64)
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1.0)
         if len(numbers) < 2:
-            return HeldOutGains(residual, block, fold, used, np.zeros(len(residual)))
-        variance = _of_others(np.sum(residual**2, axis=0), residual, fold, len(numbers))
-        return HeldOutGains(residual, block, fold, used, _log_density(residual, variance[fold]))
+            return HeldOutGains(residual, block, fold, used, weights, np.zeros(len(residual)))
+        variance = weights @ residual**2
+        return HeldOutGains(residual, block, fold, used, weights, _log_density(residual, variance[fold]))
 
     def of_columns(self, flat: Array) -> Array:
         """Gain (b,) per block of columns (n, 3, p): fitted on the other folds, the log density after minus before.
@@ -133,15 +136,9 @@ class HeldOutGains:
         fitted = coefficients @ flat.reshape(-1, flat.shape[2]).T
         after = self.residual - fitted.reshape(folds, *self.residual.shape)
         held_out = after[self.fold, np.arange(len(self.fold))]
-        variance = _of_others(np.sum(after**2, axis=1), held_out, self.fold, folds)
+        variance = np.stack([mean @ square for mean, square in zip(self.weights, after**2, strict=True)])
         gains = _log_density(held_out, variance[self.fold]) - self.before
         return sums_by(self.block, gains[:, None])[:, 0]
-
-
-def _of_others(total: Array, held_out: Array, fold: IntArray, folds: int) -> Array:
-    """Mean squares (f, 3) outside each fold; total (3,) or (f, 3): sums over all rows, held_out (n, 3): those in it."""
-    inside = (fold == np.arange(folds)[:, None]).astype(np.float64)
-    return np.asarray((total - inside @ held_out**2) / (len(fold) - inside.sum(axis=1))[:, None])
 
 
 def _scores(flat: Array, residual: Array, block: IntArray) -> Array:
