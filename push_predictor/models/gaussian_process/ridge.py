@@ -34,7 +34,9 @@ from push_predictor.types import Array
 _DROPPED = 1e-12
 _SMALLEST_FACTORISED = 200
 _LARGEST_SHARE = 0.5
-_LARGEST_SHARE_OF_HALF = 0.35  # of all rows: the rank of every second row; with a higher one the search is not worthwhile
+_LARGEST_SHARE_OF_HALF = (
+    0.35  # of all rows: the rank of every second row; with a higher one the search is not worthwhile
+)
 
 
 class Ridge(Protocol):
@@ -100,7 +102,7 @@ def factorise(matrix: Array, nugget: float = 0.0, *, smooth: bool = True) -> Reg
 
 
 def _rank_of_half(matrix: Array) -> int:
-    """The rank of every second row and column, for an eighth of the time: between half of that of all and that of all."""
+    """The rank of every second row and column, for an eighth of the time; that of all is not lower."""
     half = matrix[::2, ::2].T.copy(order="F")
     return int(scipy.linalg.lapack.dpstrf(half, tol=_DROPPED * matrix[0, 0], lower=1, overwrite_a=1)[2])
 
