@@ -48,9 +48,9 @@ _STOP = 1e-4
 
 # Gaussian priors on the logarithms. Without them the bound of 100 rows often peaks at far too confident a noise model,
 # or at a homoscedastic one. The signal stays near the homoscedastic fit, the noise varies by a factor of exp(0.67) over
-# half an input's spread. For any number of rows the priors of g's lengthscales and standard deviation are as strong as
-# for a hundred, as in sparse/fit.py: windows of one push are not independent, and with many of them the bound takes
-# differences between pushes for noise that varies over short lengths. Bounds of 1000 rows outweigh the other priors.
+# half an input's spread. For any number of rows the prior of g's lengthscales is as strong as for a hundred, as in
+# sparse/fit.py: windows of one push are not independent, and with many of them the bound takes differences between
+# pushes for noise that varies over short lengths. Bounds of 1000 rows outweigh the other priors.
 _NOISE_LENGTHSCALE, _NOISE_LENGTHSCALE_SPREAD = -0.7, 0.5
 _NOISE_LOG_SD = -0.4
 _LOG_NUGGET_SD = -1.0
@@ -102,7 +102,7 @@ def _prior_centre(gp: GpParameters, choice: KernelChoice) -> VhgpParameters:
 def _spread(d: int, choice: KernelChoice, n: int) -> Array:
     spread = np.full(2 * d + 3 + choice.noise_nugget, _SPREAD)
     spread[d + 1 : 2 * d + 1] = _NOISE_LENGTHSCALE_SPREAD
-    spread[d + 1 : 2 * d + 2] *= np.sqrt(min(1.0, _FEW_ROWS / n))
+    spread[d + 1 : 2 * d + 1] *= np.sqrt(min(1.0, _FEW_ROWS / n))
     return spread
 
 
