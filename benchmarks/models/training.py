@@ -16,10 +16,11 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.training [n ...] [--data FOLDER]
 
-Rows are made up, with two inputs and with three; with --data also those of FOLDER/mit_square. For each choice of
-kernels: CPU seconds for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the
-peak memory of one fit in dense matrices of n x n doubles. Last: the time to rebuild three VHGPs from their parameters,
-and to predict one input and a thousand.
+Rows are made up, with two inputs and with three, and those of simulated pushes with the speed as an input: three slow
+speeds, and the ten of the paper. With --data also those of FOLDER/mit_square. For each choice of kernels: CPU seconds
+for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the peak memory of one fit
+in dense matrices of n x n doubles. Last: the time to rebuild three VHGPs from their parameters, and to predict one
+input and a thousand.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from __future__ import annotations
 import argparse
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -36,11 +38,20 @@ import numpy as np
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.features import push_features
 from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.simulation.outcomes import push_outcomes
+from push_predictor.simulation.pushes import random_pushes
+from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array
 
+SLOW = (0.01, 0.02, 0.05)  # m/s
+ALL_SPEEDS = (0.01, 0.02, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # m/s, those of the paper
+WINDOW, WINDOWS = 0.2, 2  # s; of a push at least
+BEFORE, SHORTEST_PUSH = 0.025, 0.02  # m: to accelerate and decelerate; travel of slow pushes
 CHOICES = {"SE": DEFAULT_CHOICE, "Matern + nugget": KernelChoice("matern52", noise_nugget=True)}
 
 
@@ -65,6 +76,8 @@ def rows(n: int, data: Path | None) -> Iterator[tuple[str, Array, Array]]:
     """Titles, standardised inputs (n, D) and outputs (n, 3)."""
     yield "made up 2", *made_up_pushes(n)
     yield "made up 3", *made_up_pushes(n, velocity=True)
+    yield "3 speeds", *simulated_pushes(n, SLOW)
+    yield "10 speeds", *simulated_pushes(n, ALL_SPEEDS)
     if data is not None:
         yield "mit_square", *measured_pushes(data / "mit_square" / "pushes_3500.npz", n)
 
@@ -103,6 +116,16 @@ def made_up_pushes(n: int, seed: int = 0, velocity: bool = False) -> tuple[Array
     return inputs, mean + noise[:, None] * rng.normal(size=(n, 3))
 
 
+def simulated_pushes(n: int, speeds: Sequence[float], seed: int = 1) -> tuple[Array, Array]:
+    """Standardised inputs (n, 3) and outputs (n, 3): windows of the square on ABS at these speeds, m/s."""
+    plan = random_pushes(n // 2 + 10, speeds, rng=np.random.default_rng(seed))
+    travel = np.maximum(WINDOWS * WINDOW * plan.speed + BEFORE, SHORTEST_PUSH)
+    table = push_outcomes(SimulationSpec("rect1", "abs", replace(plan, travel=travel), seed=seed), WINDOW)
+    chosen = np.random.default_rng(0).permutation(len(table))[:n]
+    features = push_features(shape_outline("rect1"), table.inputs)
+    return _standardised(features[chosen]), _standardised(table.outcomes[chosen])
+
+
 def measured_pushes(path: Path, n: int) -> tuple[Array, Array]:
     """Standardised inputs (n, 2) and outputs (n, 3) of random rows of the measured square."""
     with np.load(path) as file:
@@ -110,7 +133,11 @@ def measured_pushes(path: Path, n: int) -> tuple[Array, Array]:
         inputs, outputs = (
             np.column_stack([file[k][chosen] for k in keys]) for keys in (("c", "beta"), ("dx", "dy", "dtheta"))
         )
-    return (inputs - inputs.mean(axis=0)) / inputs.std(axis=0), (outputs - outputs.mean(axis=0)) / outputs.std(axis=0)
+    return _standardised(inputs), _standardised(outputs)
+
+
+def _standardised(columns: Array) -> Array:
+    return np.asarray((columns - columns.mean(axis=0)) / columns.std(axis=0))
 
 
 def fit_reference(inputs: Array, outputs: Array) -> GaussianProcessRegressor:

@@ -29,6 +29,7 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParamet
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.vhgp_fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
@@ -235,3 +236,10 @@ def test_repeated_inputs_are_accepted() -> None:
 def test_rejects_unusable_rows() -> None:
     with pytest.raises(TrainingError, match="NaN"):
         fit_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
+
+
+def test_priors_of_the_noise_lengthscales_keep_their_weight_in_a_row_from_a_hundred_rows_on() -> None:
+    few, hundred, many = (prior_spread(2, DEFAULT_CHOICE, n) for n in (50, 100, 900))
+    np.testing.assert_array_equal(few, hundred)
+    np.testing.assert_allclose(many / hundred, [1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0, 1.0])
+    np.testing.assert_array_equal(hundred[3:5], [0.5, 0.5])

@@ -21,14 +21,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from push_predictor.types import Array, IntArray
-
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
 
 Cost = Callable[[Array], tuple[float, Array]]
 
@@ -47,10 +43,7 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Descent:
-    """A bounded minimisation: box (D, 2) of the variables, most iterations, decrease in one of them at which it ends.
-
-    stop: of a cost in nats.
-    """
+    """A bounded minimisation: box (D, 2) of the variables, most iterations, relative decrease at which it ends."""
 
     box: Array
     most_iterations: int
@@ -60,17 +53,8 @@ class Descent:
         """The local minimum reached from a point of the box."""
         from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
 
-        lowest = [np.inf]
-
-        def end_of_iteration(intermediate_result: OptimizeResult) -> None:
-            before, lowest[0] = lowest[0], float(intermediate_result.fun)
-            if before - lowest[0] < self.stop:
-                raise StopIteration
-
-        options = {"maxiter": self.most_iterations, "ftol": 0.0}
-        found = minimize(
-            cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options, callback=end_of_iteration
-        )
+        options = {"maxiter": self.most_iterations, "ftol": self.stop}
+        found = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options)
         return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())), float(found.fun))
 
     def refine(self, cost: Cost, rough: Minimum) -> Minimum:

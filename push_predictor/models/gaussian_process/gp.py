@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -43,9 +43,9 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
-_STOP = 1e-3  # nats
-_ROUGH_STOP = 0.05  # nats, of the descents that are compared
+_STOP, _ROUGH_STOP = 1e-6, 1e-4  # relative decrease; rough: of the descents that are compared
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
+_FEWEST_TO_BEGIN_FROM = 300  # rows of a part; the likelihood of fewer often has its highest maximum elsewhere
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 
 
@@ -134,26 +134,30 @@ def fit_gp(
     check_rows(inputs, outputs)
     d = inputs.shape[1]
     box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    rough = _rough(inputs, outputs, choice.family, Descent(box, most_iterations, _ROUGH_STOP))
-    found = Descent(box, most_iterations, _STOP).refine(_cost(inputs, outputs, choice.family), rough)
+    descent, cost = Descent(box, most_iterations, _STOP), _cost(inputs, outputs, choice.family)
+    rows = part_of_rows(len(outputs))
+    start, rough = _first(inputs, outputs, rows, choice.family, replace(descent, stop=_ROUGH_STOP))
+    if rows is None or len(rows) >= _FEWEST_TO_BEGIN_FROM:
+        found = descent.refine(cost, rough)
+    else:
+        found = descent.run(cost, start)
     return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
 
 
-def _rough(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Minimum:
-    """A minimum of part of the rows, from unit lengthscales, or with one of them short if that is clearly better.
+def _first(
+    inputs: Array, outputs: Array, rows: IntArray | None, family: KernelFamily, descent: Descent
+) -> tuple[Array, Minimum]:
+    """Where to begin, and the minimum of these rows that is reached from there; None for all rows.
 
-    On a polygon the outcome jumps from side to side. From a long lengthscale the search may take the jumps for noise.
+    Unit lengthscales, or one of them short if that is clearly better. On a polygon the outcome jumps from side to side.
+    From a long lengthscale the search may take the jumps for noise.
     """
-    d, rows = inputs.shape[1], part_of_rows(len(outputs))
-    usual = np.append(np.zeros(d + 1), np.log(0.3))
-    part = slice(None) if rows is None else rows
-    cost = _cost(inputs[part], outputs[part], family)
-    if len(outputs) < _FEWEST_FOR_SHORT:
-        return descent.run(cost, usual)
-    reached = [descent.run(cost, usual)]
-    reached += [descent.run(cost, usual + _SHORT * np.eye(d + 2)[k]) for k in range(d)]
-    best = min(reached, key=lambda minimum: minimum.cost)
-    return best if best.cost < reached[0].cost - _SURELY else reached[0]
+    d, part = inputs.shape[1], slice(None) if rows is None else rows
+    usual, cost = np.append(np.zeros(d + 1), np.log(0.3)), _cost(inputs[part], outputs[part], family)
+    short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)] if len(outputs) >= _FEWEST_FOR_SHORT else []
+    reached = [(start, descent.run(cost, start)) for start in (usual, *short)]
+    best = min(reached, key=lambda pair: pair[1].cost)
+    return best if best[1].cost < reached[0][1].cost - _SURELY else reached[0]
 
 
 def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:

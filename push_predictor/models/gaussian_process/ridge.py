@@ -102,7 +102,7 @@ def factorise(matrix: Array, nugget: float = 0.0, *, smooth: bool = True) -> Reg
 
 
 def _rank_of_half(matrix: Array) -> int:
-    """The rank of every second row and column, for an eighth of the time: half of that of all rows, or more."""
+    """The rank of every second row and column, for an eighth of the time; that of all is not lower."""
     half = matrix[::2, ::2].T.copy(order="F")
     return int(scipy.linalg.lapack.dpstrf(half, tol=_DROPPED * matrix[0, 0], lower=1, overwrite_a=1)[2])
 

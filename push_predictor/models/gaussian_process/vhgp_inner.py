@@ -28,7 +28,7 @@ from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, Vhgp
 from push_predictor.types import Array
 
 _SHORTEST_STEP = 1.0 / 64.0
-_PART = 0.1
+_PART = 0.02
 _USUAL_SHARE, _LARGEST_SHARE = 0.25, 0.8  # gain of a step over that of the step before
 
 

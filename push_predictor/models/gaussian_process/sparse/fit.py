@@ -119,7 +119,7 @@ def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_induc
     first = parameters.to_vector()
     box = np.column_stack([first - _REACH, first + _REACH])
     box[-1, 1] = np.inf  # one open side, see gp.py
-    Descent(box / _UNIT, _MOST_ITERATIONS, _STOP * len(outputs)).run(search.cost, first / _UNIT)
+    Descent(box / _UNIT, _MOST_ITERATIONS, _STOP).run(search.cost, first / _UNIT)
     best = search.best
     if best is None:
         raise TrainingError(f"the variational bound of {len(outputs)} rows is not finite anywhere")

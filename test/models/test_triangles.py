@@ -1,0 +1,68 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Symmetric matrices of which only one triangle is computed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from push_predictor.models.gaussian_process.kernels import FAMILIES, KernelFamily, ard_kernel
+from push_predictor.models.gaussian_process.ridge import RegularisableKernel, factorise
+from push_predictor.models.gaussian_process.triangles import BLOCK, mirror_upper, upper_blocks
+from push_predictor.types import Array
+
+SIZES = (1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 5)
+
+
+def normal(*shape: int, seed: int = 0) -> Array:
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_blocks_cover_the_upper_triangle_and_only_their_squares_reach_below(n: int) -> None:
+    covered = np.zeros((n, n), dtype=int)
+    for rows, columns in upper_blocks(n):
+        covered[rows, columns] += 1
+    assert (covered[np.triu_indices(n)] == 1).all()
+    below, left = np.nonzero(np.tril(covered, -1))
+    assert (below // BLOCK == left // BLOCK).all()
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_the_mirrored_matrix_has_the_upper_triangle_twice(n: int) -> None:
+    matrix = normal(n, n)
+    expected = np.triu(matrix) + np.triu(matrix, 1).T
+    np.testing.assert_array_equal(mirror_upper(matrix), expected)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_kernel_gradient_reads_the_upper_triangle_of_its_weights_only(family: KernelFamily) -> None:
+    inputs, weights = normal(150, 2), normal(150, 150, seed=1)
+    kernel = ard_kernel(family, np.array([0.2, -0.3]), 0.1)
+    matrix = kernel.matrix(inputs)
+    of_triangle = kernel.gradient(inputs, matrix, np.triu(weights) + np.tril(np.full((150, 150), 1e6), -1))
+    of_whole = kernel.gradient(inputs, matrix, np.triu(weights) + np.triu(weights, 1).T)
+    np.testing.assert_allclose(of_triangle, of_whole, rtol=1e-10)
+
+
+@pytest.mark.parametrize("low_rank", [True, False])
+def test_the_upper_precision_is_that_of_the_whole(low_rank: bool) -> None:
+    matrix = ard_kernel("squared_exponential", np.full(2, 0.5), 0.1).matrix(normal(300, 2))
+    kernel = factorise(matrix) if low_rank else RegularisableKernel(matrix, None)
+    ridge = kernel.regularise(np.exp(normal(300, seed=2)))
+    assert (kernel.root is not None) == low_rank
+    np.testing.assert_array_equal(np.triu(ridge.upper_precision()), np.triu(ridge.precision()))
+    np.testing.assert_array_equal(ridge.precision(), ridge.precision().T)
