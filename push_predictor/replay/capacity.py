@@ -19,6 +19,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 from push_predictor.recordings.bag.reader import RawMessage
@@ -87,15 +88,18 @@ class _Beginning:
 def _play_at_once(source: Source, wall: SteadyClock, times: list[int]) -> None:
     """Let a player read and sort all messages and compute their deadlines; adds their log times to `times`."""
 
-    def publish(message: RawMessage) -> bool:
-        times.append(message.log_time)
+    def prepare(message: RawMessage) -> Callable[[], bool]:
+        return partial(publish, message.log_time)
+
+    def publish(time: int) -> bool:
+        times.append(time)
         return True
 
     def announce(state: str) -> None:
         if state == "finished":
             player.close()
 
-    output = PlayerOutput(lambda message: None, publish, lambda: None, announce)
+    output = PlayerOutput(prepare, lambda: None, announce)
     player = ReplayPlayer(source, PlayerClock(wall, _AT_ONCE), wall, output, MOST // 2, loop=False, delay=0)
     player.play(PlayRange())
     player.run()
