@@ -250,6 +250,25 @@ def test_seek_goes_forward_and_back_without_waiting() -> None:
     assert stage.times == pytest.approx([0.0, 0.1, 0.1, 0.2, 0.2])
 
 
+@pytest.mark.parametrize(
+    ("control", "published"), [(("seek", START + 8 * SECOND // 10), [0.0, 0.1, 0.8, 0.9]), ("stop", [0.0, 0.1])]
+)
+def test_a_control_just_after_the_sleep_keeps_the_message_back(
+    control: str | tuple[str, object], published: list[float]
+) -> None:
+    stage = Stage(TEN)
+    sleep_until = stage.clock.sleep_until
+
+    def sleep_then_control(recorded: int, generation: int) -> bool:
+        slept = sleep_until(recorded, generation)
+        if slept and recorded == TEN[2].log_time:
+            stage.do(control)
+        return slept
+
+    stage.clock.sleep_until = sleep_then_control
+    assert stage.run() == published
+
+
 def test_seek_before_the_start_goes_to_the_start() -> None:
     stage = Stage(TEN)
     stage.script[3] = [("seek", 0)]
