@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""push_replay as a process: topics, services, signals."""
+"""The parameters of push_replay: refused values, and the shipped configuration."""
 
 from __future__ import annotations
 

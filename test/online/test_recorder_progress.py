@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The recorder without ROS: the bag that it writes, what it finds in it while recording, and what it calls missing."""
+"""The progress of a recording: rates, gaps, missing messages, and the line that shows them."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The recorder without ROS: the bag that it writes, what it finds in it while recording, and what it calls missing."""
+"""The topics that the recorder records, and the definitions of their types."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""push_replay as a process: topics, services, signals."""
+"""Header stamps that are moved by a constant offset."""
 
 from __future__ import annotations
 
