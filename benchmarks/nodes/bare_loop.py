@@ -16,8 +16,9 @@
 
     python -m benchmarks.nodes.bare_loop sleep|publish BAG --rate R --seconds S
 
-Prints p50, p99 and maximum in us as JSON. `sleep` only sleeps until each deadline, `publish` then publishes the
-message. Both read the messages into memory first, and sleep like push_replay: absolute deadlines, timer slack 1 ns.
+Prints JSON: p50, p99 and maximum in us, `late` up to the call that publishes the message and `late_after` up to its
+return. `sleep` only sleeps until each deadline, `publish` then publishes the message. Both read the messages into
+memory first, and sleep like push_replay: absolute deadlines, timer slack 1 ns.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ import gc
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter_ns, sleep
 
 from push_predictor.recordings.bag.reader import RawMessage, open_bag
 from push_predictor.replay.clock import SECOND, reduce_timer_slack
-from push_predictor.replay.lateness import Lateness
+from push_predictor.replay.lateness import Delays, Lateness
 
 PUSH_TOPICS = ("/slider/pose", "/pusher/pose", "/pusher/wrench")
 
@@ -49,26 +51,27 @@ def main() -> int:
     end = every[0].log_time + options.seconds * SECOND
     messages = [message for message in every if message.log_time <= end]
     publish = _publisher(messages) if options.kind == "publish" else lambda message: None
-    late = lateness(messages, options.rate, publish)
-    figures = {"p50": late.percentile(0.5), "p99": late.percentile(0.99), "max": late.maximum}
-    print(json.dumps({name: value / 1000.0 for name, value in figures.items()}))
+    late, late_after = lateness(messages, options.rate, publish)
+    print(json.dumps({"late": asdict(late), "late_after": asdict(late_after)}))
     return 0
 
 
-def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMessage], object]) -> Lateness:
-    """Sleep until the time of each message, publish it, and note the delay up to then."""
+def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMessage], object]) -> tuple[Delays, Delays]:
+    """Sleep until the time of each message and publish it; returns the delays up to then and after publishing."""
     reduce_timer_slack()
     gc.collect()
     gc.freeze()
-    late, first = Lateness(), messages[0].log_time
+    late, late_after, first = Lateness(), Lateness(), messages[0].log_time
     begin = perf_counter_ns() + SECOND // 100  # the first deadline is not late
     for message in messages:
         deadline = begin + round((message.log_time - first) / rate)
         if (remaining := deadline - perf_counter_ns()) > 0:
             sleep(remaining / SECOND)
+        now = perf_counter_ns()
         publish(message)
-        late.add(perf_counter_ns() - deadline)
-    return late
+        late_after.add(perf_counter_ns() - deadline)
+        late.add(now - deadline)
+    return late.delays(), late_after.delays()
 
 
 def _publisher(messages: list[RawMessage]) -> Callable[[RawMessage], object]:

@@ -20,8 +20,10 @@ Simulates pushes with poses at 250 Hz and a wrench at 125 Hz, replays them with 
 subscribes here. --depth is that of the subscriber's queues, 0 keeps all messages.
 
 The lateness that the node reports is compared with that of two bare loops over the same deadlines (bare_loop.py): one
-sleeps, the other sleeps and publishes. The three take turns in each round, in processes of their own, so that a busy
-machine delays all of them. Prints p50 and p99 of each round, the medians over the rounds, their ratios and the load.
+sleeps, the other sleeps and publishes. `late` is the delay up to the call that publishes a message, `after` up to its
+return, which only the loop that publishes shares. The three take turns in each round, in processes of their own, so
+that a busy machine delays all of them. Prints p50 and p99 of each round, the medians over the rounds, their ratios and
+the load.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.simulation.sensors import Sensors
 
 TOPICS = {"/slider/pose": PoseStamped, "/pusher/pose": PoseStamped, "/pusher/wrench": WrenchStamped}
-Figures: TypeAlias = tuple[float, float]  # p50 and p99 of the lateness, us
+Figures: TypeAlias = tuple[float, float, float, float]  # p50 and p99 of the lateness, the same after publishing, us
 SECONDS_A_PUSH = 2.0  # at least, at 20 mm/s over 30 mm
 
 
@@ -79,7 +81,7 @@ def main() -> int:
                 figures["publish"].append(_bare_loop("publish", bag, options.rate, options.seconds))
             figures["sleep"].append(_bare_loop("sleep", bag, options.rate, options.seconds))
             for name, found in figures.items():
-                print(f"    {name:12s} late p50 {found[-1][0]:.0f} us, p99 {found[-1][1]:.0f} us", flush=True)
+                print(f"    {name:12s} {_text(found[-1])}", flush=True)
         _print_ratios(figures)
         return 1 if wrong else 0
 
@@ -139,8 +141,9 @@ def _replay(bag: Path, rate: float, seconds: float) -> Figures:
     command = [sys.executable, "-m", "push_predictor.nodes.push_replay", "--ros-args", *assigned]
     printed = subprocess.run(command, check=True, stderr=subprocess.PIPE, text=True).stderr
     print(printed, end="", flush=True)
-    (found,) = re.findall(r"finished: .*late p50 (\d+) us, p99 (\d+) us", printed)
-    return float(found[0]), float(found[1])
+    (summary,) = re.findall(r"finished: .*", printed)
+    late, late_after = re.findall(r"p50 (\d+) us, p99 (\d+) us", summary)
+    return float(late[0]), float(late[1]), float(late_after[0]), float(late_after[1])
 
 
 def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
@@ -148,7 +151,7 @@ def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
     options = ["--rate", str(rate), "--seconds", str(seconds)]
     command = [sys.executable, "-m", "benchmarks.nodes.bare_loop", kind, str(bag), *options]
     found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
-    return found["p50"], found["p99"]
+    return found["late"]["p50"], found["late"]["p99"], found["late_after"]["p50"], found["late_after"]["p99"]
 
 
 def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
@@ -156,13 +159,16 @@ def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
     medians = {
         name: [statistics.median(values) for values in zip(*found, strict=True)] for name, found in figures.items()
     }
-    ours = medians["push_replay"]
-    for name, (p50, p99) in medians.items():
-        ratios = f"push_replay is {ours[0] / p50:.2f} and {ours[1] / p99:.2f} times as late"
-        print(
-            f"{name:12s} median late p50 {p50:.0f} us, p99 {p99:.0f} us"
-            + ("" if name == "push_replay" else f"; {ratios}")
-        )
+    for name, found in medians.items():
+        print(f"{name:12s} medians: {_text(found)}")
+    for name in ("sleep", "publish"):
+        ratios = [ours / bare for ours, bare in zip(medians["push_replay"], medians[name], strict=True)]
+        after = f", after {ratios[2]:.2f} and {ratios[3]:.2f}" if name == "publish" else ""
+        print(f"push_replay over {name}: late p50 {ratios[0]:.2f} and p99 {ratios[1]:.2f}{after}")
+
+
+def _text(figures: Sequence[float]) -> str:
+    return "late p50 {:.0f} us, p99 {:.0f} us; after p50 {:.0f} us, p99 {:.0f} us".format(*figures)
 
 
 def _compare(bag: Path, received: dict[str, list[bytes]], seconds: float) -> int:

@@ -30,6 +30,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -163,14 +164,19 @@ class PushReplay(Node):
     def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
         wall = SystemClock()
         clock = PlayerClock(wall, options.rate, options.start_paused, options.spin)
-        output = PlayerOutput(self._topics.make_room, self._publish, self._settle, self._announce)
+        output = PlayerOutput(self._prepare, self._settle, self._announce)
         return ReplayPlayer(self._source, clock, wall, output, options.window, options.loop, options.delay)
 
-    def _publish(self, message: RawMessage) -> bool:
+    def _prepare(self, message: RawMessage) -> Callable[[], bool]:
+        publish = self._topics.prepare(message)
         untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
         if self._options.triggers_clock(message.topic) or untimed:
-            self._publish_clock(message.log_time)
-        return self._topics.send(message)
+            return partial(self._publish_with_clock, message.log_time, publish)
+        return publish
+
+    def _publish_with_clock(self, recorded: int, publish: Callable[[], bool]) -> bool:
+        self._publish_clock(recorded)
+        return publish()
 
     def _settle(self) -> None:
         """Wait for acknowledgements, so that no subscriber receives `finished` before the last message."""
@@ -253,15 +259,13 @@ class PushReplay(Node):
         self.create_timer(1.0, self._report_regularly, clock=steady)
 
     def _report(self) -> ReplayReport:
-        lateness = self._player.lateness
         return ReplayReport(
             recording=str(self._options.recording),
             state=self._player.state,
             rate=self._player.rate,
             published=self._player.published,
-            late_p50=lateness.percentile(0.5) / 1000.0,
-            late_p99=lateness.percentile(0.99) / 1000.0,
-            late_max=lateness.maximum / 1000.0,
+            late=self._player.lateness.delays(),
+            late_after=self._player.lateness_after.delays(),
             behind=self._player.behind / SECOND,
             lost=self._player.failed + self._topics.overwritten,
             acknowledged=self._acknowledged,

@@ -19,6 +19,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 from push_predictor.recordings.bag.reader import RawMessage
@@ -28,27 +29,40 @@ from push_predictor.replay.player import PlayerOutput, ReplayPlayer
 from push_predictor.replay.source import Source
 
 MOST = 2000  # messages to time; some 30 ms, before the playback begins
-PUBLISHING = 1.7  # time to publish to one subscriber in another process, over that to read (docs/explanation/replay.md)
+# CPU times for a message, over that to read it (docs/explanation/replay.md)
+PUBLISHING = 1.7  # to publish it to one subscriber in another process
+TAKING = 11.0  # of a subscriber in Python (rclpy) that takes messages as fast as it can
 _AT_ONCE = 1.0e12  # recorded seconds per second: every message is due
 
 
 @dataclass(frozen=True)
 class Capacity:
-    """Messages per second: recorded, and playable by this machine on a free core to one subscriber."""
+    """Messages per second: recorded, playable to one subscriber, and taken by a subscriber in Python.
+
+    The last two are those of free cores of this machine, one for each of the two processes.
+    """
 
     recorded: float
     playable: float
+    taken: float
 
     @property
     def largest_rate(self) -> float:
         """The rate above which the replay falls behind."""
         return self.playable / self.recorded
 
+    @property
+    def largest_lossless_rate(self) -> float:
+        """The rate above which the queue of a subscriber in Python overflows, unless it keeps all messages."""
+        return min(self.taken, self.playable) / self.recorded
+
     def to_text(self, rate: float) -> str:
-        """One sentence about a replay at this rate."""
+        """State what a replay at this rate requires, and the largest rates."""
         return (
             f"{self.recorded:.0f} messages/s recorded, {self.recorded * rate:.0f} messages/s at rate {rate:g}. "
-            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.3g}"
+            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.3g}. "
+            f"A subscriber in Python takes about {self.taken:.0f} messages/s: "
+            f"nothing is lost up to rate {self.largest_lossless_rate:.3g}, or with history KEEP_ALL"
         )
 
 
@@ -70,7 +84,8 @@ def capacity(times: list[int], reading: int) -> Capacity | None:
     span = max(times) - min(times) if times else 0
     if not span or reading <= 0:
         return None
-    return Capacity((len(times) - 1) * SECOND / span, len(times) * SECOND / (reading * (1.0 + PUBLISHING)))
+    read = len(times) * SECOND / reading
+    return Capacity((len(times) - 1) * SECOND / span, read / (1.0 + PUBLISHING), read / TAKING)
 
 
 class _Beginning:
@@ -87,15 +102,18 @@ class _Beginning:
 def _play_at_once(source: Source, wall: SteadyClock, times: list[int]) -> None:
     """Let a player read and sort all messages and compute their deadlines; adds their log times to `times`."""
 
-    def publish(message: RawMessage) -> bool:
-        times.append(message.log_time)
+    def prepare(message: RawMessage) -> Callable[[], bool]:
+        return partial(publish, message.log_time)
+
+    def publish(time: int) -> bool:
+        times.append(time)
         return True
 
     def announce(state: str) -> None:
         if state == "finished":
             player.close()
 
-    output = PlayerOutput(lambda message: None, publish, lambda: None, announce)
+    output = PlayerOutput(prepare, lambda: None, announce)
     player = ReplayPlayer(source, PlayerClock(wall, _AT_ONCE), wall, output, MOST // 2, loop=False, delay=0)
     player.play(PlayRange())
     player.run()

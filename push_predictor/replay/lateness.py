@@ -12,15 +12,29 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How late messages were published: a histogram of bounded size, cheap enough for every message."""
+"""How late messages are: a histogram of bounded size, cheap enough for every message."""
 
 from __future__ import annotations
 
 import math
 import threading
+from dataclasses import dataclass
 
 _PER_DOUBLING = 16  # bins are a factor of 1.044 wide: a percentile is accurate to 4.4 %
 _BINS = 40 * _PER_DOUBLING  # up to 2**40 ns, 18 minutes
+
+
+@dataclass(frozen=True)
+class Delays:
+    """Percentiles and maximum of the lateness of many messages, us."""
+
+    p50: float
+    p99: float
+    maximum: float
+
+    def to_text(self) -> str:
+        """The figures without decimals."""
+        return f"p50 {self.p50:.0f} us, p99 {self.p99:.0f} us, max {self.maximum:.0f} us"
 
 
 class Lateness:
@@ -39,6 +53,10 @@ class Lateness:
             self._bins[place] += 1
             self.count += 1
             self.maximum = max(self.maximum, late)
+
+    def delays(self) -> Delays:
+        """The figures of all durations so far."""
+        return Delays(self.percentile(0.5) / 1000.0, self.percentile(0.99) / 1000.0, self.maximum / 1000.0)
 
     def percentile(self, share: float) -> float:
         """The duration in ns that a share (0 to 1) of all does not exceed, rounded up to its bin."""

@@ -35,13 +35,13 @@ _READING = 300_000  # ns: nothing is read ahead in less time than this before a 
 class PlayerOutput:
     """The callbacks of a player.
 
-    make_room: wait until subscribers have received what a message would overwrite; controls still work meanwhile.
-    publish: send a message, False if that failed. settle: wait until subscribers have received everything.
-    announce: take the new state: playing, paused or finished.
+    prepare: do all that a message requires before its time, and return the call that publishes it, False if that
+    failed. It waits until subscribers have received what the message would overwrite; controls still work meanwhile.
+    A message may be prepared more than once. settle: wait until subscribers have received everything. announce: take
+    the new state: playing, paused or finished.
     """
 
-    make_room: Callable[[RawMessage], None]
-    publish: Callable[[RawMessage], bool]
+    prepare: Callable[[RawMessage], Callable[[], bool]]
     settle: Callable[[], None]
     announce: Callable[[str], None]
 
@@ -49,7 +49,8 @@ class PlayerOutput:
 class ReplayPlayer:
     """Plays a source by a clock. run() takes a thread; all other methods may be called from any thread.
 
-    Messages are never dropped: a late one is published at once. published and failed count messages.
+    Messages are never dropped: a late one is published at once. published and failed count messages. lateness: delay
+    up to the call that publishes a message; lateness_after: up to its return.
     """
 
     def __init__(
@@ -64,7 +65,8 @@ class ReplayPlayer:
     ) -> None:
         self._source, self._clock, self._wall, self._output = source, clock, wall, output
         self._size, self._loop, self._delay = window, loop, delay
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
         self._waiting, self._counting = 0, threading.Lock()
         self._ahead: ReadAhead | None = None
         self._range = PlayRange()
@@ -72,7 +74,7 @@ class ReplayPlayer:
         self._stopped = self._closed = False
         self._time: int | None = None
         self.state = "waiting"
-        self.lateness = Lateness()
+        self.lateness, self.lateness_after = Lateness(), Lateness()
         self.published = self.failed = 0
 
     def run(self) -> None:
@@ -134,8 +136,7 @@ class ReplayPlayer:
         done = 0
         with self._control():
             while self._clock.paused and (count == 0 or done < count) and (head := self._head()) is not None:
-                self._output.make_room(head)
-                self._send(head)
+                self._send(head, self._output.prepare(head))
                 done += 1
             if done and self._time is not None:
                 self._clock.jump(self._time)
@@ -238,27 +239,29 @@ class ReplayPlayer:
             deadline = self._clock.deadline(head.log_time)
             assert self._ahead is not None
             self._ahead.fill(lambda: deadline - self._wall.now() > _READING)
+        publish = self._output.prepare(head)
         if self._clock.sleep_until(head.log_time, generation):
-            self._output.make_room(head)
-            self._send_at(head, generation)
+            self._send_at(head, publish, generation, deadline)
         return True
 
-    def _send_at(self, head: RawMessage, generation: int) -> None:
-        with self._changed:
+    def _send_at(self, head: RawMessage, publish: Callable[[], bool], generation: int, deadline: int) -> None:
+        # After a sleep the caches are cold: each line before the message is published costs about a microsecond.
+        with self._lock:
             # A control may have come between the sleep and the lock: the head may have changed.
             if generation == self._clock.generation and not self._stopped:
-                deadline = self._clock.deadline(head.log_time)
-                self._send(head)
-                self.lateness.add(self._wall.now() - deadline)
+                begin = self._wall.now()
+                self._send(head, publish)
+                self.lateness_after.add(self._wall.now() - deadline)
+                self.lateness.add(begin - deadline)
 
-    def _send(self, message: RawMessage) -> None:
-        assert self._ahead is not None
-        self._ahead.pop()
-        self._time = message.log_time
-        if self._output.publish(message):
+    def _send(self, message: RawMessage, publish: Callable[[], bool]) -> None:
+        ahead, self._time = self._ahead, message.log_time
+        if publish():
             self.published += 1
         else:
             self.failed += 1
+        assert ahead is not None
+        ahead.pop()
 
     def _head(self) -> RawMessage | None:
         head = self._ahead.peek() if self._ahead else None

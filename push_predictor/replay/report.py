@@ -20,11 +20,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from push_predictor.replay.lateness import Delays
+
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """State of a replay; late_* in us, behind in s, acknowledged None before the end.
+    """State of a replay; behind in s, acknowledged None before the end.
 
+    late: delay of the messages up to the call that publishes them; late_after: up to its return.
     problems: what the check of the recording found; check: its result.
     """
 
@@ -32,9 +35,8 @@ class ReplayReport:
     state: str
     rate: float
     published: int
-    late_p50: float
-    late_p99: float
-    late_max: float
+    late: Delays
+    late_after: Delays
     behind: float
     lost: int
     acknowledged: bool | None
@@ -64,9 +66,12 @@ class ReplayReport:
             "recording": self.recording,
             "rate": f"{self.rate:g}",
             "published": str(self.published),
-            "late_p50_us": f"{self.late_p50:.1f}",
-            "late_p99_us": f"{self.late_p99:.1f}",
-            "late_max_us": f"{self.late_max:.1f}",
+            "late_p50_us": f"{self.late.p50:.1f}",
+            "late_p99_us": f"{self.late.p99:.1f}",
+            "late_max_us": f"{self.late.maximum:.1f}",
+            "late_after_p50_us": f"{self.late_after.p50:.1f}",
+            "late_after_p99_us": f"{self.late_after.p99:.1f}",
+            "late_after_max_us": f"{self.late_after.maximum:.1f}",
             "behind_s": f"{self.behind:.6f}",
             "lost": str(self.lost),
             "acknowledged": {None: "unknown", True: "yes", False: "no"}[self.acknowledged],
@@ -80,7 +85,7 @@ class ReplayReport:
         """One line for the log."""
         figures = (
             f"{self.state}: published {self.published} messages of {self.recording} at rate {self.rate:g}, "
-            f"late p50 {self.late_p50:.0f} us, p99 {self.late_p99:.0f} us, max {self.late_max:.0f} us, "
+            f"late {self.late.to_text()}, after publishing {self.late_after.to_text()}, "
             f"lost {self.lost}, acknowledged {self.values['acknowledged']}"
         )
         return "; ".join([figures, *self.warnings])

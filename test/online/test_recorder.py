@@ -16,9 +16,7 @@
 
 from __future__ import annotations
 
-import io
 import resource
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,14 +27,9 @@ from lab_bags import Lab, pose_rows, short_recording
 from mcap.reader import make_reader
 from repository import REPOSITORY
 
-from push_predictor.errors import RecordingError, RequestError
-from push_predictor.online.recorder.live_line import LOG_PERIOD, LiveLine
+from push_predictor.errors import RecordingError
 from push_predictor.online.recorder.live_recording import NO_RIG, LiveRecording
-from push_predictor.online.recorder.message_files import definition_text
-from push_predictor.online.recorder.pace import Pace
-from push_predictor.online.recorder.progress import Progress, StreamFigures
-from push_predictor.online.recorder.recorded_topics import RecordedTopic, resolved, topics_to_record
-from push_predictor.online.recorder.sequence_gaps import SequenceGaps
+from push_predictor.online.recorder.progress import Progress
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.bag.writer import LIVE_CHUNK_SIZE, BagWriter
@@ -415,38 +408,6 @@ def test_an_unknown_frame_is_named_with_the_known_ones(tmp_path: Path) -> None:
     assert any("no frame 'block'; the frames are tool0, world" in text for text in problems(recording, 1.0))
 
 
-# --- topics ----------------------------------------------------------------------------------------------------------
-
-
-def test_default_topics_are_recorded_and_the_wrench_may_be_missing() -> None:
-    wanted = topics_to_record(Topics(), with_wrench=False)
-    assert [(topic.name, topic.expected) for topic in wanted] == [
-        ("slider/pose", True),
-        ("pusher/pose", True),
-        ("pusher/wrench", False),
-    ]
-
-
-def test_each_topic_is_recorded_once_and_tf_with_its_static_part() -> None:
-    wanted = topics_to_record(Topics("/tf:block", "/tf:tool0", "/state.wrench", ("/state.current",)))
-    assert wanted == (
-        RecordedTopic("/tf", ("slider", "pusher")),
-        RecordedTopic("/tf_static", ("slider", "pusher"), expected=False, static=True),
-        RecordedTopic("/state", ("wrench", "covariate")),
-    )
-
-
-@pytest.mark.parametrize("given", [Topics(world="map"), Topics(wrench_frame="ft_sensor")])
-def test_tf_is_recorded_if_a_reader_will_turn_by_it(given: Topics) -> None:
-    names = [topic.name for topic in topics_to_record(given)]
-    assert names[-2:] == ["/tf", "/tf_static"]
-
-
-@pytest.mark.parametrize("given", [Topics(), Topics(wrench_frame="tip"), Topics(wrench_frame="world")])
-def test_tf_is_not_recorded_where_nothing_is_turned_by_it(given: Topics) -> None:
-    assert "/tf" not in [topic.name for topic in topics_to_record(given)]
-
-
 def test_what_readers_do_with_the_wrench_is_saved(messages: list[RawMessage], tmp_path: Path) -> None:
     given = Topics("/slider/pose", "/pusher/pose", wrench_frame="tip", wrench_bias="free_motion", world="map")
     recording = recorder(tmp_path / "a", given)
@@ -454,161 +415,3 @@ def test_what_readers_do_with_the_wrench_is_saved(messages: list[RawMessage], tm
     recording.close(1.0)
     saved = load_topics(tmp_path / "a")
     assert (saved.wrench_frame, saved.wrench_bias, saved.world) == ("tip", "free_motion", "map")
-
-
-def test_a_topic_is_expected_if_one_of_its_streams_is() -> None:
-    wanted = topics_to_record(Topics("/state.pose", "/state.tip", "/state.wrench"), with_wrench=False)
-    assert wanted == (RecordedTopic("/state", ("slider", "pusher", "wrench"), expected=True),)
-
-
-def test_names_are_resolved_and_fields_and_frames_stay() -> None:
-    given = Topics("", "/tf:tool0", "netft.wrench", ("driver.currents[2]",), "map")
-    found = resolved(given, lambda name: name if name.startswith("/") else f"/cell/{name}")
-    expected = Topics("/cell/slider/pose", "/tf:tool0", "/cell/netft.wrench", ("/cell/driver.currents[2]",), "map")
-    assert found == expected
-
-
-@pytest.mark.parametrize(
-    ("given", "field"),
-    [
-        (Topics(slider="/tf:"), "slider_topic"),
-        (Topics(pusher="/"), "pusher_topic"),
-        (Topics(wrench="/tf:sensor"), "wrench_topic"),
-        (Topics(covariates=(".x",)), "covariate_topics"),
-    ],
-)
-def test_a_text_that_is_no_topic_is_refused(given: Topics, field: str) -> None:
-    with pytest.raises(RequestError, match=f"{field}: .* is not accepted, give TOPIC"):
-        resolved(given, str)
-
-
-def test_definitions_contain_each_inner_type_once(tmp_path: Path) -> None:
-    for name, text in {"A": "B one\nB[] two\nother/C c\n", "B": "int32 COUNT=3\nfloat64 x"}.items():
-        (tmp_path / "lab" / "msg").mkdir(parents=True, exist_ok=True)
-        (tmp_path / "lab" / "msg" / f"{name}.msg").write_text(text)
-    with pytest.raises(RecordingError, match=r"other/msg/C\.msg: not found in"):
-        definition_text("lab/msg/A", [tmp_path])
-    (tmp_path / "other" / "msg").mkdir(parents=True)
-    (tmp_path / "other" / "msg" / "C.msg").write_text("string name\n")
-    rule = "=" * 80
-    assert definition_text("lab/msg/A", [Path("/nowhere"), tmp_path]) == (
-        f"B one\nB[] two\nother/C c\n{rule}\nMSG: lab/B\nint32 COUNT=3\nfloat64 x\n{rule}\nMSG: other/C\nstring name\n"
-    )
-
-
-# --- pace and line ---------------------------------------------------------------------------------------------------
-
-
-def stamps(*seconds: float) -> np.ndarray:
-    return np.array([round(second * 1e9) for second in seconds], np.int64)
-
-
-def test_gaps_are_found_within_and_between_portions() -> None:
-    pace = Pace(0.0)
-    pace.add(stamps(10.0, 10.1), 1.0)
-    assert pace.largest_gap == pytest.approx(0.1)
-    pace.add(stamps(10.6, 10.7), 2.0)
-    assert pace.largest_gap == pytest.approx(0.5) and pace.samples == 4
-    assert pace.rate == pytest.approx(3 / 0.7)
-
-
-def test_a_slow_stream_may_be_silent_for_four_periods() -> None:
-    fast, slow = Pace(0.0), Pace(0.0)
-    fast.add(stamps(0.0, 0.1), 1.0)
-    slow.add(stamps(0.0, 2.0), 2.0)
-    assert fast.silent(3.9) == 0.0 and fast.silent(4.0) == pytest.approx(3.0)
-    assert slow.silent(9.9) == 0.0 and slow.silent(10.0) == pytest.approx(8.0)
-
-
-def test_missing_messages_are_counted_for_a_single_publisher() -> None:
-    gaps = SequenceGaps()
-    gaps.set_publishers(1)
-    assert [gaps.missing(number) for number in (7, 8, 11, 12, 3, 4)] == [0, 0, 2, 0, 0, 0]
-    gaps.set_publishers(1)
-    assert gaps.missing(6) == 1
-    gaps.set_publishers(2)
-    assert [gaps.missing(number) for number in (90, 8, 95)] == [0, 0, 0]
-    gaps.set_publishers(1)
-    assert gaps.missing(200) == 0 and gaps.missing(None) == 0 and gaps.missing(300) == 0
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_before_the_first_message_the_line_says_what_it_waits_for() -> None:
-    problems = {"rig": NO_RIG, "/b": "No publisher of /b."}
-    waiting = Progress("monday", 0.0, {"/a": 0}, (), None, None, None, problems)
-    assert waiting.to_line() == "waiting for messages, No rig, No publisher of /b"
-
-
-def test_one_window_of_one_push_is_in_the_singular() -> None:
-    one = Progress("monday", 0.5, {"/a": 3}, (), 1, 1, None)
-    assert one.to_line() == "0.5 s, 1 window of 1 push"
-
-
-def test_a_slow_covariate_is_no_gap_of_the_streams(progress: Callable[..., Progress]) -> None:
-    slow = StreamFigures("/warmth", "/warmth", 3, 0.5, 2.0)
-    whole = replace(progress(), streams=(*progress().streams, slow))
-    assert "largest gap 21 ms (slider)" in whole.to_line()
-    assert "\n  /warmth: 3 samples, 0.5 Hz, largest gap 2 s" in whole.to_text()
-
-
-@pytest.fixture
-def progress() -> Callable[..., Progress]:
-    def made(**problems: str) -> Progress:
-        figures = (StreamFigures("slider", "/a", 250, 99.96, 0.021), StreamFigures("pusher", "/b", 500, 200.0, 0.011))
-        return Progress("monday", 2.5, {"/a": 250, "/b": 500}, figures, 12, 3, 0.416, problems)
-
-    return made
-
-
-def test_the_line_has_windows_contact_gap_problems_and_rates(progress: Callable[..., Progress]) -> None:
-    assert progress(wrench="No publisher of /w.").to_line() == (
-        "2.5 s, 12 windows of 3 pushes, contact 42 %, largest gap 21 ms (slider), No publisher of /w, "
-        "slider 250 (100 Hz), pusher 500 (200 Hz)"
-    )
-
-
-def test_a_terminal_gets_one_line_that_fits(progress: Callable[..., Progress], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "40")
-    log, terminal = list[str](), Terminal()
-    line = LiveLine(log.append, log.append, terminal)
-    line.show(progress(), 0.0)
-    line.show(progress(), 1.0)
-    written = terminal.getvalue().split("\r\x1b[K")[1:]
-    assert written == ["2.5 s, 12 windows of 3 pushes, contact…"] * 2 and len(written[0]) == 39 and not log
-
-
-def test_without_a_terminal_a_line_is_logged_every_few_seconds(progress: Callable[..., Progress]) -> None:
-    log, warned, stream = list[str](), list[str](), io.StringIO()
-    line = LiveLine(log.append, warned.append, stream)
-    for second in range(11):
-        line.show(progress(), float(second))
-    assert LOG_PERIOD == 5.0 and len(log) == 3 and not warned and not stream.getvalue()
-
-
-def test_a_problem_is_logged_once_if_it_lasts_and_again_if_it_comes_back(progress: Callable[..., Progress]) -> None:
-    warned = list[str]()
-    line = LiveLine(lambda text: None, warned.append, io.StringIO())
-    for problems in ({"a": "A."}, {}, {"a": "A."}, {"a": "A for 2 s."}, {"a": "A for 3 s."}, {}):
-        line.show(progress(**problems), 0.0)
-    assert warned == ["A for 2 s."]
-    for _ in range(2):
-        line.show(progress(a="A."), 0.0)
-    assert warned == ["A for 2 s.", "A."]
-
-
-def test_the_summary_names_every_stream_and_problem(progress: Callable[..., Progress]) -> None:
-    summary = progress(wrench="No publisher of /w.")
-    assert summary.to_text().splitlines() == [
-        "monday: 2.5 s, 750 messages, 12 windows of 3 pushes, contact 42 %, largest gap 21 ms (slider)",
-        "  slider (/a): 250 samples, 100 Hz, largest gap 21 ms",
-        "  pusher (/b): 500 samples, 200 Hz, largest gap 11 ms",
-        "No publisher of /w.",
-    ]
-    assert summary.to_json()["streams"] == {
-        "/a": {"stream": "slider", "samples": 250, "rate": 99.96, "largest_gap": 0.021},
-        "/b": {"stream": "pusher", "samples": 500, "rate": 200.0, "largest_gap": 0.011},
-    }

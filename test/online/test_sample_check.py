@@ -33,6 +33,7 @@ from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.replay.lateness import Delays
 from push_predictor.replay.report import ReplayReport
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
@@ -157,7 +158,9 @@ def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -
 
 
 def test_a_replay_reports_what_the_check_found() -> None:
-    report = ReplayReport("bag", "playing", 1.0, 0, 0.0, 0.0, 0.0, 0.0, 0, None, problems=["wrong"], check="units_rig")
+    in_time = Delays(0.0, 0.0, 0.0)
+    found = {"problems": ["wrong"], "check": "units_rig"}
+    report = ReplayReport("bag", "playing", 1.0, 0, in_time, in_time, 0.0, 0, None, **found)
     assert report.warnings == ["wrong"] and report.values["data_check"] == "units_rig"
 
 

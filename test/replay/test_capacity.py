@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import pytest
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.capacity import MOST, PUBLISHING, capacity, measure_capacity
+from push_predictor.replay.capacity import MOST, PUBLISHING, TAKING, Capacity, capacity, measure_capacity
 
 MS = 1_000_000
 
@@ -64,7 +64,21 @@ def test_the_largest_rate_is_the_ratio_of_playable_and_recorded_messages() -> No
     assert found.playable == pytest.approx(101_000.0 / (1.0 + PUBLISHING))
     assert found.largest_rate == pytest.approx(1010.0 / (1.0 + PUBLISHING))
     assert found.to_text(2.0).startswith("100 messages/s recorded, 200 messages/s at rate 2. ")
-    assert f"about {found.playable:.0f} messages/s: rate 374" in found.to_text(2.0)
+    assert f"plays about {found.playable:.0f} messages/s: rate 374. " in found.to_text(2.0)
+
+
+def test_a_subscriber_in_python_limits_the_rate_without_loss() -> None:
+    found = capacity([10 * MS * k for k in range(101)], reading=MS)
+    assert found is not None
+    assert found.taken == pytest.approx(101_000.0 / TAKING) and found.taken < found.playable
+    assert found.largest_lossless_rate == pytest.approx(1010.0 / TAKING)
+    assert "takes about 9182 messages/s: nothing is lost up to rate 91.8, or with history KEEP_ALL" in found.to_text(
+        2.0
+    )
+
+
+def test_a_rate_that_the_player_cannot_reach_is_not_stated_as_without_loss() -> None:
+    assert Capacity(recorded=100.0, playable=500.0, taken=900.0).largest_lossless_rate == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("times", [[], [7], [7, 7]])

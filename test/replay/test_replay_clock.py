@@ -148,3 +148,14 @@ def test_percentiles_of_lateness_are_accurate_to_a_bin(values: list[int], share:
 
 def test_percentile_without_values_is_zero() -> None:
     assert Lateness().percentile(0.99) == 0.0
+
+
+def test_delays_are_the_percentiles_in_microseconds() -> None:
+    lateness = Lateness()
+    for late in [10_000] * 98 + [300_000, 2_000_000]:
+        lateness.add(late)
+    delays = lateness.delays()
+    assert delays.p50 == pytest.approx(10.0, rel=0.045)
+    assert delays.p99 == pytest.approx(300.0, rel=0.045)
+    assert delays.maximum == 2000.0
+    assert delays.to_text() == f"p50 {delays.p50:.0f} us, p99 {delays.p99:.0f} us, max 2000 us"

@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -54,13 +55,13 @@ class Stage:
         self.script: dict[int, list[str | tuple[str, object]]] = {}
         self.when_stuck: list[tuple[str, object] | str] = []
         self.log: list[tuple[float, RawMessage]] = []
+        self.prepared: list[tuple[float, RawMessage]] = []
         self.states: list[str] = []
         self.settled: list[int] = []
         self.cost = 0
+        self.refused: set[RawMessage] = set()
         self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
-        output = PlayerOutput(
-            lambda message: None, self.publish, lambda: self.settled.append(len(self.log)), self.states.append
-        )
+        output = PlayerOutput(self.prepare, lambda: self.settled.append(len(self.log)), self.states.append)
         source = options.pop("source", ListSource(messages))
         settings = {"window": 10, "loop": False, "delay": 0, **options}
         self.player = ReplayPlayer(source, self.clock, self, output, **settings)
@@ -78,12 +79,16 @@ class Stage:
         assert condition is not None
         self.do(self.when_stuck.pop(0) if self.when_stuck else "close")
 
+    def prepare(self, message: RawMessage) -> Callable[[], bool]:
+        self.prepared.append((self.time / SECOND, message))
+        return partial(self.publish, message)
+
     def publish(self, sent: RawMessage) -> bool:
         self.log.append((self.time / SECOND, sent))
         self.time += self.cost
         for action in self.script.pop(len(self.log), []):
             self.do(action)
-        return True
+        return sent not in self.refused
 
     def do(self, action: str | tuple[str, object]) -> None:
         name, *arguments = [action] if isinstance(action, str) else action
@@ -126,7 +131,23 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     stage = Stage(TEN)
     stage.cost = round(0.15 * SECOND)
     assert stage.run() == TENTHS
-    assert stage.player.lateness.maximum == pytest.approx(0.6 * SECOND, rel=0.01)
+    assert stage.player.lateness.maximum == pytest.approx(0.45 * SECOND, rel=0.01)
+    assert stage.player.lateness_after.maximum == pytest.approx(0.6 * SECOND, rel=0.01)
+    assert stage.player.lateness.count == stage.player.lateness_after.count == stage.player.published == 10
+
+
+def test_each_message_is_prepared_while_the_player_waits_for_it() -> None:
+    stage = Stage(TEN, rate=10.0)
+    stage.run()
+    assert [m for _, m in stage.prepared] == TEN
+    assert [wall for wall, _ in stage.prepared] == pytest.approx([0.0, *stage.times[:-1]])
+
+
+def test_a_message_that_cannot_be_published_counts_as_failed() -> None:
+    stage = Stage(TEN)
+    stage.refused = {TEN[3]}
+    assert stage.run() == TENTHS
+    assert (stage.player.published, stage.player.failed) == (9, 1)
 
 
 @given(st.permutations(range(10)))
@@ -229,6 +250,25 @@ def test_seek_goes_forward_and_back_without_waiting() -> None:
     assert stage.times == pytest.approx([0.0, 0.1, 0.1, 0.2, 0.2])
 
 
+@pytest.mark.parametrize(
+    ("control", "published"), [(("seek", START + 8 * SECOND // 10), [0.0, 0.1, 0.8, 0.9]), ("stop", [0.0, 0.1])]
+)
+def test_a_control_just_after_the_sleep_keeps_the_message_back(
+    control: str | tuple[str, object], published: list[float]
+) -> None:
+    stage = Stage(TEN)
+    sleep_until = stage.clock.sleep_until
+
+    def sleep_then_control(recorded: int, generation: int) -> bool:
+        slept = sleep_until(recorded, generation)
+        if slept and recorded == TEN[2].log_time:
+            stage.do(control)
+        return slept
+
+    stage.clock.sleep_until = sleep_then_control
+    assert stage.run() == published
+
+
 def test_seek_before_the_start_goes_to_the_start() -> None:
     stage = Stage(TEN)
     stage.script[3] = [("seek", 0)]
@@ -283,14 +323,13 @@ def test_clock_never_passes_the_next_message() -> None:
     stage.cost = SECOND
     seen: list[int | None] = []
 
-    def look(sent: RawMessage) -> bool:
-        done = stage.publish(sent)
+    def look(message: RawMessage) -> Callable[[], bool]:
         stage.player.report_time(seen.append)  # late by now: the clock alone would be far ahead
-        return done
+        return partial(stage.publish, message)
 
-    stage.player._output = PlayerOutput(lambda message: None, look, lambda: None, stage.states.append)
+    stage.player._output = PlayerOutput(look, lambda: stage.player.report_time(seen.append), stage.states.append)
     stage.run()
-    assert seen == [*(m.log_time for m in TEN[1:]), TEN[-1].log_time]
+    assert seen == [*(m.log_time for m in TEN), TEN[-1].log_time]
 
 
 def test_half_the_window_is_read_without_time_and_all_of_it_with_time() -> None:

@@ -19,7 +19,8 @@ from __future__ import annotations
 import importlib
 import re
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from rclpy.exceptions import InvalidTopicNameException, ParameterException
@@ -79,21 +80,14 @@ class ReplayTopics:
         for topic, kind in topics.items():
             self._open(topic, kind)
 
-    def make_room(self, message: RawMessage) -> None:
-        """Wait, for a limited time, for the subscribers that a message would make lose another."""
-        self.senders[message.topic].make_room()
+    def prepare(self, message: RawMessage) -> Callable[[], bool]:
+        """Wait, for a limited time, for the subscribers that a message would make lose another.
 
-    def send(self, message: RawMessage) -> bool:
-        """Publish a message; False if that failed."""
-        try:
-            self.senders[message.topic].send(message)
-        except (rclpy_implementation.RCLError, struct.error, IndexError) as error:
-            self._node.get_logger().error(
-                f"{message.topic}: a message of {len(message.data)} bytes cannot be published ({error})",
-                throttle_duration_sec=5.0,
-            )
-            return False
-        return True
+        Returns the call that publishes the message: False if that failed.
+        """
+        sender = self.senders[message.topic]
+        sender.make_room()
+        return partial(self._send, sender.send, message)
 
     def acknowledged(self) -> bool:
         """Whether all matched reliable subscribers have acknowledged everything."""
@@ -103,6 +97,17 @@ class ReplayTopics:
     def overwritten(self) -> int:
         """Number of messages that a subscriber may have lost because it did not acknowledge in time."""
         return sum(sender.overwritten for sender in self.senders.values())
+
+    def _send(self, send: Callable[[RawMessage], None], message: RawMessage) -> bool:
+        try:
+            send(message)
+        except (rclpy_implementation.RCLError, struct.error, IndexError) as error:
+            self._node.get_logger().error(
+                f"{message.topic}: a message of {len(message.data)} bytes cannot be published ({error})",
+                throttle_duration_sec=5.0,
+            )
+            return False
+        return True
 
     def _open(self, topic: str, kind: str) -> None:
         name = topic.lstrip("/")
