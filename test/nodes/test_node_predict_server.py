@@ -668,7 +668,7 @@ def memory_kb(process) -> int:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_memory_does_not_grow(server):
     bad = np.full(3, np.nan)
 

@@ -82,6 +82,7 @@ def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_proje
     assert np.mean(rows) == pytest.approx(np.mean(np.square(total)), rel=0.18)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("a_library_of_six")
 def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(deployed: PushModel) -> None:
     """Twelve recordings of 40 pushes at level 0.2: if that is the rate, seven or more have a probability of 0.4 %."""

@@ -124,7 +124,7 @@ class TestFalseAlarms:
     REPETITIONS = 200
     ALPHA = 0.05
 
-    @pytest.mark.slow
+    @pytest.mark.long
     @pytest.mark.parametrize(
         ("tails", "common"), [(np.inf, 0.0), (3.0, 0.8)], ids=["normal", "heavy tails, windows of a push alike"]
     )

@@ -168,7 +168,7 @@ def on_an_uneven_table(seed: int) -> PushTable:
     return replace(table, covariates={**table.covariates, **forces, **where})
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_level_holds_on_a_table_whose_friction_varies_with_position() -> None:
     """Training and new pushes are at other places of the same table; independent pairs, so that counts are binomial."""
     p_values = []
