@@ -18,18 +18,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from synthetic import triangle
 
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.features import push_features
 from push_predictor.models.gaussian_process.constant import fit_constant
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.prediction_table import on_grid
+from push_predictor.models.store.single_record import single_from, single_record
+from push_predictor.models.store.table_file import read_tables, write_tables
 from push_predictor.models.tabulated.single_push import posteriors as module
 from push_predictor.models.tabulated.single_push.posteriors import SinglePosteriors, accuracy_of, single_posteriors
 from push_predictor.models.tabulated.table_accuracy import (
@@ -128,7 +131,7 @@ def test_comparison_covers_all_that_differs() -> None:
     found, predictor = single_posteriors(model), model.predictor
     assert found is not None and isinstance(predictor, GaussianProcessPredictor)
     scaled = replace(predictor, scaling=replace(predictor.scaling, outcome_mean=predictor.scaling.outcome_mean + 1e-4))
-    shifted = SinglePosteriors(scaled, [on_grid(regression) for regression in predictor.regressions])
+    shifted = SinglePosteriors(scaled, found.regressions)
     assert not accuracy_of(shifted, model).accepted
 
 
@@ -155,3 +158,38 @@ def test_pushes_outside_are_of_all_kinds() -> None:
 def test_a_model_without_a_table_keeps_its_own_predictions() -> None:
     analytical = train_model(trained("square", "gp").training, trained("square", "gp").rig, "analytical", name="a")
     assert with_single_posteriors(tabulate(analytical)).single is None and single_posteriors(analytical) is None
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_posteriors_of_a_file_predict_the_same(kind: str, tmp_path: Path) -> None:
+    model = trained("square", kind)
+    written = with_single_posteriors(tabulate(model))
+    write_tables(tmp_path / "tables", "digest", written)
+    read = read_tables(tmp_path / "tables", "digest", model)
+    assert read is not None and read.single is not None and written.single is not None
+    for row in push_features(model.rig.outline, outside_pushes(model, 20)).tolist():
+        assert read.single.moments(row) == written.single.moments(row)
+
+
+def test_an_output_of_constant_noise_has_no_arrays_in_the_file() -> None:
+    model = trained("square", "gp")
+    predictor = model.predictor
+    assert isinstance(predictor, GaussianProcessPredictor)
+    first, second, third = predictor.regressions
+    constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
+    mixed = replace(predictor, regressions=(first, constant, third))
+    found = single_posteriors(replace(model, predictor=mixed))
+    assert found is not None
+    record = single_record(found, arrays := {})
+    assert record[1] is None and not any(name.startswith("single_1") for name in arrays)
+    assert single_from(mixed, record, arrays).moments([0.02, 0.3, 1.4]) == found.moments([0.02, 0.3, 1.4])
+
+
+def test_posteriors_that_predict_otherwise_are_not_read(tmp_path: Path) -> None:
+    model = trained("square", "vhgp")
+    served = with_single_posteriors(tabulate(model))
+    assert served.single is not None
+    signal = served.single.regressions[0].signal  # type: ignore[union-attr]  # not constant
+    signal.weights[:] *= 1.01
+    write_tables(tmp_path / "tables", "digest", served)
+    assert read_tables(tmp_path / "tables", "digest", model) is None

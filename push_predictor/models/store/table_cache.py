@@ -55,6 +55,8 @@ def load_served(path: Path) -> TabulatedModel:
     Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
     served = load_at_once(path)
+    if served.base_how != NO_TABLE_YET:
+        return served
     with _naming(path):
         tabulated = completed(served)
     return_memory()
@@ -91,8 +93,10 @@ def _naming(path: Path) -> Iterator[None]:
 
 @one_blas_thread()
 def completed(served: TabulatedModel) -> TabulatedModel:
-    """A model of `load_at_once` with its tables, and fast for single pushes outside them; itself if complete."""
-    tabulated = _with_single(_computed(served.model) if served.base_how == NO_TABLE_YET else served)
+    """A model of `load_at_once` with its tables; itself if it has them."""
+    if served.base_how != NO_TABLE_YET:
+        return served
+    tabulated = _computed(served.model)
     tabulated.free_matrices()
     return tabulated
 
@@ -100,7 +104,7 @@ def completed(served: TabulatedModel) -> TabulatedModel:
 @one_blas_thread()
 def as_served(model: PushModel) -> TabulatedModel:
     """The model as the server predicts with it: with the tables of its base and of its effects."""
-    return _with_single(_read(model, None) or _computed(model))
+    return _read(model, None) or _computed(model)
 
 
 @one_blas_thread()
@@ -111,9 +115,7 @@ def keep_tables(model: PushModel, path: Path) -> None:
     """
     if not path.is_file():
         return
-    served = _read(model, None)
-    if served is None:
-        served = with_effect_table(tabulate(model))
+    served = _read(model, None) or _tabulated(model)
     write_tables(tables_of(path), model_digest(model), served)
 
 
@@ -146,10 +148,6 @@ def _read(model: PushModel, path: Path | None) -> TabulatedModel | None:
     return served
 
 
-def _with_single(tabulated: TabulatedModel) -> TabulatedModel:
-    return tabulated if tabulated.single is not None else with_single_posteriors(tabulated)
-
-
 def _without_tables(model: PushModel) -> TabulatedModel:
     if isinstance(model.base.predictor, PriorPredictor):
         return _computed(model)
@@ -158,12 +156,16 @@ def _without_tables(model: PushModel) -> TabulatedModel:
 
 def _computed(model: PushModel) -> TabulatedModel:
     """The model with its tables, which are kept; a folder that takes no files is no error."""
-    served, digest = with_effect_table(tabulate(model)), model_digest(model)
+    served, digest = _tabulated(model), model_digest(model)
     if (kept := _kept(digest)) is not None:
         with suppress(OSError):
             write_tables(kept, digest, served)
             _delete_oldest(kept.parent)
     return served
+
+
+def _tabulated(model: PushModel) -> TabulatedModel:
+    return with_single_posteriors(with_effect_table(tabulate(model)))
 
 
 def return_memory() -> None:

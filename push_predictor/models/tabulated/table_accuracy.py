@@ -53,7 +53,7 @@ class TableAccuracy:
 
 @dataclass(frozen=True, eq=False)
 class Probes:
-    """Pushes (n, 3) of a domain and what the model itself predicts: mean (n, 3) and covariances (n, 3, 3), SI units."""
+    """Pushes (n, 3) and what the model itself predicts: mean (n, 3) and covariances (n, 3, 3), SI units."""
 
     inputs: Array
     mean: Array
@@ -85,6 +85,13 @@ def outside_pushes(model: PushModel, count: int) -> Array:
     low, high = [0.5 * speed.min(), 0.0, -STEEPEST], [2.0 * speed.max(), 1.0, STEEPEST]
     spread = np.random.default_rng(0).uniform(low, high, (20 * count, 3))
     return np.asarray(spread[~model.in_domain(spread)][:count])
+
+
+def probed_outside(model: PushModel, count: int) -> Probes:
+    """At most `count` pushes outside a model's domain, and what it predicts."""
+    inputs = outside_pushes(model, count)
+    exact = model.predict_rows(inputs, np.full(len(inputs), model.usual_duration))
+    return Probes(inputs, exact.mean, exact.covariance, exact.process_covariance)
 
 
 def probed(model: PushModel, count: int = CHECKED) -> Probes:

@@ -37,7 +37,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression
 from push_predictor.models.tabulated.prediction_table import on_grid
 from push_predictor.models.tabulated.single_push.moments import moments_in_numbers
-from push_predictor.models.tabulated.table_accuracy import TableAccuracy, compared_with, outside_pushes
+from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, compared_with, probed_outside
 from push_predictor.types import Array, IntArray
 
 NEGLIGIBLE = 2e-4  # of the smallest noise variance: prior variance of f that is neglected
@@ -48,11 +48,38 @@ DOUBLE: np.dtype[Any] = np.dtype(np.float64)
 CHECKED = 100  # pushes outside the domain
 
 
+@dataclass(frozen=True, eq=False)
+class SinglePosterior:
+    """The posterior of one function: mean and variance from correlations with its inputs.
+
+    inverse (D,): 1 / (2^1/2 lengthscale); inputs (n, D); weights (n,): of the correlations, for the mean. pivots (r,):
+    inputs whose correlations, times the factor (s, r), have the explained variance as squared norm. prior: variance
+    far from all inputs; least: what the variance cannot fall below.
+    """
+
+    inverse: Array
+    inputs: Array
+    weights: Array
+    pivots: IntArray
+    factor: Array
+    prior: float
+    least: float
+
+
+@dataclass(frozen=True, eq=False)
+class SingleRegression:
+    """The posterior of an output. log_noise: log noise variance, or its prior mean if `noise` is added to it."""
+
+    log_noise: float
+    signal: SinglePosterior
+    noise: SinglePosterior | None
+
+
 class SinglePosteriors:
     """Three regressions and their correlation at one push at a time."""
 
     def __init__(
-        self, predictor: GaussianProcessPredictor, regressions: Sequence[GridRegression | ConstantNoise]
+        self, predictor: GaussianProcessPredictor, regressions: Sequence[SingleRegression | ConstantNoise]
     ) -> None:
         scaling, correlation = predictor.scaling, predictor.correlation
         self._columns = list(scaling.columns)
@@ -65,10 +92,10 @@ class SinglePosteriors:
                 strict=True,
             )
         )
-        learnt = [regression for regression in regressions if isinstance(regression, GridRegression)]
-        self._signals = _Stack.of([r.signal for r in learnt], NEGLIGIBLE, DOUBLE)
-        self._noises = _Stack.of([r.noise for r in learnt if r.noise], NEGLIGIBLE_IN_NOISE, SINGLE)
-        self._regressions = regressions
+        self.regressions = regressions
+        learnt = [regression for regression in regressions if isinstance(regression, SingleRegression)]
+        self._signals = _Stack.of([r.signal for r in learnt], DOUBLE)
+        self._noises = _Stack.of([r.noise for r in learnt if r.noise], SINGLE)
         self._coupling = None if correlation is None else _Coupling(correlation)
 
     def moments(self, features: Sequence[float]) -> list[float]:
@@ -76,7 +103,7 @@ class SinglePosteriors:
         x = (np.array([features[column] for column in self._columns]) - self._centre) * self._per_unit
         signals, noises = iter(self._signals.at(x)), iter(self._noises.at(x))
         mean, latent, process = [], [], []
-        for regression, (middle, sd, square) in zip(self._regressions, self._units, strict=True):
+        for regression, (middle, sd, square) in zip(self.regressions, self._units, strict=True):
             if isinstance(regression, ConstantNoise):
                 value, variance, log_noise = 0.0, regression.variance, log(regression.noise_variance)
             else:
@@ -96,32 +123,58 @@ def single_posteriors(model: PushModel) -> SinglePosteriors | None:
     if not isinstance(predictor, GaussianProcessPredictor):
         return None
     regressions = [on_grid(regression) for regression in predictor.regressions]
-    learnt = [regression for regression in regressions if isinstance(regression, GridRegression)]
-    if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in learnt):
-        return None  # matrices of others are not of low rank
-    found = SinglePosteriors(predictor, regressions)
+    if not all(_of_low_rank(regression) for regression in regressions):
+        return None
+    found = SinglePosteriors(predictor, [_single(regression) for regression in regressions])
     return found if accuracy_of(found, model).accepted else None
 
 
 def accuracy_of(posteriors: SinglePosteriors, model: PushModel, count: int = CHECKED) -> TableAccuracy:
     """The largest differences from a model, at pushes outside its domain."""
-    inputs = outside_pushes(model, count)
-    exact = model.predict_rows(inputs, np.full(len(inputs), model.usual_duration))
-    features = push_features(model.rig.outline, inputs).tolist()
+    return error_at(posteriors, model, probed_outside(model, count))
+
+
+def error_at(posteriors: SinglePosteriors, model: PushModel, exact: Probes) -> TableAccuracy:
+    """The largest differences from what the model itself predicts."""
+    features = push_features(model.rig.outline, exact.inputs).tolist()
     numbers = np.array([posteriors.moments(row) for row in features])
     covariance, process_covariance = numbers[:, 3:].reshape(-1, 2, 3, 3).transpose(1, 0, 2, 3)
     return compared_with(exact, numbers[:, :3], covariance, process_covariance)
 
 
+def _of_low_rank(regression: GridRegression | ConstantNoise) -> bool:
+    """Whether the matrices of an output's kernel are of low rank."""
+    return isinstance(regression, ConstantNoise) or isinstance(regression.signal.kernel, SquaredExponential)
+
+
+def _single(regression: GridRegression | ConstantNoise) -> SingleRegression | ConstantNoise:
+    if isinstance(regression, ConstantNoise):
+        return regression
+    noise = None if regression.noise is None else _reduced(regression.noise, NEGLIGIBLE_IN_NOISE)
+    return SingleRegression(regression.log_noise, _reduced(regression.signal, NEGLIGIBLE), noise)
+
+
+def _reduced(posterior: GridPosterior, negligible: float) -> SinglePosterior:
+    """The posterior with a factor of low rank."""
+    pivots, root = posterior.explaining(negligible)
+    fine = posterior.prior_variance > FAR_ABOVE_NOISE * float(posterior.noise_variances.min())
+    return SinglePosterior(
+        np.exp(-posterior.kernel.log_lengthscales) * sqrt(0.5),
+        posterior.inputs,
+        posterior.kernel.variance * posterior.weights,
+        pivots,
+        np.ascontiguousarray(root.T, dtype=DOUBLE if fine else SINGLE),
+        posterior.prior_variance,
+        posterior.least_variance,
+    )
+
+
 class _Part(NamedTuple):
-    """One posterior of a stack: where its inputs are, their weights, pivots and factor, prior and least variance."""
+    """One posterior of a stack: where its inputs are, and its weights in the stack's precision."""
 
     inputs: slice
     weights: Array
-    pivots: IntArray
-    factor: Array
-    prior: float
-    least: float
+    of: SinglePosterior
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,19 +189,15 @@ class _Stack:
     parts: list[_Part]
 
     @classmethod
-    def of(cls, posteriors: Sequence[GridPosterior], negligible: float, precision: np.dtype[Any]) -> _Stack:
+    def of(cls, posteriors: Sequence[SinglePosterior], precision: np.dtype[Any]) -> _Stack:
         """The posteriors of functions, with numbers of this precision."""
         scales, inputs, parts, start = [], [], [], 0
         for posterior in posteriors:
-            pivots, root = posterior.explaining(negligible)
-            inverse = np.exp(-posterior.kernel.log_lengthscales)[:, None] * sqrt(0.5)
+            inverse = posterior.inverse[:, None]
             scales.append(np.repeat(inverse, len(posterior.inputs), axis=1))
             inputs.append(posterior.inputs.T * inverse)
             part = slice(start, start := start + len(posterior.inputs))
-            weights = (posterior.kernel.variance * posterior.weights).astype(precision)
-            fine = posterior.prior_variance > FAR_ABOVE_NOISE * float(posterior.noise_variances.min())
-            factor: Array = np.ascontiguousarray(root.T, dtype=DOUBLE if fine else SINGLE)
-            parts.append(_Part(part, weights, pivots, factor, posterior.prior_variance, posterior.least_variance))
+            parts.append(_Part(part, posterior.weights.astype(precision), posterior))
         if not parts:
             return cls(np.empty((0, 0)), np.empty((0, 0)), [])
         scale, together = (np.concatenate(arrays, axis=1).astype(precision) for arrays in (scales, inputs))
@@ -165,9 +214,9 @@ class _Stack:
         np.exp(np.negative(kernel, out=kernel), out=kernel)
         found = []
         for part in self.parts:
-            row = kernel[part.inputs]
-            half = part.factor @ row[part.pivots].astype(part.factor.dtype)
-            found.append((float(part.weights @ row), max(part.prior - float(half @ half), part.least)))
+            row, of = kernel[part.inputs], part.of
+            half = of.factor @ row[of.pivots].astype(of.factor.dtype)
+            found.append((float(part.weights @ row), max(of.prior - float(half @ half), of.least)))
         return found
 
 
