@@ -66,9 +66,9 @@ class TrainingOptions:
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
     that, with the default kernels, a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about
     which the residual is learnt, zero, or auto for the better of both by held-out pushes (what the command and the
-    front door take). about:
-    mechanics to learn about, as they are; mean is then not used. tails: of a learnt model: whether to fit the
-    distribution of new pushes (predictors/tails.py); without it, windows of a push are taken for independent.
+    front door take). about: mechanics to learn about, as they are; mean is then not used. tails: of a learnt model:
+    whether to fit the distribution of new pushes (predictors/tails.py); without it, windows of a push are taken for
+    independent.
     """
 
     n_train: int | None = None
