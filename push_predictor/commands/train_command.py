@@ -81,7 +81,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--inducing",
         type=int,
         metavar="M",
-        help="vhgp: train a sparse model with M inducing inputs (default: dense up to 2000 windows, else M = 100)",
+        help="vhgp: train a sparse model with M inducing inputs (default: dense up to 1000 windows, else M = 100)",
     )
     parser.add_argument(
         "--mean",

@@ -141,3 +141,13 @@ def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
 def test_rejects_unusable_rows(inputs: Array, outputs: Array, complaint: str) -> None:
     with pytest.raises(TrainingError, match=complaint):
         fit_gp(inputs, outputs)
+
+
+@pytest.mark.parametrize("n", [450, 1000])
+def test_jumps_are_learnt_from_part_of_the_rows(n: int) -> None:
+    rng = np.random.default_rng(1)
+    side, along = rng.integers(8, size=n), rng.random(n)
+    outputs = (-1.0) ** side * (2.0 * along - 1.0) + 0.1 * rng.normal(size=n)
+    inputs = np.column_stack([3.0 * side + along, rng.uniform(-1.0, 1.0, n)])
+    inputs, outputs = ((x - x.mean(axis=0)) / x.std(axis=0) for x in (inputs, outputs))
+    assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25

@@ -29,6 +29,7 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParamet
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.vhgp_fit import _Search as Search
 from push_predictor.models.gaussian_process.vhgp_fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
@@ -243,3 +244,9 @@ def test_priors_of_the_noise_lengthscales_keep_their_weight_in_a_row_from_a_hund
     np.testing.assert_array_equal(few, hundred)
     np.testing.assert_allclose(many / hundred, [1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0, 1.0])
     np.testing.assert_array_equal(hundred[3:5], [0.5, 0.5])
+
+
+def test_the_search_has_the_prior_of_its_own_number_of_rows() -> None:
+    inputs, outputs = rows(400)
+    search = Search(inputs, outputs, DEFAULT_CHOICE, np.zeros(7))
+    np.testing.assert_array_equal(search.prior.spread, prior_spread(2, DEFAULT_CHOICE, 400))
