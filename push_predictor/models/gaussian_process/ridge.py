@@ -34,9 +34,7 @@ from push_predictor.types import Array
 _DROPPED = 1e-12
 _SMALLEST_FACTORISED = 200
 _LARGEST_SHARE = 0.5
-_LARGEST_SHARE_OF_HALF = (
-    0.35  # of all rows: the rank of every second row; with a higher one the search is not worthwhile
-)
+_LARGEST_SHARE_OF_HALF = 0.35  # of all rows: a higher rank of every second row makes the search not worthwhile
 
 
 class Ridge(Protocol):
