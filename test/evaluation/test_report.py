@@ -358,7 +358,7 @@ def test_figures_and_numbers_are_written_next_to_the_page(page: Path, comparison
     assert content["metrics"] == json.loads(json.dumps([metrics_json(c) for c in comparisons[::2]]))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_report_accepts_one_push_of_a_circle_and_one_model(tmp_path: Path) -> None:
     rig, training, one = rig_of("ellip1"), made_up_table(4, 1, name="train"), made_up_table(1, 2)
     model = train_model(training, rig, "analytical", name="analytical")

@@ -162,7 +162,7 @@ def test_continuation_holds_the_further_pushes_with_stamps_that_go_on(later: Sim
     assert (windows[0].start - int(first.slider.stamp[0])) * 1e-9 == pytest.approx(begin, abs=2.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_command_continues_each_undecided_recording_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

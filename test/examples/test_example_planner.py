@@ -74,6 +74,7 @@ def model(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_the_example_reaches_its_goal(model, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(harness.free_domain()))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

@@ -98,6 +98,7 @@ def _make(folder: Path) -> tuple[Path, Path]:
     return data, truth
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bags(made: tuple[Path, Path], tmp_path: Path) -> None:
     first, second = made[0] / "000", _make(tmp_path)[0] / "000"
     for name in ("training/training_0.mcap", "new/new_0.mcap", "new/metadata.yaml"):

@@ -181,7 +181,7 @@ def test_answers_to_other_clients_do_not_crowd_out_the_validators(domain: int):
 # --- push_validator and push_replay ----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
     domain: int, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

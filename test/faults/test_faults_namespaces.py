@@ -41,7 +41,7 @@ from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import ListModels, PredictPush, Resume
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 CELLS = {"/cell1": HEXAGON, "/cell2": CIRCLE}
 

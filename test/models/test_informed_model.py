@@ -100,6 +100,7 @@ def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> No
     assert replace(learnt(with_function), tails=None).gaussian
 
 
+@pytest.mark.long
 def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: PushModel, tmp_path: Path) -> None:
     rows, later = with_function.training, pushes(50, 6)
     sparse, dense = trained(rows, inducing=30), trained(rows)

@@ -382,6 +382,7 @@ def test_other_kinds_still_need_rows() -> None:
         train_model(empty_table(), RIG, "analytical", name="a")
 
 
+@pytest.mark.long
 def test_command_line_trains_and_predicts_before_the_first_push(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

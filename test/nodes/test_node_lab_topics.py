@@ -85,6 +85,7 @@ def tf_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     provide_interfaces("tf2_msgs", monkeypatch)
 
 
+@pytest.mark.long
 def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_recording(
     tmp_path: Path, tf_installed: None
 ) -> None:

@@ -318,6 +318,7 @@ class TestServerThatComesLate:
             wait_for_result(alone.process, before + 1, 120.0)
         assert_same_as_offline(alone.output, models["gp"], hexagon)
 
+    @pytest.mark.long
     def test_a_server_killed_and_started_again_costs_no_window(self, alone: Bench, models, hexagon: Path, monkeypatch):
         monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
         before, served = alone.results, {"models": [str(models["gp"])]}
@@ -399,6 +400,7 @@ class TestOneValidator:
         offline = {window.push_id for window in windows}
         assert len(offline & {entry["push_id"] for entry in windows_of(bench.output)}) >= len(offline) - 1
 
+    @pytest.mark.long
     def test_another_rig_ends_the_run_and_a_model_of_another_slider_gives_a_warning(
         self, named, models, hexagon: Path, tmp_path: Path
     ):

@@ -205,7 +205,7 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     assert f"Warning: {drifting}/pushes.csv: The push angles span" in sent[-1].message
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_goal_without_data_uses_those_of_a_running_validator(server: Server, drifting: Path, tmp_path: Path) -> None:
     last = (drifting / "pushes.csv").read_text().splitlines()[-1]
     with (drifting / "pushes.csv").open("a") as stream:

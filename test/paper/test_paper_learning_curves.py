@@ -193,7 +193,7 @@ def test_the_section_has_a_figure_per_surface_and_per_shape_and_every_pair_in_it
     json.dumps(made.data, allow_nan=False)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_measured_set_of_one_pair_gets_tables_of_its_own(tmp_path):
     study = made_up_study(tmp_path)
     reference = study.simulated.reference

@@ -149,7 +149,7 @@ def test_a_copy_of_the_mit_set_is_one_corpus_with_a_set_of_every_shape_on_every_
         assert (pushes.rig.shape, pushes.rig.surface) == (shape, surface)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("pair", PAIRS)
 def test_its_windows_are_those_of_the_pushes_that_were_written_to_it(corpus: Corpus, pair: tuple[str, str]) -> None:
     ours, theirs = corpus.sets[pair].table, own_windows(*pair)
@@ -159,7 +159,7 @@ def test_its_windows_are_those_of_the_pushes_that_were_written_to_it(corpus: Cor
     np.testing.assert_allclose(ours.outcomes[order], theirs.outcomes[expected], rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_push_cut_into_files_gives_the_windows_of_the_whole_recording_within_one(corpus: Corpus) -> None:
     """A file has little free motion to measure the force's noise: touch is seen up to a sample earlier or later."""
     recording = simulated(*PAIRS[0])
@@ -169,7 +169,7 @@ def test_a_push_cut_into_files_gives_the_windows_of_the_whole_recording_within_o
     assert np.max(np.abs(np.subtract(*counts))) <= 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_learning_curves_scores_run_on_it(corpus: Corpus, scratch: Path) -> None:
     fits = [(pair, Fit("gp", n, split, 0)) for pair in PAIRS[:2] for n in (20, 1000) for split in ("push", "random")]
     done = scores(Work(scratch / "work", cores=1), corpus, fits)
@@ -179,7 +179,7 @@ def test_the_learning_curves_scores_run_on_it(corpus: Corpus, scratch: Path) -> 
     assert all(np.all(score.nmse < 1.0) for (_, fit), score in done.items() if fit.split == "random")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_sets_are_kept_as_tables_that_can_be_trained_from(corpus: Corpus, scratch: Path) -> None:
     path = scratch / "ellip1_abs.csv"
     np.testing.assert_array_equal(load_data([path]).outcomes, corpus.sets["ellip1", "abs"].table.outcomes)
@@ -187,7 +187,7 @@ def test_the_sets_are_kept_as_tables_that_can_be_trained_from(corpus: Corpus, sc
     assert "48 recordings" in (scratch / "import.txt").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_imports_a_file_again_only_after_a_change(copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "mit"
     shutil.copytree(copy / "abs", folder)
@@ -202,7 +202,7 @@ def test_imports_a_file_again_only_after_a_change(copy: Path, tmp_path: Path, mo
     assert "file refused" in (tmp_path / "scratch" / "import.txt").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_push_that_lies_in_a_folder_and_in_an_archive_counts_once(copy: Path, tmp_path: Path) -> None:
     folder = tmp_path / "twice"
     shutil.copytree(copy / "abs", folder / "abs")
@@ -213,7 +213,7 @@ def test_a_push_that_lies_in_a_folder_and_in_an_archive_counts_once(copy: Path, 
     assert len(found.sets[PAIRS[0]].table) == len(own_windows(*PAIRS[0]))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_skips_and_names_sets_too_small_for_a_learning_curve(copy: Path, tmp_path: Path) -> None:
     folder = tmp_path / "mit"
     shutil.copytree(copy / "abs", folder)
@@ -230,7 +230,7 @@ def test_skips_and_names_sets_too_small_for_a_learning_curve(copy: Path, tmp_pat
     assert "ellip2" not in found.notes[0], "an accelerated push belongs to no table"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_folder_with_nothing_usable_is_an_error_that_names_what_is_accepted(copy: Path, tmp_path: Path) -> None:
     work = Work(tmp_path / "work", cores=1)
     (tmp_path / "empty").mkdir()
@@ -243,7 +243,7 @@ def test_folder_with_nothing_usable_is_an_error_that_names_what_is_accepted(copy
         measured_corpora(tmp_path / "empty", work, tmp_path / "scratch")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_square_table_is_a_corpus_of_its_own(copy: Path, tmp_path: Path) -> None:
     folder = tmp_path / "data"
     (folder / "mit_square").mkdir(parents=True)

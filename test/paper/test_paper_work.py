@@ -263,7 +263,7 @@ def cluster(pieces) -> Iterator[object]:
         yield client
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_path: Path) -> None:
     import joblib
 
@@ -278,7 +278,7 @@ def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_
     assert os.getpid() not in {pid for _, pid in places}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_results_of_a_cluster_are_read_from_disk_locally(cluster, pieces, tmp_path: Path) -> None:
     import joblib
 

@@ -286,7 +286,7 @@ class TestBasis:
         assert basis.name == "step"
         assert basis.place == pytest.approx(place, abs=150.0)
 
-    @pytest.mark.slow
+    @pytest.mark.long
     def test_large_effect_that_sets_in_early_is_one_step_of_every_covariate_that_has_it(self) -> None:
         """On mechanics, which absorb no constant effect, most of it looks constant: its onset must be looked for."""
         plain = pushes(200, 302)

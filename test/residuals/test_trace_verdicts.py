@@ -268,6 +268,7 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
     assert not depends_on_speed & {tested["covariate"] for tested in result["tested"]}
 
 
+@pytest.mark.long
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))

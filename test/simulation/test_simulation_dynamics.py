@@ -198,7 +198,7 @@ def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_outcome_converges_with_smaller_time_steps() -> None:
     plan = random_pushes(12, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7)).take(np.tile(np.arange(12), 3))
     physics, start = even_physics(slider_named("ellip2"), 36), np.zeros((36, 3))

@@ -58,7 +58,7 @@ def test_noise_of_repeated_pushes_is_a_tenth_to_some_tenths_and_depends_on_the_p
     assert np.all(np.max(deviation, axis=0) > 4.0 * np.min(deviation, axis=0))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_surfaces_differ_in_their_noise() -> None:
     smooth, rough = (np.median(spread(first_windows(name))[0], axis=0) for name in ("delrin", "pu"))
     assert np.all(rough > 1.4 * smooth)
