@@ -45,8 +45,9 @@ from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated import tabulated_prior
-from push_predictor.models.tabulated.tabulated_model import tabulate, with_effect_table
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
@@ -577,7 +578,7 @@ def test_service_rejects_push_without_covariate_by_name(ask: Callable[..., Any])
 def test_the_service_answers_with_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
     table = pushes(10, 1)
     time = {"elapsed_time": table.covariates["elapsed_time"]}
-    expected = predicted(with_effect_table(tabulate(load_model(model_file))), replace(table, covariates=time))
+    expected = predicted(as_served(load_model(model_file)), replace(table, covariates=time))
     batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", table.inputs, 0.2, time)))
     assert_same(prediction_from_response(batch), expected, rtol=1e-9, atol=1e-15)
     first = {name: float(column[0]) for name, column in time.items()}

@@ -41,7 +41,7 @@ from push_predictor.models.gaussian_process.kernels import (
     SquaredExponential,
     ard_kernel,
 )
-from push_predictor.models.gaussian_process.ridge import RegularisableKernel, factorise
+from push_predictor.models.gaussian_process.matrices.ridge import RegularisableKernel, factorise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 from push_predictor.models.gaussian_process.kernels import FAMILIES, KernelFamily, ard_kernel
-from push_predictor.models.gaussian_process.ridge import RegularisableKernel, factorise
-from push_predictor.models.gaussian_process.triangles import BLOCK, mirror_upper, upper_blocks
+from push_predictor.models.gaussian_process.matrices.ridge import RegularisableKernel, factorise
+from push_predictor.models.gaussian_process.matrices.triangles import BLOCK, mirror_upper, upper_blocks
 from push_predictor.types import Array
 
 SIZES = (1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 5)

@@ -27,7 +27,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, Queue
@@ -41,8 +41,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from repository import REPOSITORY
 
-from push_predictor.errors import PushPredictorError
-from push_predictor.models.store.table_cache import load_served
+from push_predictor.models.store.model_registry import ModelRegistry
 
 START_TIMEOUT = 60.0
 PATIENCE = 10.0  # s after which a call is repeated; ~/finish answers within 5 s
@@ -126,7 +125,7 @@ def node_process(
     for name, value in (params or {}).items():
         command += ["-p", f"{name}:={json.dumps(str(value) if isinstance(value, Path) else value)}"]
     if executable == "predict_server":
-        _keep_tables((params or {}).get("models", ()))
+        ModelRegistry().load_all(map(str, (params or {}).get("models", ())))  # keeps tables, as `train` does
     with tempfile.TemporaryDirectory(prefix="push_node_") as folder:
         log = Path(folder) / "output.txt"
         with log.open("wb") as output:
@@ -138,14 +137,6 @@ def node_process(
             yield process
         finally:
             _end(process)
-
-
-def _keep_tables(models: Iterable[str]) -> None:
-    """Compute the tables of models as `train` does: a server without them would begin with exact predictions."""
-    for path in map(Path, models):
-        if path.is_file():
-            with suppress(PushPredictorError):  # the server says why
-                load_served(path)
 
 
 def node_environment(domain: int) -> dict[str, str]:

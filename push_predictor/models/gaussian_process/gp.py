@@ -31,9 +31,9 @@ from push_predictor.models.gaussian_process.kernels import (
     KernelFamily,
     ard_kernel,
 )
+from push_predictor.models.gaussian_process.matrices.ridge import factorise
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.ridge import factorise
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.

@@ -30,7 +30,7 @@ from typing import Literal
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.triangles import BLOCK, mirror_upper, upper_blocks
+from push_predictor.models.gaussian_process.matrices.triangles import BLOCK, mirror_upper, upper_blocks
 from push_predictor.types import Array
 
 KernelFamily = Literal["squared_exponential", "matern52"]

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.models.gaussian_process.matrices.ridge import cholesky_in_place
 from push_predictor.types import Array
 
 

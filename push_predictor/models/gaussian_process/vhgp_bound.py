@@ -30,7 +30,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.ridge import RegularisableKernel, Ridge, factorise
+from push_predictor.models.gaussian_process.matrices.ridge import RegularisableKernel, Ridge, factorise
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
 

@@ -32,7 +32,7 @@ import scipy
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.ridge import factorise
+from push_predictor.models.gaussian_process.matrices.ridge import factorise
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.types import Array, IntArray

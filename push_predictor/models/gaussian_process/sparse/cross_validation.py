@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.models.gaussian_process.matrices.ridge import cholesky_in_place
 from push_predictor.models.gaussian_process.sparse.kernel import InducedRidge
 from push_predictor.types import Array, IntArray
 

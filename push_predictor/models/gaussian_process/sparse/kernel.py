@@ -31,7 +31,7 @@ import scipy
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
-from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.models.gaussian_process.matrices.ridge import cholesky_in_place
 from push_predictor.types import Array
 
 _BLOCK = 2048

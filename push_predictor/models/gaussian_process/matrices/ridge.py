@@ -28,7 +28,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.triangles import mirror_upper
+from push_predictor.models.gaussian_process.matrices.triangles import mirror_upper
 from push_predictor.types import Array
 
 _DROPPED = 1e-12
