@@ -51,7 +51,8 @@ from push_predictor.types import Array
 SLOW = (0.01, 0.02, 0.05)  # m/s
 ALL_SPEEDS = (0.01, 0.02, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # m/s, those of the paper
 WINDOW, WINDOWS = 0.2, 2  # s; of a push at least
-BEFORE, SHORTEST_PUSH = 0.025, 0.02  # m: to accelerate and decelerate; travel of slow pushes
+BEFORE = 0.025  # m: to accelerate and decelerate
+SHORTEST_PUSH, LONGEST_PUSH = 0.02, 0.2  # m: travel of slow pushes, and of the fastest, which have one window
 CHOICES = {"SE": DEFAULT_CHOICE, "Matern + nugget": KernelChoice("matern52", noise_nugget=True)}
 
 
@@ -118,8 +119,8 @@ def made_up_pushes(n: int, seed: int = 0, velocity: bool = False) -> tuple[Array
 
 def simulated_pushes(n: int, speeds: Sequence[float], seed: int = 1) -> tuple[Array, Array]:
     """Standardised inputs (n, 3) and outputs (n, 3): windows of the square on ABS at these speeds, m/s."""
-    plan = random_pushes(n // 2 + 10, speeds, rng=np.random.default_rng(seed))
-    travel = np.maximum(WINDOWS * WINDOW * plan.speed + BEFORE, SHORTEST_PUSH)
+    plan = random_pushes(n // 2 + n // 10 + 10, speeds, rng=np.random.default_rng(seed))
+    travel = np.clip(WINDOWS * WINDOW * plan.speed + BEFORE, SHORTEST_PUSH, LONGEST_PUSH)
     table = push_outcomes(SimulationSpec("rect1", "abs", replace(plan, travel=travel), seed=seed), WINDOW)
     chosen = np.random.default_rng(0).permutation(len(table))[:n]
     features = push_features(shape_outline("rect1"), table.inputs)
