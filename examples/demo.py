@@ -57,7 +57,7 @@ RATE = 40.0
 AGREEMENT = 1e-9  # m, rad: room for rounding only
 SEED = 3  # of the hidden change; `python -m examples.demo 7` draws another one
 PATIENCE = 120.0  # s, for the replay and the last predictions
-SHARES = (28.0, 14.0, 16.0, *loop.SHARES)  # s of the stages on two idle cores
+SHARES = (20.0, 20.0, 1.0, *loop.SHARES)  # s of the stages on two idle cores
 CONTENTS = """You will see
   - three models learn from a recording of pushes, and predict another one online, in real nodes;
   - their errors with intervals, and a report with figures;
@@ -77,16 +77,18 @@ def main(arguments: Sequence[str] = ()) -> int:
     seed = int(arguments[0]) if arguments else SEED
     print(CONTENTS, flush=True)
     stages = Stages(SHARES)
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), os.nice, (10,)) as beside:  # after all nodes
+    # What no node waits for is computed while a core is idle.
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), os.nice, (19,)) as beside:
         stages.begin(f"Train {len(KINDS)} models on {TRAINING.relative_to(ROOT)}.")
         hidden = beside.submit(make_hidden, OUT, seed)  # simulated in the meantime; no other part reads it yet
         paths = _trained(KINDS)
         stages.begin(f"Replay {HELD_OUT.relative_to(ROOT)} at {RATE:g} times its speed and validate the models online.")
         print(f"   The nodes run in ROS domain {os.environ['ROS_DOMAIN_ID']}.", flush=True)
+        offline = [beside.submit(_offline, path) for path in paths]
         _replay_and_validate(paths)
         stages.begin("Compare the online predictions with offline predictions of the same windows.")
         models = [load_model(path) for path in paths]
-        results = [validate_recording(model, HELD_OUT) for model in models]
+        results = [result.result() for result in offline]
         largest = max(_largest_difference(model, k, *results[k]) for k, model in enumerate(models))
         agree = largest <= AGREEMENT
         print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
@@ -145,6 +147,11 @@ def _replay_and_validate(models: Sequence[Path]) -> None:
                 raise SystemExit(f"the validator wrote no {result} within {PATIENCE:.0f} s: see {OUT}/*.log")
             table.show()
             time.sleep(0.1)
+
+
+def _offline(path: Path) -> tuple[list[PushWindow], Comparison]:
+    """Windows and comparison of a model, without the nodes."""
+    return validate_recording(load_model(path), HELD_OUT)
 
 
 def _largest_difference(model: PushModel, number: int, windows: Sequence[PushWindow], offline: Comparison) -> float:

@@ -48,7 +48,7 @@ from push_predictor_interfaces.msg import PushAlarm
 from push_predictor_interfaces.srv import LoadModel
 
 RATE, RATE_AGAIN = 40.0, 80.0
-SHARES = (18.0, 22.0, 12.0, 16.0)  # s of the four stages on two idle cores
+SHARES = (20.0, 19.0, 11.0, 25.0)  # s of the four stages on two idle cores
 BEFORE, AFTER = "changed_online", "after_online"  # folders of the two validations
 REPLAY_PATIENCE, TRACE_PATIENCE, PATIENCE = 200.0, 240.0, 30.0  # s
 
