@@ -65,7 +65,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.table_cache import as_served, keep_tables
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, with_single_posteriors
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor_interfaces.srv import PredictPush
@@ -213,7 +213,7 @@ def _report(times: dict[str, np.ndarray]) -> None:
 
 def _in_this_process(case: Case) -> None:
     """Print processor time of predictions without ROS: the time of a busy machine goes to others."""
-    tabulated = with_single_posteriors(as_served(case.model))
+    tabulated = as_served(case.model)
     pushes = [push_from_request(request) for request in case.requests]
     table, exact = (_processor_time(model, pushes) for model in (tabulated, case.model))
     print(f"{case.name}: {tabulated.how}")

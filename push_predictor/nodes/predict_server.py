@@ -155,7 +155,6 @@ class PredictServer(LifecycleNode):
         self._state = "inactive"
         if not self._starting:
             self._start_threaded()
-            self._complete_models()
 
     def _create_services(self) -> None:
         self._threaded = [
@@ -250,7 +249,6 @@ class PredictServer(LifecycleNode):
             return response
         self.get_logger().info(response.message)
         gc.collect()
-        self._complete_models()
         if request.make_default:
             self.set_parameters([Parameter("default_model", value=response.name)])
         if was_empty and self._state == "inactive" and self.value("autostart"):

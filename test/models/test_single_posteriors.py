@@ -105,13 +105,18 @@ def test_independent_outputs_have_no_covariance() -> None:
     assert np.all(numbers * (1.0 - np.eye(3)) == 0.0) and np.all(numbers[0] >= numbers[1])
 
 
-def test_an_output_of_constant_noise_is_the_same_everywhere() -> None:
+def with_a_constant_output() -> PushModel:
+    """A model whose second output has constant noise."""
     model = trained("square", "gp")
     predictor = model.predictor
     assert isinstance(predictor, GaussianProcessPredictor)
     first, second, third = predictor.regressions
     constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
-    mixed = replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
+    return replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
+
+
+def test_an_output_of_constant_noise_is_the_same_everywhere() -> None:
+    mixed = with_a_constant_output()
     found = single_posteriors(mixed)
     assert found is not None and accuracy_of(found, mixed).accepted
 
@@ -172,17 +177,12 @@ def test_posteriors_of_a_file_predict_the_same(kind: str, tmp_path: Path) -> Non
 
 
 def test_an_output_of_constant_noise_has_no_arrays_in_the_file() -> None:
-    model = trained("square", "gp")
-    predictor = model.predictor
-    assert isinstance(predictor, GaussianProcessPredictor)
-    first, second, third = predictor.regressions
-    constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
-    mixed = replace(predictor, regressions=(first, constant, third))
-    found = single_posteriors(replace(model, predictor=mixed))
-    assert found is not None
+    mixed = with_a_constant_output()
+    found = single_posteriors(mixed)
+    assert found is not None and isinstance(mixed.predictor, GaussianProcessPredictor)
     record = single_record(found, arrays := {})
     assert record[1] is None and not any(name.startswith("single_1") for name in arrays)
-    assert single_from(mixed, record, arrays).moments([0.02, 0.3, 1.4]) == found.moments([0.02, 0.3, 1.4])
+    assert single_from(mixed.predictor, record, arrays).moments([0.02, 0.3, 1.4]) == found.moments([0.02, 0.3, 1.4])
 
 
 def test_posteriors_that_predict_otherwise_are_not_read(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from threading import Lock
 
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
 from push_predictor.models.store.model_file import is_model_file
-from push_predictor.models.store.table_cache import completed, load_at_once, load_served, return_memory
+from push_predictor.models.store.table_cache import completed, load_at_once, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 from push_predictor.types import Array
@@ -37,7 +37,6 @@ class ModelRegistry:
 
     def __init__(self) -> None:
         self._lock = Lock()  # `complete` runs in another thread than `load`
-        self._completing = Lock()  # and not in two at once, which would compute the same
         self._models: dict[str, TabulatedModel] = {}
         self._files: dict[str, Path] = {}
         self._chosen = ""
@@ -94,16 +93,14 @@ class ModelRegistry:
         return name
 
     def complete(self, cancelled: Callable[[], bool] = lambda: False) -> None:
-        """Compute missing tables, and what predicts single pushes outside them; takes some seconds.
+        """Compute missing tables, which takes some seconds each.
 
         Models predict as before until theirs is done. cancelled: asked before each model.
         """
-        with self._completing:
-            for name, known in self._models.items():
-                if cancelled():
-                    return
-                self._replace(name, known, completed(known))
-        return_memory()
+        for name, known in self._models.items():
+            if cancelled():
+                return
+            self._replace(name, known, completed(known))
 
     def _replace(self, name: str, known: TabulatedModel, found: TabulatedModel) -> None:
         """Register the model in place of a known one, unless another one has taken its name."""

@@ -54,13 +54,8 @@ def load_served(path: Path) -> TabulatedModel:
 
     Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
-    served = load_at_once(path)
-    if served.base_how != NO_TABLE_YET:
-        return served
     with _naming(path):
-        tabulated = completed(served)
-    return_memory()
-    return tabulated
+        return completed(load_at_once(path))
 
 
 @one_blas_thread()
@@ -98,6 +93,7 @@ def completed(served: TabulatedModel) -> TabulatedModel:
         return served
     tabulated = _computed(served.model)
     tabulated.free_matrices()
+    _return_memory()
     return tabulated
 
 
@@ -168,7 +164,7 @@ def _tabulated(model: PushModel) -> TabulatedModel:
     return with_single_posteriors(with_effect_table(tabulate(model)))
 
 
-def return_memory() -> None:
+def _return_memory() -> None:
     """Give the memory of the computation back: glibc would keep 100 MB for later."""
     gc.collect()
     with suppress(AttributeError, OSError):  # another C library
