@@ -67,9 +67,11 @@ $(VENV)/.docs: $(VENV)/.python setup.py
 	$(BIN)/pip install -qq '.[docs]'
 	touch $@
 
-# Compiling the message package takes most of the time: only when it changes, and while all else is installed.
+# Compiling the message package takes most of the time: only when it changes, and while all else is installed. In an
+# environment of its own: CMake also searches that of pip, where packages would be there in part.
 $(VENV)/.wheel: $(VENV)/.python $(INTERFACES)
-	$(BIN)/pip wheel -qq --no-deps --wheel-dir $(VENV)/wheels ./push_predictor_interfaces
+	$(PYTHON) -m venv $(VENV)/builder
+	$(VENV)/builder/bin/pip wheel -qq --no-deps --wheel-dir $(VENV)/wheels ./push_predictor_interfaces
 	touch $@
 
 # Python compiles what is imported: a tenth of these packages. tf2_msgs is not on PyPI.
