@@ -121,13 +121,13 @@ class TabulatedModel:
         return _merged(located.inside, table, exact)
 
     def _shifted(self, push: Push, shift: Shift) -> Prediction:
-        """Predictions from what the base adds to a table of effects, and the shift in that table."""
+        """Predictions from what the base adds to a table of effects, and the shift in that table; push: completed."""
         rest, factor = self._added(push), self._factor
         return Prediction(
             rest.mean + shift.mean,
             rest.covariance * factor + shift.covariance,
             rest.process_covariance * factor,
-            rest.in_domain & self.model.covariates_seen(push),
+            rest.in_domain & self.model.in_covariate_ranges(push.covariates, len(push.inputs)),
         )
 
     def _computed(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
@@ -144,7 +144,9 @@ class TabulatedModel:
         """Predictions of the model itself. Where its base is mechanics, the domain of one push is found in numbers."""
         if len(push.inputs) > 1 or not isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
             return self._exact.predict_rows(push.inputs, push.duration, push.covariates)
-        inside = self._in_domain(push.inputs) & self.model.covariates_seen(push)
+        inside = self._in_domain(push.inputs)
+        if self.model.covariate_ranges:
+            inside = inside & self.model.covariates_seen(push)
         return Prediction(*self._exact.predictor.moments(push), inside)
 
     def predict_one(self, push: PushRequest) -> Prediction:
@@ -195,7 +197,7 @@ class TabulatedModel:
         """What the base adds to a table of effects: all but the displacement of its mechanics."""
         predictor, n = self.model.predictor.base, len(push.inputs)
         if isinstance(predictor, AnalyticalPredictor | MechanicsPredictor):
-            covariance = np.broadcast_to(predictor.covariance, (n, 3, 3))
+            covariance = predictor.covariance[None].repeat(n, axis=0)
             return Prediction(np.zeros((n, 3)), covariance, covariance, self._in_domain(push.inputs))
         if self.domain is None:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)

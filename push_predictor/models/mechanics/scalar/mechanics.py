@@ -110,10 +110,22 @@ class ScalarMechanics(FittedMechanics):
         heading = given["push_heading"].tolist() if "push_heading" in given else [0.0] * len(pushes)
         recording = given[RECORDING].tolist() if RECORDING in given else [-1] * len(pushes)
         moved = [
-            _Push(self, self._surface(number), velocity, contact, angle, seconds, ahead).displacement()
+            self.moved(velocity, contact, angle, seconds, ahead, number)
             for (velocity, contact, angle, seconds), ahead, number in zip(pushes, heading, recording, strict=True)
         ]
         return np.array(moved)
+
+    def moved(
+        self,
+        velocity: float,
+        contact: float,
+        angle: float,
+        duration: float,
+        heading: float = 0.0,
+        recording: float = -1,
+    ) -> Three:
+        """Displacement of one push, without checks. heading: of the push in the world, where a parameter needs it."""
+        return _Push(self, self._surface(recording), velocity, contact, angle, duration, heading).displacement()
 
     @cached_property
     def world(self) -> WorldVectors:
@@ -279,6 +291,8 @@ class _Push:
 
 
 def _turned(x: float, y: float, angle: float) -> tuple[float, float]:
+    if angle == 0.0:
+        return x, y
     c, s = cos(angle), sin(angle)
     return c * x - s * y, s * x + c * y
 
