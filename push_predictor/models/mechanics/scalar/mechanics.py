@@ -20,7 +20,7 @@ tolerance of the contact. Many pushes, and pushes with inertia, are computed as 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import atan2, cos, isfinite, log, sin, sqrt
@@ -31,7 +31,7 @@ import numpy as np
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import NO_CHANGES, RECORDING, FittedMechanics
 from push_predictor.models.mechanics.forward import KIND_OF_NORMAL, KIND_OF_SLIP
-from push_predictor.models.mechanics.motion.fine_sweep import OF_LAST_STAGE, OF_TRAVEL_FINELY
+from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, OF_TRAVEL_FINELY
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
 from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
@@ -54,6 +54,7 @@ from push_predictor.types import Array
 
 MOST_SURFACES = 64  # that are kept prepared
 FEW = 200  # pushes: as fast as an array of them
+AT_REST = (0.0, 0.0, 0.0)
 FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load")  # along a push
 
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach, and the
@@ -336,11 +337,11 @@ def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> 
         apart = gap >= TOUCHING
         if apart and first[4] > 0.0:
             step = min(step, gap)
-        after, stage, one_kind = _advance(rate, pose, done, step, first)
+        after, difference, one_kind = _advance(rate, pose, done, step, first)
         last = rate(*after, done + step)
         allowed = accuracy * (_distance(after, pose, length) + OF_TRAVEL_FINELY * travel)
         smooth = apart or (one_kind and last[5] == first[5])
-        if rough or not smooth or (OF_LAST_STAGE * step * _distance(last, stage, length) > allowed and not apart):
+        if rough or not (apart or (smooth and step * _size(difference, last, length) <= allowed)):
             fine = _in_halves(rate, pose, done, step, first)
             if _distance(fine, after, length) > allowed:
                 longest, rough = 0.5 * step, True
@@ -357,29 +358,41 @@ def _in_halves(rate: Rate, pose: Three, done: float, step: float, first: Rates) 
     return _advance(rate, middle, half, 0.5 * step, rate(*middle, half))[0]
 
 
-def _advance(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> tuple[Three, Rates, bool]:
-    """Pose after one step of the classical Runge-Kutta method, the rates of its last stage, and whether all contacts
-    are of one kind; first: the rates where it begins.
+def _advance(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> tuple[Three, Three, bool]:
+    """Pose after one step by Kutta's 3/8 rule, and what the last rate is compared with; see fine_sweep. Whether all
+    stages have contacts of one kind. first: the rates where it begins.
     """
     x, y, heading = pose
     ax, ay, ah, gap, _, kind = first
     if gap >= TOUCHING:
-        return pose, first, True
-    h, middle = 0.5 * step, done + 0.5 * step
-    bx, by, bh, _, _, second = rate(x + h * ax, y + h * ay, heading + h * ah, middle)
-    cx, cy, ch, _, _, third = rate(x + h * bx, y + h * by, heading + h * bh, middle)
-    last = rate(x + step * cx, y + step * cy, heading + step * ch, done + step)
-    dx, dy, dh, _, _, fourth = last
-    k = step / 6.0
+        return pose, AT_REST, True
+    third = step / 3.0
+    bx, by, bh, _, _, second = rate(x + third * ax, y + third * ay, heading + third * ah, done + third)
+    at_x, at_y, at = x + step * bx - third * ax, y + step * by - third * ay, heading + step * bh - third * ah
+    cx, cy, ch, _, _, later = rate(at_x, at_y, at, done + 2.0 * third)
+    at_x, at_y, at = x + step * (ax - bx + cx), y + step * (ay - by + cy), heading + step * (ah - bh + ch)
+    dx, dy, dh, _, _, fourth = rate(at_x, at_y, at, done + step)
+    part = 0.125 * step
     after = (
-        x + k * (ax + 2.0 * (bx + cx) + dx),
-        y + k * (ay + 2.0 * (by + cy) + dy),
-        heading + k * (ah + 2.0 * (bh + ch) + dh),
+        x + part * (ax + 3.0 * (bx + cx) + dx),
+        y + part * (ay + 3.0 * (by + cy) + dy),
+        heading + part * (ah + 3.0 * (bh + ch) + dh),
     )
-    return after, last, second == kind and third == kind and fourth == kind
+    p, q, r, s = DIFFERENCE
+    difference = (
+        p * ax + q * bx + r * cx + s * dx,
+        p * ay + q * by + r * cy + s * dy,
+        p * ah + q * bh + r * ch + s * dh,
+    )
+    return after, difference, second == kind and later == kind and fourth == kind
 
 
-def _distance(one: Sequence[float], other: Sequence[float], length: float) -> float:
-    """Between two poses, or two rates."""
+def _distance(one: Three, other: Three, length: float) -> float:
     x, y, turn = one[0] - other[0], one[1] - other[1], (one[2] - other[2]) * length
     return sqrt(x * x + y * y + turn * turn)
+
+
+def _size(difference: Three, last: Rates, length: float) -> float:
+    """Of the difference of rates, with that after the step."""
+    x, y, turn = difference[0] + AFTER * last[0], difference[1] + AFTER * last[1], difference[2] + AFTER * last[2]
+    return sqrt(x * x + y * y + turn * turn * length * length)
