@@ -97,7 +97,7 @@ def test_a_step_is_smooth_only_if_all_its_stages_have_one_kind(stage: float) -> 
         return unseen(x, done) | np.asarray(np.abs(done - stage * LONGEST_STEP) < 1e-9)
 
     assert reached(speed, unseen) == pytest.approx([TRAVEL] * 2, abs=1e-12)
-    assert reached(speed, seen) == pytest.approx([TRAVEL - 0.06 * LONGEST_STEP] * 2, abs=0.02 * LONGEST_STEP)
+    assert max(reached(speed, seen)) < TRAVEL - 0.04 * LONGEST_STEP
 
 
 def test_the_difference_is_that_of_a_method_of_third_order() -> None:
