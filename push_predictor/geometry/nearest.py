@@ -69,14 +69,25 @@ def _on_polygon(outline: Outline) -> Nearest:
     shares = along / squared[:, None]
     starts = np.sum(outline.vertices * shares, axis=1)
     lines = [tuple(row) for row in np.column_stack([normals, offsets, shares, starts]).tolist()]
+    last = lines[0]  # where the disc touches most often touches again
 
     def nearest(x: float, y: float) -> tuple[float, float, float, float, float]:
-        """Of a convex polygon: on the edge with the largest signed distance, unless a corner is nearest."""
+        """Of a convex polygon: on an edge that the point is opposite, outside; there can be only one."""
+        normal_x, normal_y, offset, along_x, along_y, first = last
+        most = x * normal_x + y * normal_y - offset
+        if most > 0.0 and 0.0 < x * along_x + y * along_y - first < 1.0:
+            return x - most * normal_x, y - most * normal_y, normal_x, normal_y, most
+        return anew(x, y)
+
+    def anew(x: float, y: float) -> tuple[float, float, float, float, float]:
+        """On the edge with the largest signed distance, unless a corner is nearest."""
+        nonlocal last
         most = -inf
-        for nx, ny, offset, share_x, share_y, start in lines:
+        for line in lines:
+            nx, ny, offset, _, _, _ = line
             if (distance := x * nx + y * ny - offset) > most:
-                most, normal_x, normal_y = distance, nx, ny
-                along_x, along_y, first = share_x, share_y, start
+                most, at = distance, line
+        normal_x, normal_y, _, along_x, along_y, first = last = at
         if most > 0.0 and not 0.0 < x * along_x + y * along_y - first < 1.0:
             return general(x, y)
         return x - most * normal_x, y - most * normal_y, normal_x, normal_y, most

@@ -164,11 +164,15 @@ class PushModel:
 
         Raises KeyError where one is missing.
         """
-        seen = np.ones(len(push.inputs), dtype=np.bool_)
-        if self.covariate_ranges:
-            covariates = self.predictor.completed(push).covariates
-            for name, known in self.covariate_ranges.items():
-                seen &= known.contains(covariates[name])
+        if not self.covariate_ranges:
+            return np.ones(len(push.inputs), dtype=np.bool_)
+        return self.in_covariate_ranges(self.predictor.completed(push).covariates, len(push.inputs))
+
+    def in_covariate_ranges(self, covariates: Mapping[str, Array], n: int) -> BoolArray:
+        """The same for n pushes with all covariates that the effects need."""
+        seen = np.ones(n, dtype=np.bool_)
+        for name, known in self.covariate_ranges.items():
+            seen &= known.contains(covariates[name])
         return seen
 
     @cached_property

@@ -356,7 +356,7 @@ def in_equal_steps(model: AnalyticalPush, path: TruePush, steps: int) -> np.ndar
     pose, step = np.zeros((len(rows), 3)), path.travel / steps
     h = step[:, None]
     for k in range(steps):
-        k1, gap, _ = motion.rate(rows, pose, k * step)
+        k1, gap, *_ = motion.rate(rows, pose, k * step)
         k2, *_ = motion.rate(rows, pose + 0.5 * h * k1, (k + 0.5) * step)
         k3, *_ = motion.rate(rows, pose + 0.5 * h * k2, (k + 0.5) * step)
         k4, *_ = motion.rate(rows, pose + h * k3, (k + 1) * step)

@@ -31,7 +31,7 @@ from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, squar
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import EXPONENT_KNOTS, PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.sweep import swept
+from push_predictor.models.mechanics.motion.sweep import Rates, swept
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, MechanicsParameter
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.types import Array, IntArray
@@ -183,9 +183,9 @@ def test_demands_the_covariate_that_a_parameter_needs(parameter: MechanicsParame
 
 
 def test_a_disc_that_is_apart_moves_the_slider_from_its_touch_on() -> None:
-    def rate(rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
+    def rate(rows: IntArray, pose: Array, done: Array) -> Rates:
         push = np.tile([1.0, 0.0, 0.0], (len(rows), 1))
-        return push, np.array([0.0033, 0.0])[rows] - done + pose[:, 0], np.ones(len(rows))
+        return push, np.array([0.0033, 0.0])[rows] - done + pose[:, 0], np.ones(len(rows)), np.zeros(len(rows))
 
     pose = swept(rate, np.array([0.0075, 0.0075]), np.full(2, 0.03), 1e-3)
     assert pose[:, 0] == pytest.approx([0.0075 - 0.0033, 0.0075], abs=2.1e-5)

@@ -27,6 +27,7 @@ from push_predictor.geometry.shapes import shape_outline, transformed
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.contact_solution import RESTS
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.mechanics.scalar.contact import (
     LastContact,
@@ -163,8 +164,9 @@ def test_contact_on_an_ellipsoid_in_closed_form_is_that_found_by_iteration():
         touch = (np.cos(turn), np.sin(turn), normal_arm, left_arm, along, across)
         closed = driven_on_ellipsoid(touch, left, right)
         assert closed == pytest.approx(driven_scalar(lambda *load: load, touch, left, right, LastContact(), 1e-13))
-        vx, vy, spin = closed
+        vx, vy, spin, slip = closed
         sideways = vy * touch[0] - vx * touch[1] + spin * left_arm
-        slip = 0 if abs(sideways - across) < 1e-9 else int(np.sign(across - sideways))
+        slipped = 0 if abs(sideways - across) < 1e-9 else int(np.sign(across - sideways))
+        assert slip == (slipped if along > 0.0 else RESTS)
         reached.add(slip if along > 0.0 else "leaving")
     assert reached == {"leaving", -1, 0, 1}

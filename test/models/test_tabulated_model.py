@@ -40,10 +40,11 @@ from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
     TableAccuracy,
+    outside_pushes,
     relative_error,
 )
-from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_single_posteriors
+from push_predictor.models.tabulated.tabulated_domain import FASTEST, tabulated_domain, wide_box
+from push_predictor.models.tabulated.tabulated_model import REFINEMENTS, TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -136,8 +137,9 @@ def assert_close(alone: Prediction, among: Prediction, row: int, precision: floa
         np.testing.assert_allclose(one, other, rtol=precision, atol=precision * size)
 
 
-def assert_true_to_the_model(answers: TabulatedModel, n: int = 400) -> None:
-    inputs = inside(answers.model, n)
+def assert_true_to_the_model(answers: TabulatedModel, inputs: Array | None = None) -> None:
+    """Assert the model's predictions within the tolerances, at these pushes or at many inside its domain."""
+    inputs = inside(answers.model, 400) if inputs is None else inputs
     table, exact = of(answers, inputs), of(answers.model, inputs)
     assert answers.tabulated, answers.how
     assert np.max(np.abs(table.mean - exact.mean) / np.sqrt(variances(exact.covariance))) < MEAN_TOLERANCE
@@ -182,7 +184,7 @@ def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.M
     model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
     monkeypatch.setattr(prediction_table, "COUPLING_CELLS", 1.5)
     assert isinstance(model.predictor, GaussianProcessPredictor)
-    first = tabulated_domain(model, model.predictor).table.knots
+    first = tabulated_domain(model, model.predictor, wide_box(model), REFINEMENTS[0]).table.knots
     answers = tabulate(model)
     assert answers.domain is not None and answers.domain.table.knots > first
     assert_true_to_the_model(answers)
@@ -202,7 +204,8 @@ NARROW = {
 def test_constant_inputs_have_no_axis(shape: str, narrow: str) -> None:
     low, high = (np.array(limit) for limit in NARROW[narrow])
     model = trained(OUTLINES[shape], "gp", low, high, n=60)
-    assert_true_to_the_model(tabulate(coupled(model)), n=200)
+    answers = tabulate(coupled(model))
+    assert_true_to_the_model(answers, inside(model, 200))
 
 
 @settings(max_examples=60, deadline=None)
@@ -241,19 +244,38 @@ def test_contact_does_not_matter_on_a_circle(kind: str) -> None:
     assert np.ptp(of(tabulated("circle", kind), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
+def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: str, kind: str) -> None:
+    answers = tabulated(shape, kind)
+    outside = outside_pushes(answers.model, 200)
+    assert np.ptp(outside, axis=0) == pytest.approx([0.09, 1.0, 3.1], rel=0.05)
+    assert answers.exact_count(outside) == 0 and not of(answers, outside).in_domain.any()
+    assert_true_to_the_model(answers, outside)
+
+
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_pushes_outside_the_domain_are_predicted_by_the_model(shape: str) -> None:
+def test_faster_pushes_are_predicted_by_the_model(shape: str) -> None:
     model = tabulated(shape, "coupled gp")
-    out = inside(model.model, 30)
-    out[::2, 0] = 0.2
-    out[1::2, 2] = 1.4
-    table, exact = of(model, out), of(model.model, out)
-    assert not table.in_domain.any()
-    mixed = of(model, np.concatenate([out, inside(model.model, 5)]))
+    fast = inside(model.model, 30)
+    fast[:, 0] = 1.001 * FASTEST * model.model.training.inputs[:, 0].max()
+    table, exact = of(model, fast), of(model.model, fast)
+    assert not table.in_domain.any() and model.exact_count(fast) == 30
+    mixed = of(model, np.concatenate([fast, inside(model.model, 5)]))
     for name in FIELDS:
         assert np.array_equal(getattr(table, name), getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
     assert np.array_equal(mixed.in_domain, [False] * 30 + [True] * 5)
+
+
+def test_the_table_is_of_the_domain_alone_where_a_wide_one_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = tabulated("square", "gp")
+    assert wide.domain is not None
+    monkeypatch.setattr(prediction_table, "MOST_KNOTS", wide.domain.table.knots - 1)
+    narrow, outside = tabulate(wide.model), outside_pushes(wide.model, 50)
+    assert_true_to_the_model(narrow)
+    assert narrow.exact_count(outside) == 50 and narrow.exact_count(inside(wide.model, 50)) == 0
+    assert np.array_equal(of(narrow, outside).mean, of(wide.model, outside).mean)
 
 
 def test_boundary_of_the_domain_is_inside() -> None:
@@ -366,7 +388,7 @@ def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> N
     save_model(model, tmp_path / "m.model")
     registry, loaded = ModelRegistry(), LoadModel.Response()
     handle_load_model(registry, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
-    expected = with_single_posteriors(tabulate(model))
+    expected = tabulate(model)
     assert expected.tabulated and expected.how in loaded.message and registry.answering == [f"a vhgp: {expected.how}"]
     inputs = inside(model, 40)
     inputs[0, 0] = 0.2  # outside the domain

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, isfinite
+from math import isfinite
 
 import numpy as np
 
@@ -41,9 +41,12 @@ class ScalarAnalyticalPush(AnalyticalPush):
 
     def displacement(self, inputs: Array, duration: Array) -> Array:
         """See AnalyticalPush."""
-        if not 0 < len(inputs) <= FEW or not _valid(inputs, duration):
+        if not 0 < len(inputs) <= FEW:
+            return super().displacement(inputs, duration)
+        pushes = [(*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)]
+        if not all(_valid(*push) for push in pushes):
             return super().displacement(inputs, duration)  # raises the error
-        return self._scalar.displacement(inputs, duration)
+        return np.array([self._scalar.moved(*push) for push in pushes])
 
     def displacements(self, others: Sequence[AnalyticalPush], inputs: Array, duration: Array) -> Array:
         """See AnalyticalPush."""
@@ -70,6 +73,5 @@ def scalar_analytical(physics: AnalyticalPush) -> ScalarAnalyticalPush:
     )
 
 
-def _valid(inputs: Array, duration: Array) -> bool:
-    rows = all(speed >= 0.0 and isfinite(speed + contact + angle) for speed, contact, angle in inputs.tolist())
-    return rows and all(0.0 <= seconds < inf for seconds in duration.tolist())
+def _valid(speed: float, contact: float, angle: float, seconds: float) -> bool:
+    return speed >= 0.0 and seconds >= 0.0 and isfinite(speed + contact + angle + seconds)

@@ -40,17 +40,18 @@ from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
     same_surface,
 )
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, driven, driven_on_ellipsoid
+from push_predictor.models.mechanics.motion.contact_solution import RESTS, Driven, Touch, driven, driven_on_ellipsoid
 from push_predictor.models.mechanics.motion.fine_sweep import swept_finely
 from push_predictor.models.mechanics.motion.friction_cone import friction_cone
 from push_predictor.models.mechanics.motion.recorded_push import TruePush, true_push
-from push_predictor.models.mechanics.motion.sweep import FINE, swept
+from push_predictor.models.mechanics.motion.sweep import FINE, Rates, swept
 from push_predictor.models.mechanics.parameters import ParameterValues, RowValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.types import Array, IntArray
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 BEND_STEP = 5e-4  # m of the tip's path, over which the acceleration of the slider is taken
+KIND_OF_SLIP, KIND_OF_NORMAL = 100.0, 2.7  # weights that give different numbers to different kinds of contact
 MOST_INERTIA = 0.8  # of the largest load: more would not be a correction
 
 
@@ -164,8 +165,8 @@ class Motion:
         self.grain, self.slope = values.pair("grain_x", "grain_diagonal"), values.pair("slope_x", "slope_y")
         self.gradient, self.square = values.pair("gradient_x", "gradient_y"), of_rows.square
 
-    def rate(self, rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
-        """Change of the poses per metre of the tip's path, gap (m) and the approach of the disc."""
+    def rate(self, rows: IntArray, pose: Array, done: Array) -> Rates:
+        """Change of the poses per metre of the tip's path, gap, approach of the disc and kind of contact: see sweep."""
         found = self._quasi_static(rows, pose, done, None)
         if not self.values.active("inertia"):
             return found
@@ -184,9 +185,7 @@ class Motion:
         size = np.maximum(1.0, np.linalg.norm(load, axis=1) * np.abs(share) / MOST_INERTIA)
         return np.asarray(-(share / size)[:, None] * load)
 
-    def _quasi_static(
-        self, rows: IntArray, pose: Array, done: Array, inertial: Array | None
-    ) -> tuple[Array, Array, Array]:
+    def _quasi_static(self, rows: IntArray, pose: Array, done: Array, inertial: Array | None) -> Rates:
         heading, length = pose[:, 2], self.length[rows]
         tip = self.push.tip[rows] + done[:, None] * self.push.ahead[rows]
         nearest = self.mechanics.outline.project(to_body(tip, pose))
@@ -197,7 +196,15 @@ class Motion:
         vx, vy = motion.vx + spin * centre[:, 1], motion.vy - spin * centre[:, 0]
         cos, sin = np.cos(heading), np.sin(heading)
         rate = np.stack([cos * vx - sin * vy, sin * vx + cos * vy, spin], axis=1)
-        return rate, nearest.distance - self.push.radius[rows], touch.along
+        return rate, nearest.distance - self.push.radius[rows], touch.along, self._kind(nearest, touch, motion)
+
+    def _kind(self, nearest: Projection, touch: Touch, motion: Driven) -> Array:
+        """Of contacts (k,): slip and edge in one number; none is like that at a corner, where the normal turns."""
+        slip = np.where(touch.along > 0.0, motion.slip, RESTS)
+        if self.mechanics.outline.semi_axes is not None:
+            return np.asarray(KIND_OF_SLIP * slip)
+        kind = KIND_OF_SLIP * slip + touch.normal_x + KIND_OF_NORMAL * touch.normal_y
+        return np.where(nearest.at_vertex, np.nan, kind)
 
     def _centre(self, rows: IntArray, heading: Array) -> Array:
         """Centre of friction (k, 2): a friction that grows along a direction moves it by the mean square there."""

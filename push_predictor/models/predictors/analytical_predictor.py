@@ -42,8 +42,8 @@ class AnalyticalPredictor(OfMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.physics.displacement(push.inputs, push.duration)
-        covariance, process_covariance = self.covariance[None].repeat(2 * len(mean), axis=0).reshape(2, -1, 3, 3)
-        return Moments(mean, covariance, process_covariance)
+        covariance = self.covariance[None].repeat(len(mean), axis=0)
+        return Moments(mean, covariance, covariance)
 
     def with_scalar_mechanics(self) -> AnalyticalPredictor:
         """See Predictor."""

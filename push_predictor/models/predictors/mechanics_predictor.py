@@ -34,8 +34,8 @@ class MechanicsPredictor(OfFittedMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
-        covariance, process_covariance = self.covariance[None].repeat(2 * len(mean), axis=0).reshape(2, -1, 3, 3)
-        return Moments(mean, covariance, process_covariance)
+        covariance = self.covariance[None].repeat(len(mean), axis=0)
+        return Moments(mean, covariance, covariance)
 
     def with_scalar_mechanics(self) -> MechanicsPredictor:
         """See Predictor."""

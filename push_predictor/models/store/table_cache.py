@@ -35,12 +35,7 @@ from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, model_digest
 from push_predictor.models.store.table_file import FORMAT_VERSION, read_tables, write_tables
-from push_predictor.models.tabulated.tabulated_model import (
-    TabulatedModel,
-    tabulate,
-    with_effect_table,
-    with_single_posteriors,
-)
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 
 FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
@@ -161,7 +156,7 @@ def _computed(model: PushModel) -> TabulatedModel:
 
 
 def _tabulated(model: PushModel) -> TabulatedModel:
-    return with_single_posteriors(with_effect_table(tabulate(model)))
+    return with_effect_table(tabulate(model))
 
 
 def _return_memory() -> None:

@@ -23,7 +23,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import astuple, replace
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,10 @@ from push_predictor.errors import ModelFileError
 from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.arrays_record import read_arrays
-from push_predictor.models.store.single_record import single_from, single_record
 from push_predictor.models.tabulated.effect_table_build import effect_table_from
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.prediction_table import TableNodes
-from push_predictor.models.tabulated.single_push.posteriors import error_at
-from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed, probed_outside
+from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
 from push_predictor.models.tabulated.tabulated_model import (
     ONLY_LEARNT,
@@ -52,7 +50,7 @@ from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, comp
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
-FORMAT_VERSION = 2  # also to be raised when a table's values change their meaning
+FORMAT_VERSION = 3  # also to be raised when a table's values change their meaning
 RECORD = "record"
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
 
@@ -100,18 +98,15 @@ def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[st
         return {"how": tabulated.base_how, "prior": _spline_record(base.predictor.spline, "prior", arrays)}
     if tabulated.domain is None or tabulated.error is None:
         return {}
-    nodes, probes = tabulated.domain.table.nodes, probed(without_mean(base), CHECKED)
+    domain, nodes = tabulated.domain, tabulated.domain.table.nodes
     arrays |= {f"nodes_{k}": values for k, values in enumerate(nodes.values)}
-    record = {
+    return {
         "how": tabulated.base_how,
+        "ends": [domain.least.tolist(), domain.most.tolist()],
         "nodes": [nodes.cells, nodes.coarse, nodes.least],
         "error": astuple(tabulated.error),
-        "probes": _probes_record(probes),
+        "probes": _probes_record(probed(without_mean(base), CHECKED)),
     }
-    if tabulated.single is not None:
-        record["single"] = single_record(tabulated.single, arrays)
-        record["outside"] = _probes_record(probed_outside(without_mean(base), CHECKED))
-    return record
 
 
 def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Array]) -> TabulatedModel | None:
@@ -128,17 +123,13 @@ def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Arra
         return TabulatedModel(with_base(model, prior), str(record["how"])) if accurate else None
     learnt = without_mean(model.base)
     assert isinstance(learnt.predictor, GaussianProcessPredictor)
-    cells, coarse, least = record["nodes"]
-    values = [arrays[f"nodes_{k}"] for k in range(9)]
-    domain = domain_from_nodes(learnt, learnt.predictor, TableNodes(cells, coarse, least, values))
+    cells, coarse, least_variances = record["nodes"]
+    nodes = TableNodes(cells, coarse, least_variances, [arrays[f"nodes_{k}"] for k in range(9)])
+    least, most = (np.array(end, dtype=np.float64) for end in record["ends"])
+    domain = domain_from_nodes(learnt, learnt.predictor, (least, most), nodes)
     if not _probes(record["probes"]).error_of(domain).accepted:
         return None
-    tabulated = with_domain(model, domain, TableAccuracy(*record["error"]))
-    if "single" not in record:
-        return tabulated
-    single = single_from(learnt.predictor, record["single"], arrays)
-    accurate = error_at(single, learnt, _probes(record["outside"])).accepted
-    return replace(tabulated, single=single) if accurate else None
+    return with_domain(model, domain, TableAccuracy(*record["error"]))
 
 
 def _probes_record(probes: Probes) -> dict[str, Any]:

@@ -73,16 +73,11 @@ class GridPosterior:
 
     @cached_property
     def _explaining(self) -> tuple[IntArray, Array]:
-        return self.explaining(_DROPPED)
-
-    def explaining(self, negligible: float) -> tuple[IntArray, Array]:
         """Rows Z (r,) of the inputs, and the matrix (r, s) that makes of the correlations with Z a vector whose squared
         norm is the explained variance.
-
-        negligible: prior variance that may be neglected, in smallest noise variances.
         """
         prior, smallest_noise = self.kernel.variance, float(self.noise_variances.min())
-        dropped = max(negligible * smallest_noise / prior, _ROUNDING)
+        dropped = max(_DROPPED * smallest_noise / prior, _ROUNDING)
         factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(
             self.kernel.matrix(self.inputs), tol=dropped * prior, lower=1
         )

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,8 +34,8 @@ class InducedGridPosterior(GridPosterior):
 
     root: Array
 
-    def explaining(self, negligible: float) -> tuple[IntArray, Array]:
-        """See GridPosterior; nothing is neglected."""
+    @cached_property
+    def _explaining(self) -> tuple[IntArray, Array]:
         return np.arange(len(self.inputs)), self.kernel.variance * self.root
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far a table's predictions are from those of its model, at pushes of its domain."""
+"""How far a table's predictions are from those of its model."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain
 from push_predictor.types import Array
 
-MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
+MEAN_TOLERANCE = 1e-3  # predicted standard deviations
 COVARIANCE_TOLERANCE = 1e-2  # relative, of the variance of any combination of outputs
 STEEPEST = 1.57  # rad, angle of a push to be compared
-CHECKED = 250  # random pushes of the domain, and as many training pushes
+CHECKED = 250  # random pushes of the domain, as many training pushes, and as many outside the domain
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,18 @@ class Probes:
     process_covariance: Array
 
     def error_of(self, domain: TabulatedDomain) -> TableAccuracy:
-        """The largest differences of a table from the model. Raises ValueError for a push outside its domain."""
-        inside, table = domain.predict(self.inputs)
-        if table is None:
-            raise ValueError(f"pushes outside the table's domain: {self.inputs[~inside]}")
-        return compared_with(self, table.mean, table.covariance, table.process_covariance)
+        """The largest differences of a table from the model, at the pushes that the table contains.
+
+        Raises ValueError if that is none of them.
+        """
+        covered = domain.covered(self.inputs)
+        known = (
+            self if covered.all() else Probes(*(getattr(self, field)[covered] for field in self.__dataclass_fields__))
+        )
+        _, table = domain.predict(known.inputs)
+        if table is None or not len(known.inputs):
+            raise ValueError("none of the pushes is in the table")
+        return compared_with(known, table.mean, table.covariance, table.process_covariance)
 
 
 def compared_with(
@@ -87,22 +94,18 @@ def outside_pushes(model: PushModel, count: int) -> Array:
     return np.asarray(spread[~model.in_domain(spread)][:count])
 
 
-def probed_outside(model: PushModel, count: int) -> Probes:
-    """At most `count` pushes outside a model's domain, and what it predicts."""
-    inputs = outside_pushes(model, count)
-    exact = model.predict_rows(inputs, np.full(len(inputs), model.usual_duration))
-    return Probes(inputs, exact.mean, exact.covariance, exact.process_covariance)
-
-
 def probed(model: PushModel, count: int = CHECKED) -> Probes:
-    """Pushes spread evenly over a model's domain, and training pushes, at most `count` of each."""
+    """What a model predicts at pushes spread evenly over its domain, at training pushes, and at pushes outside.
+
+    At most `count` of each.
+    """
     rng, known = np.random.default_rng(0), model.training.inputs
     low, high = known.min(axis=0), known.max(axis=0)
     low[1], high[1] = 0.0, 1.0
     spread = rng.uniform(low, high, (20 * count, 3))
     spread = spread[model.in_domain(spread)][:count]
-    inputs = np.concatenate([spread, rng.permutation(known)[:count]])
-    exact = model.predict_rows(inputs, np.full(len(inputs), model.training.duration[0]))
+    inputs = np.concatenate([spread, rng.permutation(known)[:count], outside_pushes(model, count)])
+    exact = model.predict_rows(inputs, np.full(len(inputs), model.usual_duration))
     return Probes(inputs, exact.mean, exact.covariance, exact.process_covariance)
 
 

@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The domain of a learnt model's training data with the model's predictions tabulated in it."""
+"""A learnt model's predictions tabulated: over all contacts, all angles and up to twice its speeds, if it can be."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import pi
 
 import numpy as np
 
@@ -27,8 +28,10 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
 from push_predictor.models.tabulated.prediction_table import PredictionTable, TableNodes, from_nodes, tabulate
-from push_predictor.models.tabulated.push_chart import Chart, push_chart
+from push_predictor.models.tabulated.push_chart import Chart, Whole, push_chart
 from push_predictor.types import Array, BoolArray
+
+FASTEST = 2.0  # largest training speeds, up to which a wide table reaches
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,20 +42,14 @@ class FeatureBox:
     low: Array
     high: Array
 
-    def features(self, push: Sequence[float]) -> list[float]:
-        """Features of one push, in plain numbers; see push_features."""
+    def contains(self, push: Sequence[float]) -> bool:
+        """Whether one push lies in the domain, in plain numbers."""
         velocity, contact, angle = push
-        return [velocity, *map(float, self.chart.place_features(*self.chart.place_one(contact))), angle]
+        return self._contains(velocity, *self.chart.place_one(contact), angle)
 
-    def located(self, push: Sequence[float]) -> tuple[float, int] | None:
-        """Place and box of one push in the domain, in plain numbers; else None."""
-        velocity, contact, angle = push
-        place, box = self.chart.place_one(contact)
+    def _contains(self, velocity: float, place: float, box: Whole, angle: float) -> bool:
         features = (velocity, *self.chart.place_features(place, box), angle)
-        for feature, (low, high) in zip(features, self._bounds, strict=True):
-            if not low <= feature <= high:
-                return None
-        return place, box
+        return all(low <= feature <= high for feature, (low, high) in zip(features, self._bounds, strict=True))
 
     @cached_property
     def _bounds(self) -> list[tuple[float, float]]:
@@ -69,46 +66,82 @@ def feature_box(model: PushModel) -> FeatureBox:
 
 @dataclass(frozen=True, eq=False)
 class TabulatedDomain(FeatureBox):
-    """The domain with its table."""
+    """The domain with a table of a box that contains it: from least to most (3,) of velocity, place and angle."""
 
     table: PredictionTable
+    least: Array
+    most: Array
+
+    def covered(self, inputs: Array) -> BoolArray:
+        """Which of the pushes (n, 3) the table contains, (n,)."""
+        return self._covered(np.column_stack([inputs[:, 0], self.chart.place(inputs[:, 1])[0], inputs[:, 2]]))
 
     def predict(self, inputs: Array) -> tuple[BoolArray, Prediction | None]:
-        """Which of the pushes (n, 3) lie in the domain, and the predictions if all of them do."""
+        """Which of the pushes (n, 3) the table contains, and the predictions if it contains all of them."""
         velocity, contact, angle = inputs.T
         place, box = self.chart.place(contact)
+        points = np.column_stack([velocity, place, angle])
+        covered = self._covered(points)
+        if not covered.all():
+            return covered, None
         features = np.column_stack([velocity, *self.chart.place_features(place, box), angle])
         inside = np.asarray(((features >= self.low) & (features <= self.high)).all(axis=1))
-        if not inside.all():
-            return inside, None
-        points = np.column_stack([velocity, place, angle])
-        return inside, Prediction(*self.table.moments(points, box), inside)
+        return covered, Prediction(*self.table.moments(points, box), inside)
 
     def predict_one(self, push: Sequence[float]) -> Prediction | None:
-        """The prediction for one push in the domain, in plain numbers, several times as fast; else None."""
-        if (located := self.located(push)) is None:
+        """The prediction for one push, in plain numbers, several times as fast; None if the table lacks it."""
+        velocity, contact, angle = push
+        place, box = self.chart.place_one(contact)
+        (slow, start, left), (fast, end, right) = self._ends
+        if not (slow <= velocity <= fast and start <= place <= end and left <= angle <= right):
             return None
-        place, box = located
-        numbers = np.array(self.table.moments_one((push[0], place, push[2]), box))
+        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
         covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
-        return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
+        inside = np.array([self._contains(velocity, place, box, angle)])
+        return Prediction(numbers[None, :3], covariance, process_covariance, inside)
+
+    def _covered(self, points: Array) -> BoolArray:
+        low, high = self._ends
+        return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+
+    @cached_property
+    def _ends(self) -> tuple[list[float], list[float]]:
+        margin = DOMAIN_MARGIN + 1e-6 * np.abs(self.most)
+        return (self.least - margin).tolist(), (self.most + margin).tolist()
 
 
-def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refinement: float = 1.0) -> TabulatedDomain:
-    """The domain of a model with this predictor; refinement: of the table. Raises TooFineError."""
-    box, low, high = _bounds(model)
-    return TabulatedDomain(box.chart, box.low, box.high, tabulate(predictor, box.chart, low, high, refinement))
+def wide_box(model: PushModel) -> tuple[Array, Array]:
+    """Least and most velocity, place and angle (3,) of a table for all pushes up to FASTEST times the training's."""
+    fastest = FASTEST * float(model.training.inputs[:, 0].max())
+    return np.array([0.0, 0.0, -0.5 * pi]), np.array([fastest, 1.0, 0.5 * pi])
 
 
-def domain_from_nodes(model: PushModel, predictor: GaussianProcessPredictor, nodes: TableNodes) -> TabulatedDomain:
-    """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
-    box, low, high = _bounds(model)
-    return TabulatedDomain(box.chart, box.low, box.high, from_nodes(nodes, predictor, box.chart, low, high))
-
-
-def _bounds(model: PushModel) -> tuple[FeatureBox, Array, Array]:
-    """The domain, and the least and largest velocity, place and angle (3,) of the training rows."""
-    inputs, box = model.training.inputs, feature_box(model)
+def narrow_box(model: PushModel) -> tuple[Array, Array]:
+    """The same of a table of the domain alone."""
+    inputs, chart = model.training.inputs, push_chart(model.rig.outline)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
-    low[1], high[1] = box.chart.place_range(box.chart.place(inputs[:, 1])[0])
-    return box, low, high
+    low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
+    return low, high
+
+
+def tabulated_domain(
+    model: PushModel,
+    predictor: GaussianProcessPredictor,
+    ends: tuple[Array, Array],
+    refinement: float = 1.0,
+) -> TabulatedDomain:
+    """The domain of a model with this predictor, tabulated between these ends.
+
+    refinement: of the table. Raises TooFineError.
+    """
+    box = feature_box(model)
+    table = tabulate(predictor, box.chart, *ends, refinement)
+    return TabulatedDomain(box.chart, box.low, box.high, table, *ends)
+
+
+def domain_from_nodes(
+    model: PushModel, predictor: GaussianProcessPredictor, ends: tuple[Array, Array], nodes: TableNodes
+) -> TabulatedDomain:
+    """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
+    box = feature_box(model)
+    return TabulatedDomain(box.chart, box.low, box.high, from_nodes(nodes, predictor, box.chart, *ends), *ends)

@@ -12,11 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A push model that predicts from a table, in microseconds, inside the domain of its training data.
+"""A push model that predicts from a table, in microseconds.
 
 A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but it is a smooth function of at most three
-inputs. So it is tabulated once. The table is compared with the model and used only if it is accurate. Every other push
-and every other model is predicted by the model itself.
+inputs. So it is tabulated once: for all contacts, all angles and up to twice the speeds of its training, or in its
+domain alone where that would be too large. The table is compared with the model and used only if it is accurate. Every
+other push and every other model is predicted by the model itself.
 
 The mechanics have no table, neither alone nor as the mean of a learnt model: they have kinks where contacts begin to
 slip, and a table would have to be very fine there. A single push is computed in plain numbers instead. A prior model
@@ -49,22 +50,28 @@ from push_predictor.models.tabulated.effect_table import EffectTable
 from push_predictor.models.tabulated.effect_table_build import build_effect_table
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.single_effects import SingleEffects
-from push_predictor.models.tabulated.single_push.posteriors import SinglePosteriors, single_posteriors
-from push_predictor.models.tabulated.table_accuracy import TableAccuracy, probed
-from push_predictor.models.tabulated.tabulated_domain import FeatureBox, TabulatedDomain, feature_box, tabulated_domain
+from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
+from push_predictor.models.tabulated.tabulated_domain import (
+    FeatureBox,
+    TabulatedDomain,
+    feature_box,
+    narrow_box,
+    tabulated_domain,
+    wide_box,
+)
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
 ONLY_LEARNT = "exact: only learnt models have a table"
-REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
+REFINEMENTS = (0.8, 1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 
 @dataclass(frozen=True, eq=False)
 class TabulatedModel:
-    """A model with its table. domain and error are None if there is no table.
+    """A model with its table. domain, which has the table, and error are None if there is none.
 
     base_how: in words, how its base predicts. effects: the table of its effects, None if they are computed;
-    effects_how: the same in words. single: predicts pushes of the base outside its table; None: the model does.
+    effects_how: the same in words.
 
     A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
     """
@@ -75,7 +82,6 @@ class TabulatedModel:
     error: TableAccuracy | None = None
     effects: EffectTable | None = None
     effects_how: str = ""
-    single: SinglePosteriors | None = None
 
     @property
     def how(self) -> str:
@@ -84,11 +90,11 @@ class TabulatedModel:
 
     @property
     def tabulated(self) -> bool:
-        """Whether pushes in the domain are predicted from a table."""
+        """Whether pushes are predicted from a table."""
         return self.domain is not None
 
     def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
-        """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same.
+        """Like PushModel.predict; in its table within the tolerances of table_accuracy, elsewhere the same.
 
         Of an extended model the base is tabulated. Its effects are computed and added, unless they have a table.
         """
@@ -115,13 +121,13 @@ class TabulatedModel:
         return _merged(located.inside, table, exact)
 
     def _shifted(self, push: Push, shift: Shift) -> Prediction:
-        """Predictions from what the base adds to a table of effects, and the shift in that table."""
+        """Predictions from what the base adds to a table of effects, and the shift in that table; push: completed."""
         rest, factor = self._added(push), self._factor
         return Prediction(
             rest.mean + shift.mean,
             rest.covariance * factor + shift.covariance,
             rest.process_covariance * factor,
-            rest.in_domain & self.model.covariates_seen(push),
+            rest.in_domain & self.model.in_covariate_ranges(push.covariates, len(push.inputs)),
         )
 
     def _computed(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
@@ -138,7 +144,9 @@ class TabulatedModel:
         """Predictions of the model itself. Where its base is mechanics, the domain of one push is found in numbers."""
         if len(push.inputs) > 1 or not isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
             return self._exact.predict_rows(push.inputs, push.duration, push.covariates)
-        inside = self._in_domain(push.inputs) & self.model.covariates_seen(push)
+        inside = self._in_domain(push.inputs)
+        if self.model.covariate_ranges:
+            inside = inside & self.model.covariates_seen(push)
         return Prediction(*self._exact.predictor.moments(push), inside)
 
     def predict_one(self, push: PushRequest) -> Prediction:
@@ -153,7 +161,7 @@ class TabulatedModel:
 
     def exact_count(self, inputs: Array) -> int:
         """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
-        return len(inputs) if self.domain is None else int(np.sum(~self.model.base.in_domain(inputs)))
+        return len(inputs) if self.domain is None else int(np.sum(~self.domain.covered(inputs)))
 
     @cached_property
     def _exact(self) -> PushModel:
@@ -178,7 +186,7 @@ class TabulatedModel:
     def _in_domain(self, inputs: Array) -> BoolArray:
         if len(inputs) > 1:
             return self.model.in_domain(inputs)
-        return np.array([self._box.located(inputs[0].tolist()) is not None])
+        return np.array([self._box.contains(inputs[0].tolist())])
 
     @cached_property
     def _single_effects(self) -> SingleEffects:
@@ -189,7 +197,7 @@ class TabulatedModel:
         """What the base adds to a table of effects: all but the displacement of its mechanics."""
         predictor, n = self.model.predictor.base, len(push.inputs)
         if isinstance(predictor, AnalyticalPredictor | MechanicsPredictor):
-            covariance = np.broadcast_to(predictor.covariance, (n, 3, 3))
+            covariance = predictor.covariance[None].repeat(n, axis=0)
             return Prediction(np.zeros((n, 3)), covariance, covariance, self._in_domain(push.inputs))
         if self.domain is None:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)
@@ -206,25 +214,17 @@ class TabulatedModel:
             return learnt
         return Prediction(*predictor.about_mean(_moments(learnt), push), learnt.in_domain)
 
-    def _outside(self, inputs: Array, duration: Array) -> Prediction:
-        """Predictions for pushes outside the table."""
-        if self.single is None:
-            return self._residual.predict_rows(inputs, duration)
-        numbers = np.array([self.single.moments(self._box.features(row)) for row in inputs.tolist()])
-        covariance, process_covariance = numbers[:, 3:].reshape(-1, 2, 3, 3).swapaxes(0, 1)
-        return Prediction(numbers[:, :3], covariance, process_covariance, np.zeros(len(inputs), dtype=np.bool_))
-
     def _learnt(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         """Predictions of what the base has learnt, from the table where it can."""
         if len(inputs) == 1:  # in plain numbers, five times as fast
-            return domain.predict_one(inputs[0].tolist()) or self._outside(inputs, duration)
-        inside, prediction = domain.predict(inputs)
+            return domain.predict_one(inputs[0].tolist()) or self._residual.predict_rows(inputs, duration)
+        covered, prediction = domain.predict(inputs)
         if prediction is not None:
             return prediction
-        outside = self._outside(inputs[~inside], duration[~inside])
-        if not inside.any():
-            return outside
-        return _merged(inside, self._learnt(domain, inputs[inside], duration[inside]), outside)
+        beyond = self._residual.predict_rows(inputs[~covered], duration[~covered])
+        if not covered.any():
+            return beyond
+        return _merged(covered, self._learnt(domain, inputs[covered], duration[covered]), beyond)
 
 
 def tabulate(model: PushModel) -> TabulatedModel:
@@ -235,29 +235,35 @@ def tabulate(model: PushModel) -> TabulatedModel:
         return TabulatedModel(model if table is None else with_base(model, table), how)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, ONLY_LEARNT)
-    how, exact = "", probed(learnt)
+    exact, reasons = probed(learnt), []
+    for ends in (wide_box(model), narrow_box(model)):
+        found = _accurate(learnt, learnt.predictor, ends, exact)
+        if not isinstance(found, str):
+            return with_domain(model, *found)
+        reasons.append(found)
+    return TabulatedModel(model, f"exact: {reasons[-1]}")
+
+
+def _accurate(
+    learnt: PushModel, predictor: GaussianProcessPredictor, ends: tuple[Array, Array], exact: Probes
+) -> tuple[TabulatedDomain, TableAccuracy] | str:
+    """The coarsest table between these ends that is accurate, and its errors; else why there is none."""
+    how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(learnt, learnt.predictor, refinement)
+            domain = tabulated_domain(learnt, predictor, ends, refinement)
         except TooFineError as too_fine:
-            return TabulatedModel(model, f"exact: {how}{too_fine}")
+            return f"{how}{too_fine}"
         error = exact.error_of(domain)
         if error.accepted:
-            return with_domain(model, domain, error)
+            return domain, error
         how = f"a table gives {error}; "
-    return TabulatedModel(model, f"exact: {how}too far off")
+    return f"{how}too far off"
 
 
 def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy) -> TabulatedModel:
     """The model with a table that was compared with it."""
     return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
-
-
-def with_single_posteriors(tabulated: TabulatedModel) -> TabulatedModel:
-    """The same, faster for pushes outside its table, if that is accurate; takes about a second for 1000 rows."""
-    if tabulated.domain is None:
-        return tabulated
-    return replace(tabulated, single=single_posteriors(without_mean(tabulated.model.base)))
 
 
 def with_effect_table(tabulated: TabulatedModel) -> TabulatedModel:

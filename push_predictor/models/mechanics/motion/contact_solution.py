@@ -26,6 +26,7 @@ from push_predictor.types import Array, IntArray
 
 ROOT_STEPS = 40
 ROOT_TOLERANCE = 1e-10  # rad: a push alone and among others then agree to 1e-11 m; secants need one step more
+RESTS = 2.0  # in place of the slip of a slider that the pusher leaves
 EVERY = slice(None)
 BISECT_EVERY = 6  # steps: next to a flat or an edge of the limit surface, secants converge slowly
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import TypeAlias
 
-from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, ROOT_STEPS
-from push_predictor.models.mechanics.scalar.surface import Three, Twist
+from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, RESTS, ROOT_STEPS
+from push_predictor.models.mechanics.scalar.surface import Twist
 
 # One contact: normal_x, normal_y, normal_arm, left_arm, along, across; see Touch. A class would take longer to make.
 ScalarTouch: TypeAlias = tuple[float, float, float, float, float, float]
@@ -36,10 +36,12 @@ class LastContact:
         self.share, self.slope = 0.5, 0.0
 
 
-_AT_REST = 0.0, 0.0, 0.0
+# Velocity of the centre of friction, spin times length, and slip: see Driven; RESTS where the disc leaves.
+ScalarDriven: TypeAlias = tuple[float, float, float, float]
+_AT_REST = 0.0, 0.0, 0.0, RESTS
 
 
-def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> Three:
+def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> ScalarDriven:
     """The same as `driven_scalar` on an ellipsoid, where velocity is linear in the force: in closed form.
 
     A contact that sticks has the force (1, slope) along and left of the normal. Beyond an edge of the friction cone it
@@ -51,20 +53,21 @@ def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> Three:
     coupling = normal_arm * left_arm
     push = (1.0 + left_arm * left_arm) * along - coupling * across
     rub = (1.0 + normal_arm * normal_arm) * across - coupling * along
+    slip = 0.0
     if rub > left * push if push > 0.0 else rub > 0.0:
-        push, rub = 1.0, left
+        push, rub, slip = 1.0, left, 1.0
     elif rub < -right * push:
-        push, rub = 1.0, -right
+        push, rub, slip = 1.0, -right, -1.0
     vx, vy, spin = push * nx - rub * ny, push * ny + rub * nx, push * normal_arm + rub * left_arm
     # Always towards the normal: the map from force to velocity is positive definite and keeps the order of directions.
     size = along / (vx * nx + vy * ny + spin * normal_arm)
-    return vx * size, vy * size, spin * size
+    return vx * size, vy * size, spin * size, slip
 
 
 def driven_scalar(
     twist: Twist, touch: ScalarTouch, left: float, right: float, last: LastContact, tolerance: float
-) -> Three:
-    """Velocity of the centre of friction and spin times length, with friction `left` and `right` of the normal."""
+) -> ScalarDriven:
+    """The motion with friction `left` and `right` of the normal."""
     nx, ny, normal_arm, left_arm, along, across = touch
     if along <= 0.0:
         return _AT_REST
@@ -108,4 +111,4 @@ def driven_scalar(
     if toward <= 0.0:
         return _AT_REST
     size = along / toward
-    return vx * size, vy * size, spin * size
+    return vx * size, vy * size, spin * size, 1.0 if share == 1.0 else -1.0 if share == 0.0 else 0.0

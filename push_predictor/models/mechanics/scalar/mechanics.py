@@ -30,7 +30,8 @@ import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import NO_CHANGES, RECORDING, FittedMechanics
-from push_predictor.models.mechanics.motion.fine_sweep import OF_TRAVEL_FINELY
+from push_predictor.models.mechanics.forward import KIND_OF_NORMAL, KIND_OF_SLIP
+from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, OF_TRAVEL_FINELY
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
 from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
@@ -53,10 +54,12 @@ from push_predictor.types import Array
 
 MOST_SURFACES = 64  # that are kept prepared
 FEW = 200  # pushes: as fast as an array of them
+AT_REST = (0.0, 0.0, 0.0)
 FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load")  # along a push
 
-# At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach.
-Rates: TypeAlias = tuple[float, float, float, float, float]
+# At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach, and the
+# kind of contact; see sweep.Rates.
+Rates: TypeAlias = tuple[float, float, float, float, float, float]
 Rate: TypeAlias = Callable[[float, float, float, float], Rates]
 
 
@@ -108,10 +111,22 @@ class ScalarMechanics(FittedMechanics):
         heading = given["push_heading"].tolist() if "push_heading" in given else [0.0] * len(pushes)
         recording = given[RECORDING].tolist() if RECORDING in given else [-1] * len(pushes)
         moved = [
-            _Push(self, self._surface(number), velocity, contact, angle, seconds, ahead).displacement()
+            self.moved(velocity, contact, angle, seconds, ahead, number)
             for (velocity, contact, angle, seconds), ahead, number in zip(pushes, heading, recording, strict=True)
         ]
         return np.array(moved)
+
+    def moved(
+        self,
+        velocity: float,
+        contact: float,
+        angle: float,
+        duration: float,
+        heading: float = 0.0,
+        recording: float = -1,
+    ) -> Three:
+        """Displacement of one push, without checks. heading: of the push in the world, where a parameter needs it."""
+        return _Push(self, self._surface(recording), velocity, contact, angle, duration, heading).displacement()
 
     @cached_property
     def world(self) -> WorldVectors:
@@ -213,6 +228,7 @@ class _Push:
         (tip_x, tip_y), (ahead_x, ahead_y), radius = self.tip, self.ahead, self.radius
         nearest, length, tolerance, last = self.model.nearest, self.surface.length, self.surface.tolerance, self.last
         same_centre, same_cone, same_twist, ellipsoid = self.centre, self.cone, self.twist, self.ellipsoid
+        of_normal = 0.0 if self.model.mechanics.outline.semi_axes is not None else 1.0
 
         def rate(x: float, y: float, heading: float, done: float) -> Rates:
             c, s = cos(heading), sin(heading)
@@ -226,13 +242,14 @@ class _Push:
             touch = nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, along, vy * nx - vx * ny
             left, right = same_cone or self._friction(touch)
             if ellipsoid:
-                vx, vy, spin = driven_on_ellipsoid(touch, left, right)
+                vx, vy, spin, slip = driven_on_ellipsoid(touch, left, right)
             else:
                 twist = same_twist or self._loaded(heading)
-                vx, vy, spin = driven_scalar(twist, touch, left, right, last, tolerance)
+                vx, vy, spin, slip = driven_scalar(twist, touch, left, right, last, tolerance)
             spin /= length
             vx, vy = vx + spin * centre_y, vy - spin * centre_x
-            return c * vx - s * vy, s * vx + c * vy, spin, distance - radius, along
+            kind = KIND_OF_SLIP * slip + of_normal * (nx + KIND_OF_NORMAL * ny)
+            return c * vx - s * vy, s * vx + c * vy, spin, distance - radius, along, kind
 
         return rate
 
@@ -275,6 +292,8 @@ class _Push:
 
 
 def _turned(x: float, y: float, angle: float) -> tuple[float, float]:
+    if angle == 0.0:
+        return x, y
     c, s = cos(angle), sin(angle)
     return c * x - s * y, s * x + c * y
 
@@ -285,13 +304,13 @@ def _swept(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
     step, shortest = min(travel, LONGEST_STEP), SHORTEST_STEP * accuracy * LONGEST_STEP
     first = rate(x, y, heading, done) if travel > 0.0 else None
     while first is not None and travel - done > 1e-12 * travel:
-        h, (ax, ay, aw, gap, nearing) = min(step, travel - done), first
+        h, (ax, ay, aw, gap, nearing, _) = min(step, travel - done), first
         apart = gap >= TOUCHING
         if apart and nearing > 0.0:
             h = min(h, gap)
         k = 0.0 if apart else h
-        bx, by, bw, _, _ = rate(x + 0.5 * k * ax, y + 0.5 * k * ay, heading + 0.5 * k * aw, done + 0.5 * h)
-        cx, cy, cw, _, _ = rate(x + 0.75 * k * bx, y + 0.75 * k * by, heading + 0.75 * k * bw, done + 0.75 * h)
+        bx, by, bw, *_ = rate(x + 0.5 * k * ax, y + 0.5 * k * ay, heading + 0.5 * k * aw, done + 0.5 * h)
+        cx, cy, cw, *_ = rate(x + 0.75 * k * bx, y + 0.75 * k * by, heading + 0.75 * k * bw, done + 0.75 * h)
         part = k / 9.0
         mx, my = part * (2.0 * ax + 3.0 * bx + 4.0 * cx), part * (2.0 * ay + 3.0 * by + 4.0 * cy)
         mw = part * (2.0 * aw + 3.0 * bw + 4.0 * cw)
@@ -311,42 +330,69 @@ def _swept(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
 
 def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
     """Pose after the sweep; see fine_sweep.swept_finely."""
-    pose, done, longest = (0.0, 0.0, 0.0), 0.0, min(travel, LONGEST_STEP)
-    first: Rates | None = None
-    while travel - done > 1e-12 * travel:
-        first = first or rate(*pose, done)
-        step = min(longest, travel - done)
-        if first[4] > 0.0 and first[3] >= TOUCHING:
-            step = min(step, first[3])
-        half = done + 0.5 * step
-        coarse, middle = _advance(rate, pose, done, step, first), _advance(rate, pose, done, 0.5 * step, first)
-        fine = _advance(rate, middle, half, 0.5 * step, rate(*middle, half))
-        allowed = accuracy * (_distance(fine, pose, length) + OF_TRAVEL_FINELY * travel)
-        if _distance(fine, coarse, length) <= allowed:
-            pose, done, longest, first = fine, done + step, min(2.0 * step, LONGEST_STEP), None
-        else:
-            longest = 0.5 * step
+    pose, done, longest, rough = (0.0, 0.0, 0.0), 0.0, min(travel, LONGEST_STEP), False
+    first = rate(*pose, done) if travel > 0.0 else None
+    while first is not None and travel - done > 1e-12 * travel:
+        step, gap = min(longest, travel - done), first[3]
+        apart = gap >= TOUCHING
+        if apart and first[4] > 0.0:
+            step = min(step, gap)
+        after, difference, one_kind = _advance(rate, pose, done, step, first)
+        last = rate(*after, done + step)
+        allowed = accuracy * (_distance(after, pose, length) + OF_TRAVEL_FINELY * travel)
+        smooth = apart or (one_kind and last[5] == first[5])
+        if rough or not (apart or (smooth and step * _size(difference, last, length) <= allowed)):
+            fine = _in_halves(rate, pose, done, step, first)
+            if _distance(fine, after, length) > allowed:
+                longest, rough = 0.5 * step, True
+                continue
+            after, last = fine, rate(*fine, done + step)
+        pose, done, longest, rough, first = after, done + step, min(2.0 * step, LONGEST_STEP), not smooth, last
     return pose
 
 
-def _advance(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> Three:
-    """Pose after one step of the classical Runge-Kutta method; first: the rate where it begins."""
+def _in_halves(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> Three:
+    """Pose after a step, in two halves."""
+    half = done + 0.5 * step
+    middle = _advance(rate, pose, done, 0.5 * step, first)[0]
+    return _advance(rate, middle, half, 0.5 * step, rate(*middle, half))[0]
+
+
+def _advance(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> tuple[Three, Three, bool]:
+    """Pose after one step by Kutta's 3/8 rule, and what the last rate is compared with; see fine_sweep. Whether all
+    stages have contacts of one kind. first: the rates where it begins.
+    """
     x, y, heading = pose
-    ax, ay, ah, gap, _ = first
+    ax, ay, ah, gap, _, kind = first
     if gap >= TOUCHING:
-        return pose
-    h, middle = 0.5 * step, done + 0.5 * step
-    bx, by, bh, _, _ = rate(x + h * ax, y + h * ay, heading + h * ah, middle)
-    cx, cy, ch, _, _ = rate(x + h * bx, y + h * by, heading + h * bh, middle)
-    dx, dy, dh, _, _ = rate(x + step * cx, y + step * cy, heading + step * ch, done + step)
-    k = step / 6.0
-    return (
-        x + k * (ax + 2.0 * bx + 2.0 * cx + dx),
-        y + k * (ay + 2.0 * by + 2.0 * cy + dy),
-        heading + k * (ah + 2.0 * bh + 2.0 * ch + dh),
+        return pose, AT_REST, True
+    third = step / 3.0
+    bx, by, bh, _, _, second = rate(x + third * ax, y + third * ay, heading + third * ah, done + third)
+    at_x, at_y, at = x + step * bx - third * ax, y + step * by - third * ay, heading + step * bh - third * ah
+    cx, cy, ch, _, _, later = rate(at_x, at_y, at, done + 2.0 * third)
+    at_x, at_y, at = x + step * (ax - bx + cx), y + step * (ay - by + cy), heading + step * (ah - bh + ch)
+    dx, dy, dh, _, _, fourth = rate(at_x, at_y, at, done + step)
+    part = 0.125 * step
+    after = (
+        x + part * (ax + 3.0 * (bx + cx) + dx),
+        y + part * (ay + 3.0 * (by + cy) + dy),
+        heading + part * (ah + 3.0 * (bh + ch) + dh),
     )
+    p, q, r, s = DIFFERENCE
+    difference = (
+        p * ax + q * bx + r * cx + s * dx,
+        p * ay + q * by + r * cy + s * dy,
+        p * ah + q * bh + r * ch + s * dh,
+    )
+    return after, difference, second == kind and later == kind and fourth == kind
 
 
 def _distance(one: Three, other: Three, length: float) -> float:
     x, y, turn = one[0] - other[0], one[1] - other[1], (one[2] - other[2]) * length
     return sqrt(x * x + y * y + turn * turn)
+
+
+def _size(difference: Three, last: Rates, length: float) -> float:
+    """Of the difference of rates, with that after the step."""
+    x, y, turn = difference[0] + AFTER * last[0], difference[1] + AFTER * last[1], difference[2] + AFTER * last[2]
+    return sqrt(x * x + y * y + turn * turn * length * length)
