@@ -60,7 +60,7 @@ from push_predictor.types import Array
 
 SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
-PUSHED = ("circle_pu", SMALL, "square_abs_test")  # whose forces are altered
+PUSHED = ("circle_pu", SMALL, ONE_SIDE)  # whose forces are altered
 SLIDERS = [name for name in BAGS if name != "square_abs_train"]  # which has the slider and surface of another
 
 
