@@ -54,9 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command and return its exit status."""
     # With a thousand rows a second thread gains little, and it is ten times slower if another process needs the core.
     limit_process()
+    completing = "_ARGCOMPLETE" in os.environ  # set by the shell: argcomplete takes longer than the parser
     words, warnings = current_spelling(sys.argv[1:] if arguments is None else arguments)
-    parser = build_parser()
-    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion only: argcomplete takes longer than the parser
+    parser = build_parser(words[:1] if words and words[0] in COMMANDS and not completing else COMMANDS)
+    if completing:
         _complete(parser)
     options = parser.parse_args(words)
     for warning in warnings:
@@ -76,8 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the parser with all sub-commands."""
+def build_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """Return the parser with these sub-commands; a call needs its own only, and the others take time to import."""
     parser = argparse.ArgumentParser(
         prog="push_predictor",
         description="Learn models of planar pushing from recordings, check them, and explain their errors.",
@@ -85,7 +86,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in COMMANDS:
+    for name in names:
         import_module(f"push_predictor.commands.{name}_command").add_parser(commands)
     return parser
 

@@ -35,7 +35,7 @@ from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 
-HEXAGON, SQUARE = BAGS / "hexagon_delrin", BAGS / "square_abs_test"
+HEXAGON, ROUND = BAGS / "hexagon_delrin", BAGS / "circle_pu"
 MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
@@ -137,7 +137,7 @@ def test_a_recording_in_mm_is_an_error_in_any_case(in_mm: Path, model: PushModel
 
 
 def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel, loaded_only: Callable[..., None]) -> None:
-    assert warned(lambda: train(SQUARE, kind="analytical", watch=quiet, strict=True)) == []
+    assert warned(lambda: train(ROUND, kind="analytical", watch=quiet, strict=True)) == []
     assert warned(lambda: loaded_only(model, HEXAGON, strict=True)) == []
 
 
@@ -156,7 +156,7 @@ def test_a_learnt_model_of_few_pushes_warns_and_an_analytical_one_does_not(tmp_p
 def test_a_validation_warns_of_training_pushes_and_of_another_slider(model: PushModel) -> None:
     (text,) = warned(lambda: validate(model, HEXAGON))
     assert "were used for training" in text
-    (text,) = warned(lambda: validate(model, SQUARE))
+    (text,) = warned(lambda: validate(model, ROUND))
     assert "was trained with the outline of 'hex'" in text
 
 

@@ -48,6 +48,7 @@ pytestmark = pytest.mark.slow
 
 OUTPUTS = ["dx", "dy", "dtheta"]
 METRICS = ["model", "n_train", "n_test", "n_pushes", "nmse", "nlpd", "exact_nlpd", "joint_nlpd", "coverage"]
+SHORT = ["--speed", "0.02", "0.05", "--travel", "0.022"]  # m/s and m: of simulated pushes
 PUSH = ["--velocity", "0.02", "--contact", "0.1", "--angle", "0.3"]
 
 
@@ -77,7 +78,7 @@ class Outcome:
 def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
     """simulate -> train, as a user would."""
     folder = tmp_path_factory.mktemp("cli")
-    simulate = ["simulate", "--shape", "rect1", "--surface", "abs", "--speed", "0.02", "0.05"]
+    simulate = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT]
     calls = {
         "train recording": [*simulate, "--pushes", "6", "--seed", "1", "--out", str(folder / "train")],
         "test recording": [
@@ -91,7 +92,6 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
             "--json",
             "-",
         ],
-        "other slider": [*simulate[:2], "ellip1", *simulate[3:], "--pushes", "2", "--out", str(folder / "round")],
         "gp": ["train", str(folder / "train"), "--kind", "gp", "--mean", "zero"]
         + ["--out", str(folder / "gp.pushmodel")],
         "vhgp": ["train", str(folder / "train"), "--kind", "vhgp", "--n-train", "15", "--name", "hetero"]
@@ -196,7 +196,7 @@ def test_simulate_reports_the_recording(place: Place, run):
 
 
 def test_seed_determines_the_simulated_recording(place: Place, run):
-    call = ["simulate", "--shape", "rect1", "--surface", "abs", "--speed", "0.02", "0.05", "--pushes", "4"]
+    call = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT, "--pushes", "4"]
     for seed, same in (("2", True), ("3", False)):
         again = place.path(f"again{seed}/test.mcap")
         assert run(*call, "--seed", seed, "--out", again).status == 0
@@ -204,7 +204,7 @@ def test_seed_determines_the_simulated_recording(place: Place, run):
 
 
 def test_train_reports_model_windows_and_pushes(place: Place):
-    assert ": gp, trained on 32 of 32 windows, 6 pushes" in place.printed["gp"]
+    assert ": gp, trained on 24 of 24 windows, 6 pushes" in place.printed["gp"]
     learned = json.loads(place.printed["vhgp"])
     assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
     assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
@@ -330,7 +330,7 @@ def test_evaluate_and_validate_warn_about_training_pushes(place: Place, run):
 
 
 def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
-    outcome = run("validate", place.path("analytical.pushmodel"), place.path("round"), "--json", "-")
+    outcome = run("validate", place.path("analytical.pushmodel"), str(REPOSITORY / "bags" / "circle_pu"), "--json", "-")
     assert_metrics_format(outcome.json)
     warned = without_progress(outcome.err)[-1]
     assert warned.startswith("warning: ") and "'rect1'" in warned and "'ellip1'" in warned
@@ -451,8 +451,11 @@ def test_import_writes_a_table_and_a_rig_that_train_reads(run, tmp_path: Path):
 
 
 def test_report_writes_a_page_and_the_metrics(place: Place, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)  # pictures of 160 dpi take seconds
-    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
+    drawn: list[str] = []
+    monkeypatch.setattr(  # test_report draws them
+        "push_predictor.evaluation.report.figures.gallery.draw",
+        lambda path, *_: drawn.append(path.name) or path.write_bytes(b""),
+    )
     fired = "push_predictor.evaluation.offline.recording_alarm"
     monkeypatch.setattr(fired, lambda model, *_: {"fired": model.name == "hetero"})  # the main model
     models = [place.path("vhgp.pushmodel"), place.path("analytical.pushmodel")]
@@ -460,6 +463,7 @@ def test_report_writes_a_page_and_the_metrics(place: Place, run, tmp_path: Path,
     found = run(*call, "--json", "-").json
     page = Path(found["report"]).read_text()
     assert page.startswith("<!") and '<span class="verdict">no longer fits</span>' in page
+    assert {"map_mean.png", "tracks.png", "calibration.png", "residuals.png"} <= {*drawn}
     assert [metrics["model"] for metrics in found["models"]] == ["hetero", "analytical"]
     assert json.loads((tmp_path / "validation.json").read_text()) == found["models"]
     for metrics in found["models"]:

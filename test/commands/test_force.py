@@ -25,7 +25,7 @@ from push_predictor.commands.common.output import check_folder, check_output
 from push_predictor.errors import RequestError
 
 PUSH = ["--velocity", "0.02", "--contact", "0.1", "--angle", "0.3"]
-SIMULATE = ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.02"]
+SIMULATE = ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.05"]
 CALLS = [  # {old} exists; the inputs are absent or damaged, so that nothing is computed
     ["predict", "absent", *PUSH, "--json", "{old}"],
     ["info", "absent", "--json", "{old}"],
@@ -81,7 +81,7 @@ def test_an_existing_output_is_refused_before_the_work(
 
 
 def test_force_replaces_a_recording_and_no_other_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    call = [*SIMULATE, "--out", str(tmp_path / "bag")]
+    call = [*SIMULATE, "--travel", "0.01", "--out", str(tmp_path / "bag")]
     assert main(call) == 0
     first = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
     assert main([*call, "--seed", "1"]) == 1

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,7 @@ pytest.importorskip("rosbags")
 from lab_bags import laboratory, short_recording, write_db3
 
 from push_predictor.cli import main
+from push_predictor.recordings.streams import Recording, taken
 
 pytestmark = pytest.mark.slow
 
@@ -38,10 +40,18 @@ def commands() -> list[list[str]]:
     return [shlex.split(line)[1:] for line in re.findall(r"^    (push_predictor .*)$", block, re.MULTILINE)[:4]]
 
 
+def thinned(recording: Recording) -> Recording:
+    """Every second sample: 50 Hz."""
+    slider, pusher, wrench = (
+        taken(stream, slice(None, None, 2)) for stream in (recording.slider, recording.pusher, recording.wrench)
+    )
+    return replace(recording, slider=slider, pusher=pusher, wrench=wrench)
+
+
 def test_the_commands_of_the_readme_validate_a_model(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monday, tuesday = short_recording(52.0), short_recording(52.0, after=75.0)
+    monday, tuesday = thinned(short_recording(52.0)), thinned(short_recording(52.0, after=75.0))
     write_db3(laboratory(monday), tmp_path / "monday")
     laboratory(tuesday).mcap(tmp_path / "tuesday")
     monkeypatch.chdir(tmp_path)
@@ -57,8 +67,9 @@ def test_the_commands_of_the_readme_validate_a_model(
     assert re.match(r"monday: no findings\. The data contain \d+ pushes", monday_line)
     assert re.match(r"tuesday: no findings\. The data contain \d+ pushes", tuesday_line)
     assert main(info) == 0
-    assert "slider: 5195 samples" in capsys.readouterr().out
-    assert main(train) == 0 and (tmp_path / "monday.pushmodel").is_file()
+    assert "slider: 2598 samples" in capsys.readouterr().out
+    assert main([*train, "--n-train", "60"]) == 0  # windows; all of them take seconds more
+    assert (tmp_path / "monday.pushmodel").is_file()
     capsys.readouterr()
     assert main(validate) == 0
     assert capsys.readouterr().out.startswith("The model fits: 95 % intervals cover ")

@@ -124,10 +124,13 @@ def fractions(seen: list[tuple[str, str, float]], task: str) -> list[float]:
     return found
 
 
-def test_commands_report_what_is_done(tmp_path: Path, seen: list[tuple[str, str, float]]) -> None:
+def test_commands_report_what_is_done(
+    tmp_path: Path, seen: list[tuple[str, str, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("push_predictor.design.batch.CANDIDATES", 16)
     bag, model = str(tmp_path / "bag"), str(tmp_path / "m.pushmodel")
-    shape = ["--shape", "rect1", "--surface", "abs", "--speed", "0.02"]
-    assert main(["simulate", *shape, "--pushes", "12", "--out", bag]) == 0
+    shape = ["--shape", "rect1", "--surface", "abs", "--speed", "0.02", "--travel", "0.012"]
+    assert main(["simulate", *shape, "--pushes", "10", "--out", bag]) == 0
     assert main(["train", bag, "--kind", "gp", "--mean", "zero", "--out", model]) == 0
     assert main(["suggest", model, "--count", "3", "--out", str(tmp_path / "s.csv")]) == 0
     assert main(["validate", model, bag]) == 0

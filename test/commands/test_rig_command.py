@@ -76,9 +76,10 @@ def test_a_rig_needs_no_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(call) == 0
     assert "mass           not given" in capsys.readouterr().out
     assert load_rig(out).object_mass is None and "object_mass" not in out.read_text()
-    assert main(["check", SQUARE_BAG, "--rig", str(out), "--strict"]) == 0
-    assert main(["info", SQUARE_BAG, "--rig", str(out)]) == 0
-    assert "square on plywood, mass not given" in capsys.readouterr().out
+    assert main(["rig", "--circle", "0.105", *call[3:], "--force"]) == 0
+    assert main(["check", ROUND_BAG, "--rig", str(out), "--strict"]) == 0
+    assert main(["info", ROUND_BAG, "--rig", str(out)]) == 0
+    assert "circle on plywood, mass not given" in capsys.readouterr().out
 
 
 def test_a_rectangle_is_wide_along_x(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +27,9 @@ from synthetic import noisy_pushes, square_rig
 
 from push_predictor.cli import main
 from push_predictor.commands.suggest_command import COLUMNS
-from push_predictor.design.batch import suggest_pushes
+from push_predictor.design.batch import Suggested, suggest_pushes
 from push_predictor.design.limits import Limits
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import save_rig
@@ -35,6 +37,13 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor.types import Array
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few candidates: the command does not depend on their number."""
+    monkeypatch.setattr("push_predictor.design.batch.CANDIDATES", 32)
+    monkeypatch.setattr("push_predictor.design.batch.MATTER", 16)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +76,16 @@ def test_writes_the_suggested_pushes_in_order(folder: Path, capsys: pytest.Captu
     assert f"leave {100.0 * expected.variance_left[-1]:.0f} % of the variance" in printed
 
 
-def test_keeps_to_the_limits_without_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_keeps_to_the_limits_without_a_model(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[PushModel, int, Limits, Suggested]] = []
+
+    def noted(model: PushModel, count: int, limits: Limits, **options: Any) -> Suggested:
+        calls.append((model, count, limits, suggest_pushes(model, count, limits, **options)))
+        return calls[-1][-1]
+
+    monkeypatch.setattr("push_predictor.design.batch.suggest_pushes", noted)
     limits = [
         "--speed-range",
         "0.03",
@@ -87,8 +105,12 @@ def test_keeps_to_the_limits_without_a_model(folder: Path, capsys: pytest.Captur
     assert shown["model"] == "rig" and len(shown["pushes"]) == 3
     for name in COLUMNS:
         np.testing.assert_allclose([push[name] for push in shown["pushes"]], found[name], rtol=1e-5)
-    model = train_model(noisy_pushes(1).take(np.array([], dtype=int)), square_rig(), "prior", name="rig")
-    same = suggest_pushes(model, 3, Limits((0.03, 0.05), (-0.2, 0.4), 0.02, ((0.5, 1.0),), 0.1))
+    ((model, count, limits_given, same),) = calls
+    assert (model.kind, len(model.training), count) == ("prior", 0, 3)
+    assert model.rig.to_record() == square_rig().to_record()
+    assert limits_given == Limits((0.03, 0.05), (-0.2, 0.4), 0.02, ((0.5, 1.0),), 0.1)
+    assert np.all((found["velocity"] >= 0.03) & (found["velocity"] <= 0.05) & (found["contact"] < 0.5))
+    assert np.all((found["angle"] >= -0.2) & (found["angle"] <= 0.4))
     np.testing.assert_allclose(np.column_stack([found[n] for n in COLUMNS[:3]]), same.inputs, rtol=1e-5)
     np.testing.assert_allclose(found["duration"] * found["velocity"], 0.02, rtol=1e-5)
 

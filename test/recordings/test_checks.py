@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checked_bags import bag, found, rig_of
+from checked_bags import bag, found, rig_of, sample
 from lab_bags import Lab, pose_values
 from mistakes import (
     BAGS,
@@ -60,6 +60,8 @@ from push_predictor.types import Array
 
 SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
+PUSHED = ("circle_pu", SMALL, ONE_SIDE)  # whose forces are altered
+SLIDERS = [name for name in BAGS if name != "square_abs_train"]  # which has the slider and surface of another
 
 
 def bag_apothem(name: str) -> float:
@@ -73,34 +75,34 @@ def test_the_bags_give_no_finding(name: str) -> None:
     assert check_recording(bag(name), rig_of(name)) == ()
 
 
-@pytest.mark.parametrize("name", BAGS)
-@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012), (0.0012, 0.0), (-0.0012, 0.0)])
+@pytest.mark.parametrize("name", SLIDERS)
+@pytest.mark.parametrize("shift", [(0.0, 0.0012), (-0.0012, 0.0)])
 def test_a_shift_of_over_a_millimetre_is_found_within_four_sd(name: str, shift: tuple[float, float]) -> None:
     shift = (shift[0] or shift[1], 0.0) if name == ONE_SIDE else shift  # along its side no contact shows a shift
-    finding = found(tracked(bag(name), 0.0, shift), rig_of(name))["outline_shifted"]
+    finding = found(tracked(sample(name), 0.0, shift), rig_of(name))["outline_shifted"]
     for estimate, true in zip((finding.values["x"], finding.values["y"]), shift, strict=True):
         assert estimate.sd is not None
         assert abs(estimate.value + true) < 4.0 * estimate.sd + 1e-4
     assert finding.severity == "warning" and "mm" in finding.sentence
 
 
-@pytest.mark.parametrize("name", [name for name in BAGS if name != "circle_pu"])
-@pytest.mark.parametrize("degrees", [2.1, -2.1, 12.0])
+@pytest.mark.parametrize("name", [name for name in SLIDERS if name != "circle_pu"])
+@pytest.mark.parametrize("degrees", [2.1, -12.0])
 def test_a_turn_of_over_two_degrees_is_found(name: str, degrees: float) -> None:
-    finding = found(tracked(bag(name), np.radians(degrees), (0.0, 0.0)), rig_of(name))["outline_turned"]
+    finding = found(tracked(sample(name), np.radians(degrees), (0.0, 0.0)), rig_of(name))["outline_turned"]
     assert finding.values["yaw"].value == pytest.approx(-np.radians(degrees), abs=0.006)
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
     order = rig_of(name).outline.rotational_symmetry
     turn = 2.0 * np.pi / order if order else 0.3
-    assert not found(tracked(bag(name), turn, (0.0, 0.0)), rig_of(name))
+    assert not found(tracked(sample(name), turn, (0.0, 0.0)), rig_of(name))
 
 
-@pytest.mark.parametrize("name", ["hexagon_delrin", "square_abs_test", "square_abs_train"])
+@pytest.mark.parametrize("name", ["hexagon_delrin", "square_abs_test"])
 def test_a_wrong_size_is_found(name: str) -> None:
-    finding = found(bag(name), outline_altered(rig_of(name), size=1.03))["outline_size"]
+    finding = found(sample(name), outline_altered(rig_of(name), size=1.03))["outline_size"]
     assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
     half = 45.0 if name.startswith("square") else 1e3 * bag_apothem(name)
     stated = re.search(r", (-\d+\.\d) mm a side", finding.sentence)
@@ -114,13 +116,13 @@ def test_a_wrong_size_seen_from_one_side_is_reported_with_its_rival() -> None:
 
 @pytest.mark.parametrize("name", ["circle_pu", SMALL, ONE_SIDE])
 def test_a_mirrored_frame_is_named(name: str) -> None:
-    assert "frame_mirrored" in found(mirrored(bag(name), -1.0, -1.0), rig_of(name))
+    assert "frame_mirrored" in found(mirrored(sample(name), -1.0, -1.0), rig_of(name))
 
 
 @pytest.mark.parametrize("name", [SMALL, ONE_SIDE])
 @pytest.mark.parametrize(("y", "heading", "finding"), [(1.0, -1.0, "heading_clockwise"), (-1.0, 1.0, "y_mirrored")])
 def test_a_heading_or_a_y_axis_of_the_wrong_sign_is_named(name: str, y: float, heading: float, finding: str) -> None:
-    assert list(found(mirrored(bag(name), y, heading), rig_of(name))) == [finding]
+    assert list(found(mirrored(sample(name), y, heading), rig_of(name))) == [finding]
 
 
 def test_a_circle_with_a_wrong_y_axis_is_named_as_mirrored() -> None:
@@ -128,24 +130,17 @@ def test_a_circle_with_a_wrong_y_axis_is_named_as_mirrored() -> None:
     assert list(found(mirrored(bag("circle_pu"), -1.0, 1.0), rig_of("circle_pu"))) == ["frame_mirrored"]
 
 
-@pytest.mark.parametrize("name", BAGS)
 @pytest.mark.parametrize("error", [0.0011, -0.0011])
-def test_a_wrong_tip_radius_is_found(name: str, error: float) -> None:
-    """As the size or a shift where the contacts do not separate the two; the advice or the sentence names the tip."""
-    rig = rig_of(name)
-    (finding,) = check_recording(bag(name), replace(rig, pusher_radius=rig.pusher_radius + error))
-    if name == ONE_SIDE:
-        assert finding.name == "outline_shifted" and abs(finding.values["x"].value) == pytest.approx(0.0011, abs=1e-4)
-    elif name == "ellipse_plywood":
-        assert finding.name == "tip_radius"
-        assert finding.values["radius"].value == pytest.approx(rig.pusher_radius, abs=1e-4)
-    else:
-        assert finding.name == "outline_size" and f"tip radius by {-1e3 * error:.1f} mm" in finding.advice
+def test_a_wrong_tip_radius_seen_from_one_side_is_reported_as_a_shift(error: float) -> None:
+    """The contacts of one side separate neither; see test_outline_causes for the other recordings."""
+    rig = rig_of(ONE_SIDE)
+    (finding,) = check_recording(bag(ONE_SIDE), replace(rig, pusher_radius=rig.pusher_radius + error))
+    assert finding.name == "outline_shifted" and abs(finding.values["x"].value) == pytest.approx(0.0011, abs=1e-4)
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_exchanged_topics_are_refused(name: str) -> None:
-    assert found(swapped(bag(name)), rig_of(name))["topics_swapped"].severity == "refused"
+    assert found(swapped(sample(name)), rig_of(name))["topics_swapped"].severity == "refused"
 
 
 def test_few_pushes_give_no_estimate_of_the_outline() -> None:
@@ -162,9 +157,9 @@ def test_a_slider_that_never_moves_is_refused() -> None:
 
 
 @pytest.mark.parametrize("lag", [0.05, -0.05])
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
-    finding = found(late(bag(name), lag), rig_of(name))["clocks_apart"]
+    finding = found(late(sample(name), lag), rig_of(name))["clocks_apart"]
     estimate = finding.values["lag"]
     assert estimate.value == pytest.approx(lag, abs=0.02 if name == ONE_SIDE else 0.015)
     assert estimate.sd is not None and 0.0 < estimate.sd < 0.005
@@ -190,17 +185,17 @@ def test_stamps_in_a_wrong_unit_are_refused(factor: float) -> None:
     assert "units_time_slider" in found(replace(bag(SMALL), slider=replace(slider, stamp=stamp)), rig_of(SMALL))
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_a_quaternion_with_w_first_is_refused(name: str) -> None:
     """Of a tracker, whose quaternions have a tilt of some milliradians."""
-    (finding,) = check_recording(w_first(bag(name)), rig_of(name))
+    (finding,) = check_recording(w_first(sample(name)), rig_of(name))
     assert (finding.name, finding.severity) == ("quaternion_order", "refused")
     assert finding.values["tilt"].value > np.radians(90.0)
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_the_tilt_of_a_tracker_is_no_finding(name: str) -> None:
-    recording = bag(name)
+    recording = sample(name)
     tracked_in_space = slider_stream(recording.slider.stamp, spatial_rows(recording.slider))
     assert check_recording(replace(recording, slider=tracked_in_space), rig_of(name)) == ()
     assert tracked_in_space.tilt is not None
@@ -247,56 +242,56 @@ def test_quaternions_of_transforms_are_checked_too(tmp_path: Path, w_is_first: b
     assert list(found(read, rig_of(SMALL))) == (["quaternion_order"] if w_is_first else [])
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_an_orientation_that_is_not_recorded_is_refused(name: str) -> None:
-    assert found(without_orientation(bag(name)), rig_of(name))["heading_constant"].severity == "refused"
+    assert found(without_orientation(sample(name)), rig_of(name))["heading_constant"].severity == "refused"
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 @pytest.mark.parametrize("place", [(0.03, 0.0), (0.0, -0.03), (-0.08, 0.0), (0.05, 0.06)])
 def test_a_body_on_the_robots_hand_is_refused(name: str, place: tuple[float, float]) -> None:
     """Whether the tip seems to be inside the outline, on it, or outside."""
-    (finding,) = check_recording(on_hand(bag(name), place), rig_of(name))
+    (finding,) = check_recording(on_hand(sample(name), place), rig_of(name))
     assert (finding.name, finding.severity) == ("another_body", "refused")
     assert "moves with the tip" in finding.sentence
 
 
-@pytest.mark.parametrize(("name", "shift"), [*((name, 0.003) for name in BAGS), ("circle_pu", 0.02)])
+@pytest.mark.parametrize(("name", "shift"), [*((name, 0.003) for name in SLIDERS), ("circle_pu", 0.02)])
 def test_a_shifted_world_frame_is_no_exchange_of_topics(name: str, shift: float) -> None:
-    slider = bag(name).slider
-    findings = found(replace(bag(name), slider=replace(slider, x=slider.x + shift)), rig_of(name))
+    slider = sample(name).slider
+    findings = found(replace(sample(name), slider=replace(slider, x=slider.x + shift)), rig_of(name))
     assert findings and {each.severity for each in findings.values()} == {"warning"}
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", PUSHED)
 def test_a_wrench_of_the_wrong_sign_is_named(name: str) -> None:
-    wrench = bag(name).wrench
+    wrench = sample(name).wrench
     assert wrench is not None
-    wrong = replace(bag(name), wrench=replace(wrench, fx=-wrench.fx, fy=-wrench.fy))
+    wrong = replace(sample(name), wrench=replace(wrench, fx=-wrench.fx, fy=-wrench.fy))
     assert list(found(wrong, rig_of(name))) == ["wrench_sign"]
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", PUSHED)
 def test_a_wrench_along_other_axes_is_named(name: str) -> None:
-    wrench = bag(name).wrench
+    wrench = sample(name).wrench
     assert wrench is not None
-    wrong = replace(bag(name), wrench=replace(wrench, fx=-wrench.fy, fy=wrench.fx))
+    wrong = replace(sample(name), wrench=replace(wrench, fx=-wrench.fy, fy=wrench.fx))
     assert list(found(wrong, rig_of(name))) == ["wrench_frame"]
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", PUSHED)
 @pytest.mark.parametrize("mistake", [force_in_slider_frame, lambda recording: force_turned(recording, -np.pi / 2.0)])
 def test_a_wrench_in_the_sliders_or_a_turned_frame_is_named(name: str, mistake: Mistake) -> None:
-    assert list(found(mistake(bag(name)), rig_of(name))) == ["wrench_frame"]
+    assert list(found(mistake(sample(name)), rig_of(name))) == ["wrench_frame"]
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", SLIDERS)
 def test_a_heading_in_degrees_is_refused(name: str) -> None:
-    finding = found(heading_in_degrees(bag(name)), rig_of(name))["units_heading"]
+    finding = found(heading_in_degrees(sample(name)), rig_of(name))["units_heading"]
     assert finding.severity == "refused" and "degrees" in finding.sentence
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", PUSHED)
 @pytest.mark.parametrize("alter", [
     force_of_random_direction,
     force_of_another_time,
@@ -305,18 +300,18 @@ def test_a_heading_in_degrees_is_refused(name: str) -> None:
     lambda recording: force_constant(recording, 2.0),
 ])  # fmt: skip
 def test_a_force_that_has_nothing_to_do_with_the_push_is_named(name: str, alter: Mistake) -> None:
-    (finding,) = wrench_findings(alter(bag(name)), rig_of(name))
+    (finding,) = wrench_findings(alter(sample(name)), rig_of(name))
     assert (finding.name, finding.severity) == ("wrench_unrelated", "warning")
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", PUSHED)
 @pytest.mark.parametrize(("factor", "finding"), [
     (0.0, "wrench_absent"), (1e-3, "wrench_absent"), (1.0 / 9.81, "wrench_absent"),
     (102.0, "wrench_units"), (1e3, "wrench_units"),
 ])  # fmt: skip
 def test_a_force_that_is_absent_or_in_another_unit_is_named(name: str, factor: float, finding: str) -> None:
     """In N, kN, kgf, gf or mN."""
-    assert [each.name for each in wrench_findings(force_scaled(bag(name), factor), rig_of(name))] == [finding]
+    assert [each.name for each in wrench_findings(force_scaled(sample(name), factor), rig_of(name))] == [finding]
 
 
 def test_a_slider_of_unknown_mass_may_be_light_or_heavy() -> None:

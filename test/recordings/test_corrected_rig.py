@@ -22,7 +22,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from repository import REPOSITORY
+from checked_bags import sample as bag
+from mistakes import stream_part
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import rotate, wrap_angle
@@ -33,7 +34,6 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
 from push_predictor.recordings.checks.outline.findings import half_size
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.rigs.estimate import estimate_rig
 from push_predictor.recordings.streams import Recording
@@ -42,27 +42,19 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.slider import Slider
 from push_predictor.simulation.spec import SimulationSpec
 
-BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
 ROUND = "circle_pu"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
+BAGS = (ROUND, "ellipse_plywood", "hexagon_delrin", ONE_SIDE, "square_abs_test")
+DETAILED = ("ellipse_plywood", "hexagon_delrin")  # the small errors that test_checks makes in the poses instead
 MILLIMETRE, TWO_DEGREES = 0.001, np.radians(2.0)
 CORNERS = np.array([[-0.05, -0.03], [0.07, -0.03], [-0.02, 0.06]])  # of a slider without mirror symmetry
 
 
 @cache
-def bag(name: str) -> Recording:
-    return read_recording(REPOSITORY / "bags" / name)
-
-
-@cache
 def scalene() -> Recording:
-    return triangle_pushes(12)
-
-
-def triangle_pushes(count: int) -> Recording:
     """Pushes of a triangle whose sides differ."""
     slider = Slider("scalene", Outline(CORNERS - CORNERS.mean(axis=0)), 0.8)
-    plan = random_pushes(count, (0.02,), 0.02, np.random.default_rng(1))
+    plan = random_pushes(12, (0.02,), 0.02, np.random.default_rng(1))
     return simulate(SimulationSpec(slider, "abs", plan, seed=1))
 
 
@@ -80,21 +72,20 @@ def found(recording: Recording, rig: Rig) -> dict[str, Mapping[str, Value]]:
     return {finding.name: finding.values for finding in check_recording(recording, rig)}
 
 
-@pytest.mark.parametrize("name", [name for name in BAGS if name != ROUND])
+@pytest.mark.parametrize("name", DETAILED)
 def test_an_outline_turned_by_two_degrees_is_found(name: str) -> None:
     values = found(bag(name), wrong(rig_of(bag(name)), yaw=TWO_DEGREES))["outline_turned"]
     assert values["yaw"].value == pytest.approx(-TWO_DEGREES, abs=0.002)
 
 
-@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("name", [*DETAILED, ONE_SIDE])
 def test_an_outline_shifted_by_a_millimetre_is_found(name: str) -> None:
     shift = (MILLIMETRE, 0.0) if name == ONE_SIDE else (0.0, MILLIMETRE)  # along its side no contact shows a shift
     values = found(bag(name), wrong(rig_of(bag(name)), shift=shift))["outline_shifted"]
     assert (values["x"].value, values["y"].value) == pytest.approx((-shift[0], -shift[1]), abs=1e-4)
 
 
-@pytest.mark.parametrize("name", [name for name in BAGS if name != ONE_SIDE])
-@pytest.mark.parametrize("more", [MILLIMETRE, -MILLIMETRE])
+@pytest.mark.parametrize(("name", "more"), zip(DETAILED, (MILLIMETRE, -MILLIMETRE), strict=True))
 def test_an_outline_too_large_or_too_small_by_a_millimetre_a_side_is_found(name: str, more: float) -> None:
     rig = rig_of(bag(name))
     values = found(bag(name), wrong(rig, more=more))["outline_size"]
@@ -138,7 +129,7 @@ def test_a_mirrored_outline_is_found_and_corrected() -> None:
 
 
 def test_few_pushes_show_no_mirrored_outline() -> None:
-    few = triangle_pushes(5)
+    few = replace(scalene(), slider=stream_part(scalene().slider, 0.0, 0.4), wrench=None)
     rig = rig_of(few)
     altered = replace(rig, outline=mirror_image(rig.outline))
     assert list(found(few, altered)) == ["outline_unchecked"]
@@ -173,14 +164,6 @@ def test_a_wrong_tip_is_separated_from_a_wrong_size_on_an_ellipse() -> None:
     corrected = corrected_rig(altered, findings)
     assert corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
     assert corrected.outline.area == pytest.approx(rig.outline.area)
-
-
-@pytest.mark.parametrize("name", [ROUND, "hexagon_delrin"])
-def test_a_wrong_tip_of_a_regular_slider_is_reported_with_its_rival(name: str) -> None:
-    rig = rig_of(bag(name))
-    (finding,) = check_recording(bag(name), replace(rig, pusher_radius=rig.pusher_radius + 0.0015))
-    assert finding.name == "outline_size"
-    assert "correct the tip radius by -1.5 mm: these contacts do not separate the two" in finding.advice
 
 
 def test_the_clocks_are_no_part_of_the_rig() -> None:

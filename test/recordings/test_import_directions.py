@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ SOURCES = {
 }
 
 
+@cache
 def imported(path: Path) -> set[str]:
     """The modules of `recordings` that a module imports itself."""
     nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]

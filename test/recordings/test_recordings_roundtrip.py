@@ -82,7 +82,7 @@ def assert_same_pose(read: PoseStream, written: PoseStream) -> None:
     np.testing.assert_allclose(np.sin(turn), 0.0, atol=1e-13)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(recordings, st.sampled_from(COMPRESSIONS), st.booleans())
 def test_any_recording_reads_back_unchanged(written: Recording, compression: str, bare: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -135,7 +135,7 @@ def test_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Pat
 LAYOUTS = st.builds(Layout, st.booleans(), st.integers(1, 7), st.just(8)) | st.just(Layout(False, 1, 4))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(stamps(0), LAYOUTS, st.text(max_size=20), st.data())
 def test_columns_read_back_from_cdr_with_any_frame_id(
     stamp: np.ndarray, layout: Layout, frame: str, data: st.DataObject

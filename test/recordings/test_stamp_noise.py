@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.sensors.topic_report import stamp_figures
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.read import read_recording, require_rig
@@ -266,7 +266,9 @@ def table_of(recording: Recording) -> PushTable:
 
 @cache
 def model() -> PushModel:
-    return train_model(table_of(half(0)), require_rig(half(0)), "gp", name="square")
+    return train_model(
+        table_of(half(0)), require_rig(half(0)), "gp", name="square", options=TrainingOptions(n_train=60)
+    )
 
 
 @cache

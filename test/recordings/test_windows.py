@@ -70,7 +70,7 @@ def test_windows_state_what_the_sensor_read_in_free_motion_and_do_not_contain_it
         assert b.covariates["normal_force"] == pytest.approx(a.covariates["normal_force"], abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     shift=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
     turn=st.floats(-7.0, 7.0),
@@ -84,7 +84,7 @@ def test_windows_do_not_depend_on_the_world_frame(shift: tuple[float, float], tu
         assert a.displacement == pytest.approx(b.displacement, abs=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(cuts=st.lists(st.integers(1, 239), max_size=12, unique=True), order=st.permutations(range(3)))
 def test_windows_do_not_depend_on_portions_and_interleaving(cuts: list[int], order: list[int]) -> None:
     recording = translating_push()

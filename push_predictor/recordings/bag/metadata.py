@@ -19,7 +19,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
@@ -70,7 +72,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
 
     path = folder / METADATA_FILE
     try:
-        information = yaml.safe_load(path.read_text(encoding="utf-8"))[_ROOT]
+        information = _parsed(path.read_text(encoding="utf-8"))[_ROOT]
         files = tuple(str(name) for name in information.get("relative_file_paths") or ())
     except FileNotFoundError:
         return BagMetadata()
@@ -85,10 +87,21 @@ def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Map
     import yaml
 
     try:
-        information = yaml.safe_load(metadata["rosbag2"]["serialized_metadata"])
+        information = _parsed(metadata["rosbag2"]["serialized_metadata"])
     except (*_DAMAGED, yaml.YAMLError):
         return {}
     return _records(information.get("custom_data")) if isinstance(information, dict) else {}
+
+
+@lru_cache(maxsize=16)
+def _parsed(text: str) -> Any:
+    """The content of YAML text, which nobody changes: a bag has the same text twice, and is opened several times.
+
+    Parsed in Python: libyaml, ten times as fast, crashes on text that is nested deeply.
+    """
+    import yaml
+
+    return yaml.safe_load(text)
 
 
 def bag_metadata_text(

@@ -43,6 +43,7 @@ BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the g
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
 AT_REST = 0.1  # share of the slider's motion; a slider moves only with the tip, or in a hand
 TIE = 1.3  # hypotheses with gaps up to this ratio fit equally well: the more usual one is named
+EXACT = 5e-5  # m; no further hypothesis is tried after one with a smaller gap, which is less than a tracker's noise
 FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wrong
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
@@ -59,7 +60,7 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
         swapped(recording), rig
     ):
         return [_swapped(fit.gap)]
-    recorded = _gap_as_recorded(recording, rig)
+    recorded = _gap_as_recorded(contacts, rig)
     if fit.pushes < FEWEST_PUSHES and recorded < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
     if fit.gap < LARGE_GAP and not _is_implausible(fit, reach):
@@ -68,7 +69,7 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
     explained = min(BETTER * fit.gap, FAR * reach)
     if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
-    mirrors = {name: _gap_of(reflected(contacts, each), rig) for name, each in MIRRORS.items()}
+    mirrors = _mirror_gaps(contacts, rig)
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
     if found := _mirror_image_findings(contacts, rig, fit.gap, min(explained, mirrors[best])):
         return found
@@ -115,13 +116,21 @@ def _gap_of(contacts: Contacts, rig: Rig) -> float:
     return np.inf if _is_implausible(fit, _reach(rig)) else fit.gap
 
 
+def _mirror_gaps(contacts: Contacts, rig: Rig) -> dict[str, float]:
+    """Gaps (m) by the name of the mirror, up to the first that explains the contacts exactly."""
+    gaps = {}
+    for name, mirror in MIRRORS.items():
+        gaps[name] = _gap_of(reflected(contacts, mirror), rig)
+        if gaps[name] < EXACT:
+            break
+    return gaps
+
+
 def _reach(rig: Rig) -> float:
     return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
 
 
-def _gap_as_recorded(recording: Recording, rig: Rig) -> float:
-    contacts = contacts_of(recording, rig)
-    assert contacts is not None, "it was fitted before"
+def _gap_as_recorded(contacts: Contacts, rig: Rig) -> float:
     return float(np.median(np.abs(rig.outline.project(contacts.tips).distance - rig.pusher_radius)))
 
 

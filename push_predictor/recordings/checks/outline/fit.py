@@ -58,6 +58,7 @@ CORNER = 0.003  # m
 SHORT = 0.3  # of the median number of samples
 DISTURBED = 0.001  # m; the spread from which on world frames are sought that are far apart
 MOST_EVALUATIONS = 40  # of the gaps by a fit
+SMALLEST_GAIN = 1e-4  # relative change of the cost at which a fit ends: it moves the estimate by a fraction of its sd
 STARTS = 12  # turns from which the fit begins
 # Prior sd of what the contacts do not determine, in the units of OutlineFit.
 WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3])
@@ -266,7 +267,13 @@ def _starts(turns: int, residuals: Gaps) -> list[Array]:
 
 def _refined(problem: _Problem, start: Array) -> Array:
     found = least_squares(
-        problem.residuals, start, jac=problem.jacobian, loss="soft_l1", x_scale=0.01, max_nfev=MOST_EVALUATIONS
+        problem.residuals,
+        start,
+        jac=problem.jacobian,
+        loss="soft_l1",
+        x_scale="jac",
+        ftol=SMALLEST_GAIN,
+        max_nfev=MOST_EVALUATIONS,
     )
     return np.asarray(found.x)
 
