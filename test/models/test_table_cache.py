@@ -45,7 +45,7 @@ from push_predictor.models.store.table_cache import (
     tables_of,
 )
 from push_predictor.models.tabulated import tabulated_prior
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_single_posteriors
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import empty_table
 
@@ -61,7 +61,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="module")
 def model() -> PushModel:
     """A small VHGP."""
-    return train_model(noisy_pushes(60), square_rig(), "vhgp", name="small")
+    return train_model(noisy_pushes(45), square_rig(), "vhgp", name="small")
 
 
 @pytest.fixture
@@ -70,6 +70,24 @@ def file(model: PushModel, tmp_path: Path) -> Path:
     path = tmp_path / "small.pushmodel"
     save_model(model, path)
     return path
+
+
+@pytest.fixture
+def computed_once(model: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are computed once for all tests that use this, which are about their files."""
+    monkeypatch.setattr(table_cache, "tabulate", lambda asked: once(asked)[0])
+    monkeypatch.setattr(table_cache, "with_single_posteriors", lambda served: once(served.model)[1])
+
+
+def once(model: PushModel) -> tuple[TabulatedModel, TabulatedModel]:
+    """The model's table, and with single posteriors."""
+    if (digest := model_digest(model)) not in COMPUTED:
+        table = tabulate(model)
+        COMPUTED[digest] = table, with_single_posteriors(table)
+    return COMPUTED[digest]
+
+
+COMPUTED: dict[str, tuple[TabulatedModel, TabulatedModel]] = {}
 
 
 def never(*_: object, **__: object) -> TabulatedModel:
@@ -164,13 +182,6 @@ def test_completion_does_not_undo_what_was_loaded_meanwhile(
     assert registry.get("small").model.kind == "analytical" and registry.names == ["small", "other"]
 
 
-def test_a_prior_model_has_its_table_at_once(tmp_path: Path, folder: Path) -> None:
-    prior = train_model(empty_table(), square_rig(), "prior", name="prior")
-    few_draws = replace(prior, predictor=replace(prior.predictor, draws=prior.predictor.draws[:12]))
-    save_model(few_draws, tmp_path / "prior.model")
-    assert load_at_once(tmp_path / "prior.model").how.startswith("table of")
-
-
 def test_training_writes_the_table_next_to_the_model(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,22 +214,25 @@ def test_the_shipped_model_has_its_table(folder: Path, monkeypatch: pytest.Monke
     assert served.tabulated and not folder.exists()
 
 
-def test_the_table_of_a_prior_model_is_kept_and_checked(
+def test_a_prior_model_has_its_table_at_once_and_it_is_kept_and_checked(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tabulated_prior, "CELL", 0.03)
-    monkeypatch.setattr(tabulated_prior, "ANGLE_CELLS", 5)
-    monkeypatch.setattr(tabulated_prior, "MEAN_TOLERANCE", 3.0)
-    monkeypatch.setattr(tabulated_prior, "SPREAD_TOLERANCE", 3.0)
-    model, file = train_model(empty_table(), square_rig(), "prior", name="prior"), tmp_path / "prior.pushmodel"
+    for name, value in (("CELL", 0.1), ("ANGLE_CELLS", 4), ("FEWEST_CELLS", 4)):
+        monkeypatch.setattr(tabulated_prior, name, value)
+    for name in ("MEAN_TOLERANCE", "SPREAD_TOLERANCE"):
+        monkeypatch.setattr(tabulated_prior, name, 9.0)
+    corners = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+    rig, file = replace(square_rig(), support_points=corners), tmp_path / "prior.pushmodel"
+    model = train_model(empty_table(), rig, "prior", name="prior")
     assert isinstance(model.predictor, PriorPredictor)
-    few_draws = replace(model.predictor, draws=model.predictor.draws[:8])  # the table takes an eighth of the time
+    few_draws = replace(model.predictor, draws=model.predictor.draws[:4])  # the table takes a fraction of the time
     save_model(replace(model, predictor=few_draws), file)
-    computed = load_served(file)
+    computed = load_at_once(file)
+    assert computed.how.startswith("table of")
     with monkeypatch.context() as patch:
         patch.setattr(table_cache, "tabulate", never)
         kept = load_served(file)
-        assert kept.how == computed.how and "table of" in kept.how
+        assert kept.how == computed.how
         pushes, duration = np.array([[0.02, 0.1, 0.2], [0.03, 0.6, -0.3]]), np.full(2, 0.2)
         one, other = (served.predict_rows(pushes, duration) for served in (computed, kept))
         assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
@@ -227,6 +241,7 @@ def test_the_table_of_a_prior_model_is_kept_and_checked(
     assert np.array_equal(again.predict_rows(pushes, duration).mean, one.mean)
 
 
+@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize("content", [b"", b"{}", "cut", "flipped"])
 def test_a_damaged_table_is_computed_again(
     file: Path, folder: Path, content: bytes | str, monkeypatch: pytest.MonkeyPatch
@@ -247,6 +262,7 @@ def test_a_damaged_table_is_computed_again(
     assert load_served(file).how == expected.how
 
 
+@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize(
     "change",
     [
@@ -274,6 +290,7 @@ def test_a_file_that_does_not_fit_is_computed_again(
     assert read_arrays(kept)["record"].tobytes() == right["record"].tobytes()
 
 
+@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize("name", ["mean", "covariance", "process_covariance"])
 def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
     file: Path, folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
@@ -289,6 +306,7 @@ def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
         load_served(file)
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, model: PushModel, folder: Path) -> None:
     load_served(file)
     other = file.with_name("other.pushmodel")
@@ -301,6 +319,7 @@ def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, m
     assert len(list(folder.iterdir())) == 2
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_cache, "MOST_TABLES", 2)
     for version in (1, 2, 1, 3):
