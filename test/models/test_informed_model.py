@@ -81,8 +81,8 @@ def informed() -> PushModel:
 
 @pytest.fixture(scope="module")
 def with_function() -> PushModel:
-    """A GP of 60 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
-    table = pushes(60, 1)
+    """A GP of 40 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
+    table = pushes(40, 1)
     return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])), "gp")
 
 

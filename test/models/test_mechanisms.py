@@ -174,10 +174,9 @@ def test_a_refinement_responds_to_each_of_its_parameters(mechanism: Mechanism) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outline", ["rect1", "tri"])
-def test_responses_grow_with_path_length(outline: str) -> None:
+def test_responses_grow_with_path_length() -> None:
     for mechanism in LIBRARY:
-        short, long = (mechanism.response(physics_of(outline), pushes(15, duration=t)) for t in (0.2, 0.5))
+        short, long = (mechanism.response(physics_of("tri"), pushes(15, duration=t)) for t in (0.2, 0.5))
         assert np.all(np.isfinite(long))
         assert np.all(size(long) > size(short))
 
@@ -340,7 +339,7 @@ def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_respons
 
 
 def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
-    plan = random_pushes(200, (speed,), travel=0.006, rng=np.random.default_rng(3))
+    plan = random_pushes(80, (speed,), travel=0.005, rng=np.random.default_rng(3))
     table = push_outcomes(SimulationSpec("rect1", surface, plan, contact_friction=friction))
     return table.take(np.unique(table.push_id, return_index=True)[1])
 

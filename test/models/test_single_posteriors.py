@@ -57,7 +57,7 @@ NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])
 
 
 @cache
-def trained(shape: str, kind: str, n: int = 120) -> PushModel:
+def trained(shape: str, kind: str, n: int = 80) -> PushModel:
     """Trained on pushes at angles of up to 1 rad, with correlated noise that depends on the angle."""
     rig, draw = Rig(shape, OUTLINES[shape], 0.00475, "abs", 0.8), np.random.default_rng(3)
     inputs = draw.uniform([0.01, 0.0, -1.0], [0.05, 1.0, 1.0], (n, 3))
@@ -78,7 +78,7 @@ def test_a_single_push_outside_the_domain_is_predicted_as_by_the_model(shape: st
     model = trained(shape, kind)
     tabulated = with_single_posteriors(tabulate(model))
     assert tabulated.single is not None
-    inputs = outside_pushes(model, 60)
+    inputs = outside_pushes(model, 30)
     exact = model.predict_rows(inputs, np.full(len(inputs), 0.2))
     alone = [tabulated.predict_rows(inputs[k : k + 1], np.array([0.2])) for k in range(len(inputs))]
     mean, covariance, process = (
