@@ -183,6 +183,18 @@ class Outline:
         return along, np.asarray(np.sum(along**2, axis=1))
 
     @cached_property
+    def _edge_columns(self) -> tuple[Array, ...]:
+        """Columns (V, 1): x, y of the edges' first vertices, x, y along them, and their squared lengths."""
+        along, squared = self._edges
+        return tuple(column[:, None].copy() for column in (*self.vertices.T, *along.T, squared))
+
+    @cached_property
+    def _shift_per_rise(self) -> Array:
+        """Of edges (V, 1), change of x per change of y; of level edges, which no level line crosses, any number."""
+        along, rise = self._edges[0].T[..., None]
+        return np.asarray(along / np.where(rise == 0.0, 1.0, rise))
+
+    @cached_property
     def _edge_normals(self) -> Array:
         along = self._ends - self.vertices
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -203,28 +215,28 @@ class Outline:
 
     def _project_polygon(self, points: Array) -> Projection:
         # By edge first and by coordinate: arrays of n numbers in a row, where those of two would be slow.
-        (x, y), (x0, y0), (along_x, along_y) = points.T, self.vertices.T[..., None], self._edges[0].T[..., None]
-        offset_x, offset_y = x - x0, y - y0
-        fraction = (offset_x * along_x + offset_y * along_y) / self._edges[1][:, None]
+        x0, y0, along_x, along_y, squared = self._edge_columns
+        offset_x, offset_y = points[:, 0] - x0, points[:, 1] - y0
+        fraction = (offset_x * along_x + offset_y * along_y) / squared
         fraction = np.minimum(np.maximum(fraction, 0.0), 1.0)
         away_x, away_y = offset_x - fraction * along_x, offset_y - fraction * along_y
         distance = away_x * away_x + away_y * away_y
-        edge, rows = np.argmin(distance, axis=0), np.arange(len(points))
-        share, length = fraction[edge, rows], np.sqrt(distance[edge, rows])
-        away = _paired(away_x[edge, rows], away_y[edge, rows])
+        edge = distance.argmin(axis=0)
+        nearest = edge * len(points) + np.arange(len(points))  # flat: take is faster than indices of both axes
+        share, length = fraction.take(nearest), np.sqrt(distance.take(nearest))
+        away = _paired(away_x.take(nearest), away_y.take(nearest))
         inside = self._contains(offset_x, offset_y)
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
-        normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
+        normal = np.where(at_vertex[:, None], radial, self._edge_normals.take(edge, axis=0))
         distance = np.where(inside, -length, length)
         return Projection(points - away, normal, distance, at_vertex, lambda: self.contact_on_edge(edge, share))
 
     def _contains(self, offset_x: Array, offset_y: Array) -> BoolArray:
         """Which of n points lie inside; offsets (V, n) of each from the vertices."""
-        along, rise = self._edges[0].T[..., None]
         below = offset_y < 0.0
         crosses = below != np.concatenate([below[1:], below[:1]])
-        right_of = offset_x < offset_y * (along / np.where(rise == 0.0, 1.0, rise))
+        right_of = offset_x < offset_y * self._shift_per_rise
         return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=0))
 
     # --- circles and ellipses -----------------------------------------------------------------------------------
