@@ -116,9 +116,9 @@ def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: Pu
 
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
     table = pushes(24, 3)
-    assert learnt(trained(table, mean="auto")).mean is not None
+    assert learnt(trained(table, "gp", mean="auto")).mean is not None
     senseless = replace(table, outcomes=table.outcomes * [-1.0, 1.0, -1.0])
-    assert learnt(trained(senseless, mean="auto")).mean is None
+    assert learnt(trained(senseless, "gp", mean="auto")).mean is None
 
 
 def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(informed: PushModel) -> None:

@@ -351,7 +351,7 @@ def test_table_that_is_too_far_off_is_not_used(of_few_draws: PushModel, monkeypa
 
 @pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
 def test_table_is_accurate_without_mechanics(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = with_draws(train_model(empty_table(), rig, "prior", name="p"), 6)  # less smooth, and faster
+    model = with_draws(train_model(empty_table(), rig, "prior", name="p"), 4)  # less smooth, and faster
     tabulated, inputs, duration = tabulate(model), some_inputs(100, 3), np.full(100, 0.3)
     assert tabulated.how.startswith("table of")
     found, exact = (m.predict_rows(inputs, duration) for m in (tabulated, model))

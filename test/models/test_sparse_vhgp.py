@@ -27,6 +27,7 @@ from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.kernels import KernelChoice
+from push_predictor.models.gaussian_process.sparse import fit as sparse_fit
 from push_predictor.models.gaussian_process.sparse.bound import SparseProblem
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
@@ -87,7 +88,7 @@ def test_rows_beyond_the_dense_limit_improve_the_model(fitted: SparseVHGP) -> No
 
 @pytest.mark.slow
 def test_the_same_rows_give_the_same_model() -> None:
-    one, again = (fit_sparse_vhgp(*rows(500), 15) for _ in range(2))
+    one, again = (fit_sparse_vhgp(*rows(150), 10) for _ in range(2))
     new = rows(20, seed=4)[0]
     np.testing.assert_array_equal(again.predict(new).mean, one.predict(new).mean)
     np.testing.assert_array_equal(again.inducing_noise, one.inducing_noise)
@@ -182,7 +183,8 @@ def test_memory_grows_with_rows_times_inducing_inputs() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0])
-def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
+def test_degenerate_outputs_still_give_finite_predictions(outputs: Array, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sparse_fit, "_MOST_ITERATIONS", 6)  # an outlier takes all that are allowed
     inputs = np.random.default_rng(0).normal(size=(40, 2))
     prediction = fit_sparse_vhgp(inputs, outputs, 8).predict(inputs)
     assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -77,6 +78,24 @@ def computed_once(model: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tables are computed once for all tests that use this, which are about their files."""
     monkeypatch.setattr(table_cache, "tabulate", lambda asked: once(asked)[0])
     monkeypatch.setattr(table_cache, "with_single_posteriors", lambda served: once(served.model)[1])
+
+
+@pytest.fixture(scope="module")
+def tables(model: PushModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The file of the model's tables, and how it predicts with them."""
+    place = tmp_path_factory.mktemp("computed")
+    save_model(model, place / "small.pushmodel")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PUSH_PREDICTOR_CACHE", str(place / "tables"))
+        how = load_served(place / "small.pushmodel").how
+    return only(place / "tables"), how
+
+
+@pytest.fixture
+def kept(tables: tuple[Path, str], folder: Path, computed_once: None) -> Path:
+    """A copy of it in the folder of kept tables."""
+    folder.mkdir()
+    return Path(shutil.copy(tables[0], folder))
 
 
 def once(model: PushModel) -> tuple[TabulatedModel, TabulatedModel]:
@@ -241,28 +260,24 @@ def test_a_prior_model_has_its_table_at_once_and_it_is_kept_and_checked(
     assert np.array_equal(again.predict_rows(pushes, duration).mean, one.mean)
 
 
-@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize("content", [b"", b"{}", "cut", "flipped"])
 def test_a_damaged_table_is_computed_again(
-    file: Path, folder: Path, content: bytes | str, monkeypatch: pytest.MonkeyPatch
+    file: Path, kept: Path, tables: tuple[Path, str], content: bytes | str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = load_served(file)
-    damaged = only(folder)
-    whole = damaged.read_bytes()
+    whole = kept.read_bytes()
     if content == "cut":
-        damaged.write_bytes(whole[:-9])
+        kept.write_bytes(whole[:-9])
     elif content == "flipped":
         middle = len(whole) // 2
-        damaged.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
+        kept.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
     else:
         assert isinstance(content, bytes)
-        damaged.write_bytes(content)
-    assert load_served(file).how == expected.how
+        kept.write_bytes(content)
+    assert load_served(file).how == tables[1]
     monkeypatch.setattr(table_cache, "tabulate", never)
-    assert load_served(file).how == expected.how
+    assert load_served(file).how == tables[1]
 
 
-@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize(
     "change",
     [
@@ -281,26 +296,25 @@ def test_a_damaged_table_is_computed_again(
     ],
 )
 def test_a_file_that_does_not_fit_is_computed_again(
-    file: Path, folder: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]
+    file: Path,
+    kept: Path,
+    tables: tuple[Path, str],
+    change: Callable[[dict[str, Any], dict[str, np.ndarray]], object],
 ) -> None:
-    expected = load_served(file)
-    right = read_arrays(kept := only(folder))
+    right = read_arrays(kept)
     rewrite(kept, change)
-    assert load_served(file).how == expected.how
+    assert load_served(file).how == tables[1]
     assert read_arrays(kept)["record"].tobytes() == right["record"].tobytes()
 
 
-@pytest.mark.usefixtures("computed_once")
 @pytest.mark.parametrize("name", ["mean", "covariance", "process_covariance"])
 def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
-    file: Path, folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
+    file: Path, kept: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    load_served(file)
-
     def change(record: dict[str, Any], arrays: object) -> None:
         record["probes"][name] = (np.array(record["probes"][name]) * 1.02).tolist()
 
-    rewrite(only(folder), change)
+    rewrite(kept, change)
     monkeypatch.setattr(table_cache, "tabulate", never)
     with pytest.raises(ModelFileError, match="a table was computed"):
         load_served(file)
