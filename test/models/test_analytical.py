@@ -365,7 +365,10 @@ def in_equal_steps(model: AnalyticalPush, path: TruePush, steps: int) -> np.ndar
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outline", [OUTLINES[name] for name in ("rect1", "ellip3", "triangle")])
+@pytest.mark.parametrize(
+    "outline",
+    [OUTLINES["triangle"], *(pytest.param(OUTLINES[name], marks=pytest.mark.long) for name in ("rect1", "ellip3"))],
+)
 def test_displacements_are_within_a_thousandth_of_fine_steps(outline):
     model = AnalyticalPush(outline, RADIUS)
     path = sweeps(model, *pushes(40, seed=3, travel=0.0145))

@@ -78,6 +78,11 @@ def alone(model: PushModel) -> GaussianProcessPredictor:
     return replace(model.predictor, correlation=None)
 
 
+def with_fitted_correlation(model: PushModel) -> GaussianProcessPredictor:
+    """Its predictor with a correlation that is fitted again."""
+    return replace(alone(model), correlation=fit_correlation(alone(model), model.training.push_id))
+
+
 def without(model: PushModel) -> PushModel:
     return replace(model, predictor=alone(model))
 
@@ -233,7 +238,8 @@ def test_held_out_correlation_is_that_of_the_other_blocks(model: PushModel) -> N
 def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(correlation_fit, "MOST_ROWS", 150)
     monkeypatch.setattr(correlation_fit, "MOST_BLOCKS", 30)
-    model = trained()
+    whole = trained_once("gp")
+    model = replace(whole, predictor=with_fitted_correlation(whole))
     correlation = correlation_of(model)
     assert correlation.rows is not None and len(correlation.features) == 150
     assert of(model, np.array([[0.02, 0.12, 0.6]]))[0] > 0.5

@@ -142,7 +142,7 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
 )
 def test_table_is_close_to_the_exact_effects(kind: str, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind == "fitted":  # its noise is small
-        monkeypatch.setattr(effect_table_build, "WORK", (60_000,))
+        monkeypatch.setattr(effect_table_build, "WORK", (50_000,))
     assert_close(kind, case)
 
 

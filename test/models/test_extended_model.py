@@ -74,7 +74,7 @@ def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: 
 
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
-    models = {kind: train_model(pushes(25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS}
+    models = {kind: train_model(pushes(8 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS}
     prior = models["prior"].predictor
     assert isinstance(prior, PriorPredictor)
     return {**models, "prior": replace(models["prior"], predictor=replace(prior, draws=prior.draws[:8]))}
@@ -333,8 +333,9 @@ def test_extended_model_survives_saving(bases: dict[str, PushModel], kind: str, 
     assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
     assert_same(predicted(loaded, table), predicted(model, table), rtol=1e-9, atol=1e-15)
     np.testing.assert_array_equal(loaded.training.outcomes, model.training.outcomes)
-    loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
-    assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
+    if kind in ("gp", "vhgp"):  # which have more than the moments
+        loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
+        assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
 
 
 def test_file_with_effects_needs_a_reader_of_its_format(bases: dict[str, PushModel], tmp_path: Path) -> None:
@@ -406,7 +407,7 @@ def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "count", "seeds"), [("gp", 30, 4), ("analytical", 40, 5)])
+@pytest.mark.parametrize(("kind", "count", "seeds"), [pytest.param("gp", 30, 4, marks=pytest.mark.long), ("analytical", 40, 5)])
 def test_planted_effects_are_found_within_their_intervals(
     bases: dict[str, PushModel], kind: str, count: int, seeds: int
 ) -> None:

@@ -55,6 +55,7 @@ pytestmark = pytest.mark.slow
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)
+ON_ELLIPSE = replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))
 TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
 
 
@@ -349,7 +350,7 @@ def test_table_that_is_too_far_off_is_not_used(of_few_draws: PushModel, monkeypa
     np.testing.assert_array_equal(found.mean, of_few_draws.predict_rows(inputs, np.full(3, 0.2)).mean)
 
 
-@pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
+@pytest.mark.parametrize("rig", [RIG, pytest.param(ON_ELLIPSE, marks=pytest.mark.long)])
 def test_table_is_accurate_without_mechanics(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     model = with_draws(train_model(empty_table(), rig, "prior", name="p"), 4)  # less smooth, and faster
     tabulated, inputs, duration = tabulate(model), some_inputs(100, 3), np.full(100, 0.3)

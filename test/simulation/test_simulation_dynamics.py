@@ -137,7 +137,7 @@ SLOW = PushPlan(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip2", "hex"])
+@pytest.mark.parametrize("shape", ["rect1", "ellip2", pytest.param("hex", marks=pytest.mark.long)])
 def test_slow_push_minimises_dissipation(shape: str) -> None:
     twice = at_speeds(SLOW, 0.005, 0.005)
     physics = even_physics(slider_named(shape), len(twice), np.repeat([20.0, 0.0], len(SLOW)))
@@ -149,7 +149,7 @@ def test_slow_push_minimises_dissipation(shape: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip2"])
+@pytest.mark.parametrize("shape", ["rect1", pytest.param("ellip2", marks=pytest.mark.long)])
 def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
     plan = random_pushes(8, [0.005], 0.005, np.random.default_rng(1))
     physics = even_physics(slider_named(shape), 24, friction=0.15)

@@ -116,7 +116,7 @@ def test_pressure_noise_has_unit_variance_along_the_whole_push() -> None:
     assert far == pytest.approx(PERSISTENT_SHARE, abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_noise_along_a_push_is_partly_persistent() -> None:
     plan = grid_pushes([0.125], [0.0], 80, travel=0.02)
     table = push_outcomes(SimulationSpec("rect1", "abs", plan, seed=2, place_spread=0.0, turn_spread=0.0))

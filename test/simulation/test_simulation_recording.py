@@ -132,7 +132,9 @@ def test_written_recording_reads_back(simulated: Recording, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("shape", "surface"), [("rect1", "abs"), ("ellip2", "plywood")])
+@pytest.mark.parametrize(
+    ("shape", "surface"), [("rect1", "abs"), pytest.param("ellip2", "plywood", marks=pytest.mark.long)]
+)
 def test_windows_of_the_streams_agree_with_the_true_motion(shape: str, surface: str) -> None:
     plan = random_pushes(15, [0.02, 0.05], 0.025, np.random.default_rng(11), angle_limit=0.9)
     spec = SimulationSpec(shape, surface, plan, seed=5, sensors=Sensors(dropout_interval=0.0))
