@@ -137,7 +137,7 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
         *[("about nothing", case) for case in ("linear", "step and linear")],
         ("about mechanics", "linear"),
         *[("analytical", case) for case in ("linear", "step and linear")],
-        ("fitted", "linear"),
+        pytest.param("fitted", "linear", marks=pytest.mark.long),
     ],
 )
 def test_table_is_close_to_the_exact_effects(kind: str, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -373,9 +373,7 @@ def not_again(*_: object) -> TabulatedModel:
     raise AssertionError("a table was computed")
 
 
-@pytest.mark.parametrize(
-    ("kind", "accurate"), [("about mechanics", True), ("analytical", True), ("analytical", False)]
-)
+@pytest.mark.parametrize(("kind", "accurate"), [("about mechanics", True), ("analytical", True), ("analytical", False)])
 def test_tables_of_effects_are_kept_and_checked(
     kind: str, accurate: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -74,7 +74,9 @@ def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: 
 
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
-    models = {kind: train_model(pushes(8 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS}
+    models = {
+        kind: train_model(pushes(16 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS
+    }
     prior = models["prior"].predictor
     assert isinstance(prior, PriorPredictor)
     return {**models, "prior": replace(models["prior"], predictor=replace(prior, draws=prior.draws[:8]))}
@@ -407,7 +409,9 @@ def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "count", "seeds"), [pytest.param("gp", 30, 4, marks=pytest.mark.long), ("analytical", 40, 5)])
+@pytest.mark.parametrize(
+    ("kind", "count", "seeds"), [pytest.param("gp", 30, 4, marks=pytest.mark.long), ("analytical", 40, 5)]
+)
 def test_planted_effects_are_found_within_their_intervals(
     bases: dict[str, PushModel], kind: str, count: int, seeds: int
 ) -> None:

@@ -151,9 +151,9 @@ def test_friction_gradient_moves_the_centre_by_the_mean_squares_of_the_pressure(
 @pytest.mark.parametrize("values", [{}, {"inertia": 1.0}], ids=["slow", "with inertia"])
 def test_the_place_of_the_body_frames_origin_changes_nothing(values: dict[str, float]) -> None:
     """Outline and support shifted in their frame are the same slider; its origin is another point of it."""
-    (inputs, duration), shift = pushes(20, speed=0.2), np.array([0.01, -0.006])
+    (inputs, duration), shift = pushes(8, speed=0.2), np.array([0.01, -0.006])
     duration = 0.25 * duration  # the slider turns by some degrees: a wrong origin would be off by some tenths of a mm
-    inputs[:, 1] = SQUARE.contact_on_edge(np.arange(20) % 4, np.linspace(0.2, 0.8, 20))  # corners take long
+    inputs[:, 1] = SQUARE.contact_on_edge(np.arange(8) % 4, np.linspace(0.2, 0.8, 8))  # corners take long
     shifted = PushMechanics(
         Outline(SQUARE.vertices + shift),
         RADIUS,

@@ -42,8 +42,7 @@ from push_predictor.recordings.table import PushTable
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     return {
-        kind: train_model(noisy_pushes(75), square_rig(), kind, name=f"a_{kind}", sources=["made up"])
-        for kind in KINDS
+        kind: train_model(noisy_pushes(75), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
     }
 
 
@@ -59,8 +58,8 @@ def test_model_predicts_new_pushes(models: dict[str, PushModel], kind: str) -> N
 @pytest.mark.parametrize("kind", KINDS)
 def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
     rng = np.random.default_rng(3)
-    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 20), rng.random(20), rng.uniform(-1.57, 1.57, 20)])
-    prediction = models[kind].predict_rows(inputs, np.full(20, 0.2))
+    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 10), rng.random(10), rng.uniform(-1.57, 1.57, 10)])
+    prediction = models[kind].predict_rows(inputs, np.full(10, 0.2))
     assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
     assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
     assert not np.all(prediction.in_domain)

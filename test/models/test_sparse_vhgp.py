@@ -43,7 +43,6 @@ from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, induci
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-
 MANY = 2000  # rows: more than a dense model takes
 
 
