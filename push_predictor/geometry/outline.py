@@ -183,6 +183,18 @@ class Outline:
         return along, np.asarray(np.sum(along**2, axis=1))
 
     @cached_property
+    def _edge_columns(self) -> tuple[Array, ...]:
+        """Columns (V, 1): x, y of the edges' first vertices, x, y along them, and their squared lengths."""
+        along, squared = self._edges
+        return tuple(column[:, None].copy() for column in (*self.vertices.T, *along.T, squared))
+
+    @cached_property
+    def _shift_per_rise(self) -> Array:
+        """Of edges (V, 1), change of x per change of y; of level edges, which no level line crosses, any number."""
+        along, rise = self._edges[0].T[..., None]
+        return np.asarray(along / np.where(rise == 0.0, 1.0, rise))
+
+    @cached_property
     def _edge_normals(self) -> Array:
         along = self._ends - self.vertices
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -203,28 +215,28 @@ class Outline:
 
     def _project_polygon(self, points: Array) -> Projection:
         # By edge first and by coordinate: arrays of n numbers in a row, where those of two would be slow.
-        (x, y), (x0, y0), (along_x, along_y) = points.T, self.vertices.T[..., None], self._edges[0].T[..., None]
-        offset_x, offset_y = x - x0, y - y0
-        fraction = (offset_x * along_x + offset_y * along_y) / self._edges[1][:, None]
+        x0, y0, along_x, along_y, squared = self._edge_columns
+        offset_x, offset_y = points[:, 0] - x0, points[:, 1] - y0
+        fraction = (offset_x * along_x + offset_y * along_y) / squared
         fraction = np.minimum(np.maximum(fraction, 0.0), 1.0)
         away_x, away_y = offset_x - fraction * along_x, offset_y - fraction * along_y
         distance = away_x * away_x + away_y * away_y
-        edge, rows = np.argmin(distance, axis=0), np.arange(len(points))
-        share, length = fraction[edge, rows], np.sqrt(distance[edge, rows])
-        away = np.stack([away_x[edge, rows], away_y[edge, rows]], axis=1)
+        edge = distance.argmin(axis=0)
+        nearest = edge * len(points) + np.arange(len(points))  # flat: take is faster than indices of both axes
+        share, length = fraction.take(nearest), np.sqrt(distance.take(nearest))
+        away = _paired(away_x.take(nearest), away_y.take(nearest))
         inside = self._contains(offset_x, offset_y)
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
-        normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
+        normal = np.where(at_vertex[:, None], radial, self._edge_normals.take(edge, axis=0))
         distance = np.where(inside, -length, length)
         return Projection(points - away, normal, distance, at_vertex, lambda: self.contact_on_edge(edge, share))
 
     def _contains(self, offset_x: Array, offset_y: Array) -> BoolArray:
         """Which of n points lie inside; offsets (V, n) of each from the vertices."""
-        along, rise = self._edges[0].T[..., None]
         below = offset_y < 0.0
         crosses = below != np.concatenate([below[1:], below[:1]])
-        right_of = offset_x < offset_y * (along / np.where(rise == 0.0, 1.0, rise))
+        right_of = offset_x < offset_y * self._shift_per_rise
         return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=0))
 
     # --- circles and ellipses -----------------------------------------------------------------------------------
@@ -243,13 +255,13 @@ class Outline:
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        points = np.stack([a * np.cos(parameter), b * np.sin(parameter)], axis=-1)
+        points = _paired(a * np.cos(parameter), b * np.sin(parameter))
         return points if self.pose == CENTRED else to_world(points, np.array(self.pose))
 
     def _curve_normal(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        normal = np.stack([b * np.cos(parameter), a * np.sin(parameter)], axis=-1)
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        normal = _paired(b * np.cos(parameter), a * np.sin(parameter))
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         return np.asarray(normal if self.pose == CENTRED else rotate(normal, np.array(self.pose[2])))
 
     def _in_axes(self, points: Array) -> Array:
@@ -277,17 +289,26 @@ class Outline:
         a, b = self.semi_axes or (1.0, 1.0)
         x, y = np.abs(points.T)
         t, low, high = np.arctan2(a * y, b * x), np.zeros_like(x), np.full_like(x, np.pi / 2.0)
+        ax, by, skew = x * a, y * b, b * b - a * a
         for _ in range(NEWTON_STEPS):  # stationarity of |curve(t) - point|^2
             cos, sin = np.cos(t), np.sin(t)
-            slope = (b * b - a * a) * cos * sin + x * a * sin - y * b * cos
-            bend = (b * b - a * a) * (cos * cos - sin * sin) + x * a * cos + y * b * sin
-            low, high = np.where(slope > 0.0, low, t), np.where(slope > 0.0, t, high)
-            newton = t - slope / np.where(bend > 0.0, bend, np.inf)
-            usable = (bend > 0.0) & (newton >= low) & (newton <= high)
+            slope = skew * cos * sin + ax * sin - by * cos
+            bend = skew * (cos * cos - sin * sin) + ax * cos + by * sin
+            falls, bends = slope > 0.0, bend > 0.0
+            low, high = np.where(falls, low, t), np.where(falls, t, high)
+            newton = t - slope / np.where(bends, bend, np.inf)
+            usable = bends & (newton >= low) & (newton <= high)
             before, t = t, np.where(usable, newton, (low + high) / 2.0)
             if np.all(np.abs(t - before) < PARAMETER_TOLERANCE):
                 break
         return np.asarray(np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0])))
+
+
+def _paired(x: Array, y: Array) -> Array:
+    """Points (..., 2) of coordinates (...); np.stack takes several times as long."""
+    points = np.empty((*np.shape(x), 2))
+    points[..., 0], points[..., 1] = x, y
+    return points
 
 
 def _signed_area(vertices: Array) -> float:

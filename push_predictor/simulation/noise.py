@@ -41,7 +41,7 @@ class PushNoise:
 
         Their variance is the same between knots as at knots.
         """
-        position = np.clip(travelled / KNOT_SPACING, 0.0, self.knots.shape[1] - 1.001)
+        position = np.minimum(np.maximum(travelled / KNOT_SPACING, 0.0), self.knots.shape[1] - 1.001)
         index = position.astype(np.intp)
         phase = (np.pi / 2.0) * (position - index)[:, None]
         rows = np.arange(len(travelled))

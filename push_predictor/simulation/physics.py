@@ -24,7 +24,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.simulation.changes import PLAIN, Changes, Conditions, Moment
 from push_predictor.simulation.noise import PushNoise
 from push_predictor.simulation.surface import FrictionField
@@ -84,15 +84,15 @@ class Physics:
         return np.asarray(self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0]))
 
     def acting(
-        self, pose: Array, velocity: Array, contact: Array, travelled: Array, points: tuple[Array, Array]
+        self, pose: Array, velocity: Array, nearest: Projection, travelled: Array, points: tuple[Array, Array]
     ) -> ActingForces:
         """Friction and forces at an instant.
 
-        Arguments as in Moment, points: world x, y (n, k) of the support, m.
+        nearest: the tips on the outline, points: world x, y (n, k) of the support, m; the others as in Moment.
         """
         if self.changes == PLAIN:
             return ActingForces(self.grip(*points, travelled), self.friction_at_rod(travelled))
-        changes, moment = self.changes, Moment(self.conditions, pose, velocity, contact, travelled)
+        changes, moment = self.changes, Moment(self.conditions, pose, velocity, nearest.contact, travelled)
         load = self.load_noise.at(travelled)
         grip = self._grip(load if changes.load is None else load + changes.load(moment), *points)
         friction = self.friction_at_rod(travelled)

@@ -75,13 +75,13 @@ class FrictionField:
     def at(self, x: Array, y: Array) -> Array:
         """Coefficients at world points x, y (same shape, m), bilinear; beyond the table those of its rim."""
         size = self.values.shape[0]
-        column = np.clip((x + HALF_EXTENT) / CELL, 0.0, size - 1.001)
-        row = np.clip((y + HALF_EXTENT) / CELL, 0.0, size - 1.001)
+        column = np.minimum(np.maximum((x + HALF_EXTENT) / CELL, 0.0), size - 1.001)
+        row = np.minimum(np.maximum((y + HALF_EXTENT) / CELL, 0.0), size - 1.001)
         i, j = column.astype(np.intp), row.astype(np.intp)
         u, v = column - i, row - j
         flat, corner = self.values.ravel(), j * size + i
-        low = flat[corner] * (1.0 - u) + flat[corner + 1] * u
-        high = flat[corner + size] * (1.0 - u) + flat[corner + size + 1] * u
+        low = flat.take(corner) * (1.0 - u) + flat.take(corner + 1) * u
+        high = flat.take(corner + size) * (1.0 - u) + flat.take(corner + (size + 1)) * u
         return np.asarray(low * (1.0 - v) + high * v)
 
 

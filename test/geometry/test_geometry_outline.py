@@ -109,7 +109,7 @@ def test_point_off_the_outline_projects_back_to_its_contact(outline, offset):
     assert found.normal == pytest.approx(-outline.inward_normal(contact), abs=1e-6)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
     point = np.array([[x, y]])
@@ -122,7 +122,7 @@ def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
     assert 0.0 <= found.contact[0] < 1.0
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_normal_outside_points_from_the_nearest_point_to_the_query(outline, x, y):
     point = np.array([[x, y]])

@@ -57,7 +57,7 @@ def spread_pushes(n: int, seed: int = 0) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("shape", [*OUTLINES, "notched", "moved"])
 @given(place=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_the_nearest_point_is_that_of_the_outline(shape: str, place: tuple[float, float]) -> None:
     outline = {**OUTLINES, "notched": NOTCHED, "moved": MOVED}[shape]
     *point, nx, ny, distance = nearest_on(outline)(*place)  # of two that are equally near it may be either

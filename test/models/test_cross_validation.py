@@ -85,7 +85,7 @@ def test_held_out_gp_equals_gp_conditioned_on_other_blocks(n: int) -> None:
     "choice", [KernelChoice(), KernelChoice("matern52", noise_nugget=True)], ids=["plain", "nugget"]
 )
 def test_held_out_vhgp_is_close_to_vhgp_solved_on_other_blocks(choice: KernelChoice) -> None:
-    inputs, outputs, block = rows(300)
+    inputs, outputs, block = rows(220)
     regression = fit_vhgp(inputs, outputs, choice, most_iterations=15)
     found, expected = regression.held_out(block), refitted(regression, block)
     sd = np.sqrt(expected["variance"] + np.exp(expected["log_noise_mean"]))

@@ -42,10 +42,10 @@ def tables(tmp_path: Path) -> list[Path]:
     """Two tables of the same slider, on points at its corners and in its middle, with friction 0.15."""
     paths = []
     for seed, points in enumerate((CORNERS, MIDDLE)):
-        table, rig = square_pushes(30, seed)
+        table, rig = square_pushes(18, seed)
         mechanics = PushMechanics(rig.outline, rig.pusher_radius, supported_at(points))
         outcomes = mechanics.displacement({"contact_friction": 0.15}, table.inputs, table.duration)
-        outcomes += np.random.default_rng(seed).normal(0.0, [1e-5, 1e-5, 1e-3], (30, 3))
+        outcomes += np.random.default_rng(seed).normal(0.0, [1e-5, 1e-5, 1e-3], (18, 3))
         paths.append(tmp_path / f"{seed}.csv")
         write_table(paths[-1], replace(table, outcomes=outcomes))
         save_rig(replace(rig, support_points=points), tmp_path / f"{seed}.rig.yaml")
@@ -65,5 +65,5 @@ def test_supports_are_numbered_by_path_if_they_differ(tables: list[Path]) -> Non
     np.testing.assert_allclose(first, CORNERS)
     np.testing.assert_allclose(second, MIDDLE)
     assert different_supports([tables[0], tables[0]]) == {}
-    assert load_data(tables, numbered=True).covariates["recording"].tolist() == [0.0] * 30 + [1.0] * 30
+    assert load_data(tables, numbered=True).covariates["recording"].tolist() == [0.0] * 18 + [1.0] * 18
     assert "recording" not in load_data(tables).covariates

@@ -40,13 +40,13 @@ from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
 from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated import tabulated_prior
+from push_predictor.models.tabulated import effect_table_build, tabulated_prior
 from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
@@ -75,7 +75,12 @@ def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: 
 
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
-    return {kind: train_model(pushes(40), square_rig(), kind, name=f"a_{kind}") for kind in KINDS}
+    models = {
+        kind: train_model(pushes(16 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS
+    }
+    prior = models["prior"].predictor
+    assert isinstance(prior, PriorPredictor)
+    return {**models, "prior": replace(models["prior"], predictor=replace(prior, draws=prior.draws[:8]))}
 
 
 def predicted(model: Any, table: PushTable) -> Prediction:
@@ -92,8 +97,9 @@ def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
 
 @pytest.fixture(autouse=True)
 def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables of prior models are refused after some knots, and not built for seconds."""
+    """Tables of prior models and of effects are refused after some knots, and not built for seconds."""
     monkeypatch.setattr(tabulated_prior, "MOST_KNOTS", 10)
+    monkeypatch.setattr(effect_table_build, "WORK", (3_000,))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -194,7 +200,7 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
 
 @pytest.mark.slow
 def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, PushModel], tmp_path: Path) -> None:
-    table = pushes(40, 4, slippery(0.2))
+    table = pushes(25, 4, slippery(0.2))
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     first = with_effects(refit_base(bases["gp"], table), table, terms)
     second = with_effects(
@@ -213,8 +219,10 @@ def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, P
 # --- the range of its covariates -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("answer", [lambda model: model, tabulate])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "answer"),
+    [(kind, lambda model: model) for kind in KINDS] + [(kind, tabulate) for kind in KINDS if kind != "prior"],
+)
 def test_covariate_outside_training_range_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
     model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
     inside = predicted(model, table).in_domain
@@ -317,7 +325,7 @@ def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushMod
 def test_extended_model_survives_saving(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
     generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
     trained = with_effects(
-        bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+        bases[kind], pushes(6, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     )
     predictor = trained.predictor
     assert isinstance(predictor, ExtendedPredictor)
@@ -329,8 +337,9 @@ def test_extended_model_survives_saving(bases: dict[str, PushModel], kind: str, 
     assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
     assert_same(predicted(loaded, table), predicted(model, table), rtol=1e-9, atol=1e-15)
     np.testing.assert_array_equal(loaded.training.outcomes, model.training.outcomes)
-    loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
-    assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
+    if kind in ("gp", "vhgp"):  # which have more than the moments
+        loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
+        assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
 
 
 def test_file_with_effects_needs_a_reader_of_its_format(bases: dict[str, PushModel], tmp_path: Path) -> None:
@@ -402,20 +411,24 @@ def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushModel], kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "count", "seeds"), [pytest.param("gp", 30, 4, marks=pytest.mark.long), ("analytical", 40, 5)]
+)
+def test_planted_effects_are_found_within_their_intervals(
+    bases: dict[str, PushModel], kind: str, count: int, seeds: int
+) -> None:
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     away = []
-    for seed in range(10, 16):
-        table = pushes(60, seed, slippery(0.15), grain(0.1))
+    for seed in range(10, 10 + seeds):
+        table = pushes(count, seed, slippery(0.15), grain(0.1))
         predictor = with_effects(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
         found = np.concatenate([effect.coefficients for effect in predictor.effects])
         sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in predictor.effects])
         away.append((found - [0.15, 0.1, 0.05]) / sd)
-    # In units of their own deviations: Student's t with 25 blocks, its root mean square known to 0.2 here.
+    # In units of their own deviations: Student's t with some 25 blocks, its root mean square known to 0.25 here.
     assert 0.6 < np.sqrt(np.mean(np.square(away))) < 1.5
     assert np.max(np.abs(away)) < 4.0
-    assert np.max(np.abs(np.mean(away, axis=0))) < 1.3  # not one-sided: 3 deviations of a mean of six
+    assert np.max(np.abs(np.mean(away, axis=0))) < 1.3  # not one-sided
     assert np.all(sd < [0.05, 0.05, 0.05])
 
 
@@ -433,7 +446,7 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(60, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
+    table, held_out = pushes(45, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
@@ -446,7 +459,7 @@ def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_absent_effect_improves_nothing(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(60, 7), pushes(60, 8)
+    table, held_out = pushes(45, 7), pushes(60, 8)
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     _, nlpd = gain(held_out_windows(refit).calibrated(), after, held_out)  # both with deviations of held-out pushes
@@ -466,7 +479,7 @@ def test_refit_keeps_physics_and_estimates_covariance(bases: dict[str, PushModel
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(60, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))
+    table, held_out = pushes(40, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))
     model = extended(bases[kind], slippery(0.3))
     refit = refit_base(model, table)
     assert refit.predictor.effects == model.predictor.effects

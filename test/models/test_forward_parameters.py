@@ -151,9 +151,9 @@ def test_friction_gradient_moves_the_centre_by_the_mean_squares_of_the_pressure(
 @pytest.mark.parametrize("values", [{}, {"inertia": 1.0}], ids=["slow", "with inertia"])
 def test_the_place_of_the_body_frames_origin_changes_nothing(values: dict[str, float]) -> None:
     """Outline and support shifted in their frame are the same slider; its origin is another point of it."""
-    (inputs, duration), shift = pushes(20, speed=0.2), np.array([0.01, -0.006])
+    (inputs, duration), shift = pushes(8, speed=0.2), np.array([0.01, -0.006])
     duration = 0.25 * duration  # the slider turns by some degrees: a wrong origin would be off by some tenths of a mm
-    inputs[:, 1] = SQUARE.contact_on_edge(np.arange(20) % 4, np.linspace(0.2, 0.8, 20))  # corners take long
+    inputs[:, 1] = SQUARE.contact_on_edge(np.arange(8) % 4, np.linspace(0.2, 0.8, 8))  # corners take long
     shifted = PushMechanics(
         Outline(SQUARE.vertices + shift),
         RADIUS,
@@ -201,7 +201,7 @@ PART_OF = {
 
 @pytest.mark.parametrize("name", PART_OF)
 def test_small_change_is_the_response_of_the_mechanism(name: str) -> None:
-    outline, n, draw = shape_outline("ellip3"), 30, np.random.default_rng(2)
+    outline, n, draw = shape_outline("ellip3"), 20, np.random.default_rng(2)
     inputs = np.column_stack([draw.uniform(0.02, 0.1, n), draw.random(n), draw.uniform(-1.0, 1.0, n)])
     duration, heading, normal = np.full(n, 0.05), draw.uniform(-3.0, 3.0, n), outline.inward_normal(inputs[:, 1])
     slider = heading - np.arctan2(normal[:, 1], normal[:, 0]) - inputs[:, 2]
@@ -209,7 +209,7 @@ def test_small_change_is_the_response_of_the_mechanism(name: str) -> None:
     response = {m.name: m for m in LIBRARY}[mechanism].response(
         AnalyticalPush(outline, RADIUS), Push(inputs, duration, {"slider_heading": slider})
     )[:, :, column]
-    model, base = replace(mechanics("ellip3", "ellipsoid"), accuracy=1e-5), BY_NAME[name].textbook
+    model, base = replace(mechanics("ellip3", "ellipsoid"), accuracy=1e-4), BY_NAME[name].textbook
     step = {"contact_friction": 0.1, "gradient_x": 2.0, "gradient_y": 2.0, "inertia": 0.02}.get(name)
     step = step or 0.5 * BY_NAME[name].spread
     more, less = (moved(model, {name: base + s}, inputs, duration, heading) for s in (step, -step))

@@ -81,8 +81,8 @@ def informed() -> PushModel:
 
 @pytest.fixture(scope="module")
 def with_function() -> PushModel:
-    """A GP of 60 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
-    table = pushes(60, 1)
+    """A GP of 40 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
+    table = pushes(40, 1)
     return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])), "gp")
 
 
@@ -116,9 +116,9 @@ def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: Pu
 
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
     table = pushes(24, 3)
-    assert learnt(trained(table, mean="auto")).mean is not None
+    assert learnt(trained(table, "gp", mean="auto")).mean is not None
     senseless = replace(table, outcomes=table.outcomes * [-1.0, 1.0, -1.0])
-    assert learnt(trained(senseless, mean="auto")).mean is None
+    assert learnt(trained(senseless, "gp", mean="auto")).mean is None
 
 
 def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(informed: PushModel) -> None:

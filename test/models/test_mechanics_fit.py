@@ -58,6 +58,7 @@ def test_fit_recovers_parameters_within_their_intervals() -> None:
     assert np.all(error < [0.02, 5e-4]) and np.all(error > [1e-3, 2e-5])
 
 
+@pytest.mark.long
 def test_intervals_cover_the_true_value_as_often_as_they_state() -> None:
     deviation = []
     for seed in range(12):

@@ -92,7 +92,7 @@ def share_explained(difference: np.ndarray, response: np.ndarray) -> tuple[float
 # --- every mechanism on every outline -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("outline", OUTLINES)
+@pytest.mark.parametrize("outline", ["rect1", "ellip1", "ellip3", "tri"])
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
 def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism, outline: str) -> None:
     response = mechanism.response(physics_of(outline), pushes(30))
@@ -116,7 +116,7 @@ def test_a_mirrored_push_has_the_mirrored_response(mechanism: Mechanism) -> None
     assert np.all(size(there - expected) < 2e-3 * size(here))
 
 
-@pytest.mark.parametrize(("outline", "order"), [("rect1", 4), ("hex", 6), ("ellip2", 2)])
+@pytest.mark.parametrize(("outline", "order"), [("hex", 6), ("ellip2", 2)])
 @pytest.mark.parametrize("mechanism", [m for m in LIBRARY if m.name not in FIXED_TO_THE_BODY], ids=lambda m: m.name)
 def test_response_is_the_same_on_equivalent_sides(mechanism: Mechanism, outline: str, order: int) -> None:
     push = pushes(30)
@@ -174,10 +174,9 @@ def test_a_refinement_responds_to_each_of_its_parameters(mechanism: Mechanism) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outline", ["rect1", "tri"])
-def test_responses_grow_with_path_length(outline: str) -> None:
+def test_responses_grow_with_path_length() -> None:
     for mechanism in LIBRARY:
-        short, long = (mechanism.response(physics_of(outline), pushes(15, duration=t)) for t in (0.2, 0.5))
+        short, long = (mechanism.response(physics_of("tri"), pushes(15, duration=t)) for t in (0.2, 0.5))
         assert np.all(np.isfinite(long))
         assert np.all(size(long) > size(short))
 
@@ -340,7 +339,7 @@ def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_respons
 
 
 def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
-    plan = random_pushes(200, (speed,), travel=0.006, rng=np.random.default_rng(3))
+    plan = random_pushes(80, (speed,), travel=0.005, rng=np.random.default_rng(3))
     table = push_outcomes(SimulationSpec("rect1", surface, plan, contact_friction=friction))
     return table.take(np.unique(table.push_id, return_index=True)[1])
 

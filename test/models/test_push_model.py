@@ -42,7 +42,7 @@ from push_predictor.recordings.table import PushTable
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     return {
-        kind: train_model(noisy_pushes(), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
+        kind: train_model(noisy_pushes(75), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
     }
 
 
@@ -58,8 +58,8 @@ def test_model_predicts_new_pushes(models: dict[str, PushModel], kind: str) -> N
 @pytest.mark.parametrize("kind", KINDS)
 def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
     rng = np.random.default_rng(3)
-    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 60), rng.random(60), rng.uniform(-1.57, 1.57, 60)])
-    prediction = models[kind].predict_rows(inputs, np.full(60, 0.2))
+    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 10), rng.random(10), rng.uniform(-1.57, 1.57, 10)])
+    prediction = models[kind].predict_rows(inputs, np.full(10, 0.2))
     assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
     assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
     assert not np.all(prediction.in_domain)
@@ -166,7 +166,7 @@ def test_a_loaded_model_predicts_what_the_saved_one_did(
     assert (loaded.name, loaded.kind, loaded.provenance) == (f"a_{kind}", kind, models[kind].provenance)
     assert loaded.training.push_id.tolist() == models[kind].training.push_id.tolist()
     assert np.array_equal(loaded.training.outcomes, models[kind].training.outcomes)
-    assert np.array_equal(loaded.training.covariates["elapsed_time"], np.arange(120.0))
+    assert np.array_equal(loaded.training.covariates["elapsed_time"], np.arange(75.0))
 
 
 def test_no_damaged_copy_of_a_model_predicts_other_values(models: dict[str, PushModel], tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.kernels import KernelChoice
+from push_predictor.models.gaussian_process.sparse import fit as sparse_fit
 from push_predictor.models.gaussian_process.sparse.bound import SparseProblem
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
@@ -42,6 +43,8 @@ from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, induci
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
+MANY = 2000  # rows: more than a dense model takes
+
 
 @cache
 def dense_and_sparse(n: int) -> tuple[VHGP, SparseVHGP]:
@@ -54,7 +57,7 @@ def dense_and_sparse(n: int) -> tuple[VHGP, SparseVHGP]:
 
 @pytest.fixture(scope="module")
 def fitted() -> SparseVHGP:
-    return fit_sparse_vhgp(*rows(3000), 40)
+    return fit_sparse_vhgp(*rows(MANY), 30)
 
 
 def test_fit_recovers_input_dependent_noise(fitted: SparseVHGP) -> None:
@@ -75,7 +78,7 @@ def test_predictions_equal_those_of_a_dense_model() -> None:
 
 
 def test_rows_beyond_the_dense_limit_improve_the_model(fitted: SparseVHGP) -> None:
-    inputs, outputs = rows(3000)
+    inputs, outputs = rows(MANY)
     new, truth = rows(500, seed=5)[0], np.sin(rows(500, seed=5)[0][:, 0])
     dense: VHGP = fit_vhgp(inputs[:300], outputs[:300])
     error, of_dense = (np.mean((m.predict(new).mean - truth) ** 2) for m in (fitted, dense))
@@ -83,11 +86,11 @@ def test_rows_beyond_the_dense_limit_improve_the_model(fitted: SparseVHGP) -> No
 
 
 @pytest.mark.slow
-def test_the_same_rows_give_the_same_model(fitted: SparseVHGP) -> None:
-    again = fit_sparse_vhgp(*rows(3000), 40)
+def test_the_same_rows_give_the_same_model() -> None:
+    one, again = (fit_sparse_vhgp(*rows(150), 10) for _ in range(2))
     new = rows(20, seed=4)[0]
-    np.testing.assert_array_equal(again.predict(new).mean, fitted.predict(new).mean)
-    np.testing.assert_array_equal(again.inducing_noise, fitted.inducing_noise)
+    np.testing.assert_array_equal(again.predict(new).mean, one.predict(new).mean)
+    np.testing.assert_array_equal(again.inducing_noise, one.inducing_noise)
 
 
 def test_model_is_determined_by_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
@@ -152,8 +155,8 @@ def test_record_round_trips(fitted: SparseVHGP) -> None:
     again = sparse_regression(*known, 1, arrays)
     new = rows(20, seed=8)[0]
     np.testing.assert_array_equal(again.predict(new).outcome_variance, fitted.predict(new).outcome_variance)
-    for wrong in (np.array([3, 3]), np.array([-1]), np.array([3000]), np.array([[1]]), np.empty(0)):
-        with pytest.raises(ValueError, match="distinct row indices below 3000"):
+    for wrong in (np.array([3, 3]), np.array([-1]), np.array([MANY]), np.array([[1]]), np.empty(0)):
+        with pytest.raises(ValueError, match=f"distinct row indices below {MANY}"):
             sparse_regression(*known, 1, {**arrays, "inducing_noise_1": wrong})
 
 
@@ -178,17 +181,18 @@ def test_memory_grows_with_rows_times_inducing_inputs() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outputs", [np.zeros(200), np.sign(np.arange(200) - 20.0), np.eye(200)[3] * 30.0])
-def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
-    inputs = np.random.default_rng(0).normal(size=(200, 2))
-    prediction = fit_sparse_vhgp(inputs, outputs, 20).predict(inputs)
+@pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0])
+def test_degenerate_outputs_still_give_finite_predictions(outputs: Array, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sparse_fit, "_MOST_ITERATIONS", 6)  # an outlier takes all that are allowed
+    inputs = np.random.default_rng(0).normal(size=(40, 2))
+    prediction = fit_sparse_vhgp(inputs, outputs, 8).predict(inputs)
     assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
 
 
 def test_repeated_inputs_are_accepted() -> None:
-    inputs, outputs = rows(1200)
-    inputs = inputs[np.arange(1200) // 40 * 40]
-    assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 50).bound)
+    inputs, outputs = rows(600)
+    inputs = inputs[np.arange(600) // 40 * 40]
+    assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 30).bound)
 
 
 def test_rejects_unusable_rows_and_kernels() -> None:
@@ -221,7 +225,7 @@ def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
 @pytest.mark.slow
 def test_sparse_push_model_is_trained_saved_loaded_and_tabulated(tmp_path: Path) -> None:
     rows = table(400)
-    model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=30))
+    model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=20))
     assert isinstance(model.predictor, GaussianProcessPredictor)
     assert all(isinstance(regression, SparseVHGP) for regression in model.predictor.regressions)
     save_model(model, tmp_path / "sparse.pushmodel")

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -45,7 +46,7 @@ from push_predictor.models.store.table_cache import (
     tables_of,
 )
 from push_predictor.models.tabulated import tabulated_prior
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import empty_table
 
@@ -61,7 +62,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="module")
 def model() -> PushModel:
     """A small VHGP."""
-    return train_model(noisy_pushes(60), square_rig(), "vhgp", name="small")
+    return train_model(noisy_pushes(45), square_rig(), "vhgp", name="small")
 
 
 @pytest.fixture
@@ -70,6 +71,40 @@ def file(model: PushModel, tmp_path: Path) -> Path:
     path = tmp_path / "small.pushmodel"
     save_model(model, path)
     return path
+
+
+@pytest.fixture
+def computed_once(model: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are computed once for all tests that use this, which are about their files."""
+    monkeypatch.setattr(table_cache, "tabulate", once)
+
+
+@pytest.fixture(scope="module")
+def tables(model: PushModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The file of the model's tables, and how it predicts with them."""
+    place = tmp_path_factory.mktemp("computed")
+    save_model(model, place / "small.pushmodel")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PUSH_PREDICTOR_CACHE", str(place / "tables"))
+        how = load_served(place / "small.pushmodel").how
+    return only(place / "tables"), how
+
+
+@pytest.fixture
+def kept(tables: tuple[Path, str], folder: Path, computed_once: None) -> Path:
+    """A copy of it in the folder of kept tables."""
+    folder.mkdir()
+    return Path(shutil.copy(tables[0], folder))
+
+
+def once(model: PushModel) -> TabulatedModel:
+    """The model with its table."""
+    if (digest := model_digest(model)) not in COMPUTED:
+        COMPUTED[digest] = tabulate(model)
+    return COMPUTED[digest]
+
+
+COMPUTED: dict[str, TabulatedModel] = {}
 
 
 def never(*_: object, **__: object) -> TabulatedModel:
@@ -164,13 +199,6 @@ def test_completion_does_not_undo_what_was_loaded_meanwhile(
     assert registry.get("small").model.kind == "analytical" and registry.names == ["small", "other"]
 
 
-def test_a_prior_model_has_its_table_at_once(tmp_path: Path, folder: Path) -> None:
-    prior = train_model(empty_table(), square_rig(), "prior", name="prior")
-    few_draws = replace(prior, predictor=replace(prior.predictor, draws=prior.predictor.draws[:12]))
-    save_model(few_draws, tmp_path / "prior.model")
-    assert load_at_once(tmp_path / "prior.model").how.startswith("table of")
-
-
 def test_training_writes_the_table_next_to_the_model(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,22 +231,25 @@ def test_the_shipped_model_has_its_table(folder: Path, monkeypatch: pytest.Monke
     assert served.tabulated and not folder.exists()
 
 
-def test_the_table_of_a_prior_model_is_kept_and_checked(
+def test_a_prior_model_has_its_table_at_once_and_it_is_kept_and_checked(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tabulated_prior, "CELL", 0.03)
-    monkeypatch.setattr(tabulated_prior, "ANGLE_CELLS", 5)
-    monkeypatch.setattr(tabulated_prior, "MEAN_TOLERANCE", 3.0)
-    monkeypatch.setattr(tabulated_prior, "SPREAD_TOLERANCE", 3.0)
-    model, file = train_model(empty_table(), square_rig(), "prior", name="prior"), tmp_path / "prior.pushmodel"
+    for name, value in (("CELL", 0.1), ("ANGLE_CELLS", 4), ("FEWEST_CELLS", 4)):
+        monkeypatch.setattr(tabulated_prior, name, value)
+    for name in ("MEAN_TOLERANCE", "SPREAD_TOLERANCE"):
+        monkeypatch.setattr(tabulated_prior, name, 9.0)
+    corners = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+    rig, file = replace(square_rig(), support_points=corners), tmp_path / "prior.pushmodel"
+    model = train_model(empty_table(), rig, "prior", name="prior")
     assert isinstance(model.predictor, PriorPredictor)
-    few_draws = replace(model.predictor, draws=model.predictor.draws[:8])  # the table takes an eighth of the time
+    few_draws = replace(model.predictor, draws=model.predictor.draws[:4])  # the table takes a fraction of the time
     save_model(replace(model, predictor=few_draws), file)
-    computed = load_served(file)
+    computed = load_at_once(file)
+    assert computed.how.startswith("table of")
     with monkeypatch.context() as patch:
         patch.setattr(table_cache, "tabulate", never)
         kept = load_served(file)
-        assert kept.how == computed.how and "table of" in kept.how
+        assert kept.how == computed.how
         pushes, duration = np.array([[0.02, 0.1, 0.2], [0.03, 0.6, -0.3]]), np.full(2, 0.2)
         one, other = (served.predict_rows(pushes, duration) for served in (computed, kept))
         assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
@@ -229,22 +260,20 @@ def test_the_table_of_a_prior_model_is_kept_and_checked(
 
 @pytest.mark.parametrize("content", [b"", b"{}", "cut", "flipped"])
 def test_a_damaged_table_is_computed_again(
-    file: Path, folder: Path, content: bytes | str, monkeypatch: pytest.MonkeyPatch
+    file: Path, kept: Path, tables: tuple[Path, str], content: bytes | str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = load_served(file)
-    damaged = only(folder)
-    whole = damaged.read_bytes()
+    whole = kept.read_bytes()
     if content == "cut":
-        damaged.write_bytes(whole[:-9])
+        kept.write_bytes(whole[:-9])
     elif content == "flipped":
         middle = len(whole) // 2
-        damaged.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
+        kept.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
     else:
         assert isinstance(content, bytes)
-        damaged.write_bytes(content)
-    assert load_served(file).how == expected.how
+        kept.write_bytes(content)
+    assert load_served(file).how == tables[1]
     monkeypatch.setattr(table_cache, "tabulate", never)
-    assert load_served(file).how == expected.how
+    assert load_served(file).how == tables[1]
 
 
 @pytest.mark.parametrize(
@@ -265,30 +294,31 @@ def test_a_damaged_table_is_computed_again(
     ],
 )
 def test_a_file_that_does_not_fit_is_computed_again(
-    file: Path, folder: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]
+    file: Path,
+    kept: Path,
+    tables: tuple[Path, str],
+    change: Callable[[dict[str, Any], dict[str, np.ndarray]], object],
 ) -> None:
-    expected = load_served(file)
-    right = read_arrays(kept := only(folder))
+    right = read_arrays(kept)
     rewrite(kept, change)
-    assert load_served(file).how == expected.how
+    assert load_served(file).how == tables[1]
     assert read_arrays(kept)["record"].tobytes() == right["record"].tobytes()
 
 
 @pytest.mark.parametrize("name", ["mean", "covariance", "process_covariance"])
 def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
-    file: Path, folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
+    file: Path, kept: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    load_served(file)
-
     def change(record: dict[str, Any], arrays: object) -> None:
         record["probes"][name] = (np.array(record["probes"][name]) * 1.02).tolist()
 
-    rewrite(only(folder), change)
+    rewrite(kept, change)
     monkeypatch.setattr(table_cache, "tabulate", never)
     with pytest.raises(ModelFileError, match="a table was computed"):
         load_served(file)
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, model: PushModel, folder: Path) -> None:
     load_served(file)
     other = file.with_name("other.pushmodel")
@@ -301,6 +331,7 @@ def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, m
     assert len(list(folder.iterdir())) == 2
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_cache, "MOST_TABLES", 2)
     for version in (1, 2, 1, 3):

@@ -76,8 +76,8 @@ def shared_errors(pushes: int, seed: int) -> PushTable:
 
 
 @cache
-def trained(kind: str = "gp", tails: bool = True) -> PushModel:
-    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind, options=TrainingOptions(tails=tails))
+def trained(kind: str = "gp") -> PushModel:
+    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind)
 
 
 def tails_of(model: PushModel) -> Tails:
@@ -150,7 +150,7 @@ def test_unknown_kind_and_conformal_without_tails_are_refused() -> None:
 
 
 @given(st.integers(4, 60), st.floats(0.05, 0.95))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 def test_conformal_interval_of_single_windows_is_the_order_statistic(pushes: int, level: float) -> None:
     """Of k exchangeable scores, the ceil(level (k + 1))-th smallest bounds a new one with probability level."""
     z, names = residuals_of(pushes, 1, pushes)
@@ -177,7 +177,7 @@ def test_every_push_counts_the_same_in_conformal_intervals() -> None:
 def test_conformal_intervals_cover_new_pushes_of_any_distribution() -> None:
     """Pushes with a shared error, of which half the training sets cover too much and half too little."""
     rng, shares = np.random.default_rng(0), []
-    for _ in range(50):
+    for _ in range(35):
         windows = rng.integers(1, 8, size=30)
         push = np.repeat(np.arange(30), windows)
         z = (np.exp(rng.standard_normal((30, 3)))[push] * (1.0 + 0.3 * rng.random((len(push), 3)))) * rng.choice(
@@ -215,7 +215,7 @@ def test_joint_region_is_fitted_under_the_correlation() -> None:
 
 def test_hyperparameters_widen_few_pushes_more_than_many() -> None:
     for windows in (1, 6):
-        few, many = (residuals_of(pushes, windows) for pushes in (40, 4000))
+        few, many = (residuals_of(pushes, windows) for pushes in (40, 2000))
         of_few, of_many = (fitted(*r, counts=(7, 2, 0)).factor / fitted(*r).factor for r in (few, many))
         assert of_few[0] > of_few[1] > 1.02 and of_few[2] == pytest.approx(1.0)
         assert np.all(of_many < 1.01)
@@ -328,7 +328,7 @@ def test_tails_come_from_held_out_pushes() -> None:
 
 
 def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push() -> None:
-    table = shared_errors(12, 2)
+    table = shared_errors(8, 2)
     model = train_model(table, square_rig(), "gp", name="a", options=TrainingOptions(mean="mechanics"))
     held = untailed(model).held_out_moments()
     counts = [regression.parameters.count for regression in learnt(model).regressions]
@@ -337,7 +337,8 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
 
 
 def test_training_without_tails_takes_windows_for_independent() -> None:
-    assert trained("gp", tails=False).predictor.tails is None
+    options = TrainingOptions(tails=False)
+    assert train_model(shared_errors(12, 0), square_rig(), "gp", name="a", options=options).predictor.tails is None
 
 
 def test_a_table_gives_the_model_s_covariance_and_tails() -> None:

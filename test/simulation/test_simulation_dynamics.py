@@ -31,9 +31,10 @@ from push_predictor.types import Array
 RADIUS = 0.00475
 FRICTION = 0.2
 ACCELERATION = 2.5
+LET_GO_STEP = 3e-4  # s
 
 
-def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, friction: float = FRICTION) -> Physics:
+def even_physics(slider: Slider, n: int, contact_friction: float | Array = 0.25, friction: float = FRICTION) -> Physics:
     """n equal sliders with uniform load on a uniform table."""
     points = support_points(slider.outline)
     return Physics(
@@ -63,7 +64,7 @@ def let_go(physics: Physics, velocity: Array, duration: float) -> Motion:
     n = len(velocity)
     away = PusherPath(np.full((n, 2), 1.0), np.tile([1.0, 0.0], (n, 1)), np.full(n, 0.01), np.full(n, 0.01), 1.0)
     still = np.zeros((n, 3))
-    return run(physics, away, still, np.full(n, duration), velocity=velocity, time_step=np.full(n, 2e-4))
+    return run(physics, away, still, np.full(n, duration), velocity=velocity, time_step=np.full(n, LET_GO_STEP))
 
 
 def travelled(motion: Motion) -> Array:
@@ -93,7 +94,7 @@ def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, st
     directions = rotate(inward, plan.angle)
     lever = 0.03
     ends = []
-    for tip, direction, shares in zip(tips, directions, physics.shares, strict=True):
+    for tip, direction, shares in zip(tips, directions, physics.shares, strict=False):
         pose, guess = np.zeros(3), np.zeros(1 if sticks else 2)
         for step in range(steps):
             here = tip + (step / steps) * distance * direction
@@ -102,18 +103,19 @@ def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, st
             arm, arms = rotate(nearest.point, pose[None, 2])[0], rotate(physics.support, pose[2])
             across = np.array([-normal[1], normal[0]])
 
-            def twist(free: Array, normal=normal, arm=arm, across=across, direction=direction) -> Array:
-                turn = free[0] / lever
-                given = direction if sticks else (direction @ normal) * normal + free[1] * across
-                return np.array([given[0] + turn * arm[1], given[1] - turn * arm[0], turn])
+            # The twist is linear in what the contact leaves free: the turn, and the slip if it does not stick.
+            given = direction if sticks else (direction @ normal) * normal
+            free = np.array([[arm[1] / lever, -arm[0] / lever, 1.0 / lever], [*across, 0.0]])[: len(guess)]
+            of_free = free[:, None, :2] + free[:, None, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
 
-            def power(free: Array, arms=arms, shares=shares, twist=twist) -> float:
-                v = twist(free)
-                at = v[:2] + v[2] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-                return float(shares @ np.linalg.norm(at, axis=1))
+            def power(values: Array, given=given, of_free=of_free, shares=shares) -> tuple[float, Array]:
+                velocity = given + np.tensordot(values, of_free, 1)
+                speed = np.linalg.norm(velocity, axis=1)
+                gradient = np.sum(of_free * (shares / speed)[:, None] * velocity, axis=(1, 2))
+                return float(shares @ speed), gradient
 
-            guess = minimize(power, guess, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-11}).x
-            pose = pose + twist(guess) * distance / steps
+            guess = minimize(power, guess, jac=True, method="BFGS", options={"gtol": 1e-6}).x
+            pose = pose + (np.array([*given, 0.0]) + guess @ free) * distance / steps
         ends.append(pose)
     return np.array(ends)
 
@@ -133,22 +135,23 @@ SLOW = PushPlan(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("contact_friction", "sticks"), [(20.0, True), (0.0, False)])
-@pytest.mark.parametrize("shape", ["rect1", "ellip2", "hex"])
-def test_slow_push_minimises_dissipation(shape: str, contact_friction: float, sticks: bool) -> None:
-    physics = even_physics(slider_named(shape), len(SLOW), contact_friction)
-    expected = least_dissipation_path(physics, SLOW, 0.005, sticks)
-    found = at_distance(push(physics, SLOW), SLOW, physics, 0.005)
-    assert np.all(np.abs(found - expected)[:, :2] < 5e-5)  # 1 % of the distance
-    assert np.all(np.abs(found - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
+@pytest.mark.parametrize("shape", ["rect1", "ellip2", pytest.param("hex", marks=pytest.mark.long)])
+def test_slow_push_minimises_dissipation(shape: str) -> None:
+    twice = at_speeds(SLOW, 0.005, 0.005)
+    physics = even_physics(slider_named(shape), len(twice), np.repeat([20.0, 0.0], len(SLOW)))
+    found = np.split(at_distance(push(physics, twice, rest=0.0), twice, physics, 0.005), 2)
+    for here, sticks in zip(found, (True, False), strict=True):
+        expected = least_dissipation_path(physics, SLOW, 0.005, sticks)
+        assert np.all(np.abs(here - expected)[:, :2] < 5e-5)  # 1 % of the distance
+        assert np.all(np.abs(here - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip2"])
+@pytest.mark.parametrize("shape", ["rect1", pytest.param("ellip2", marks=pytest.mark.long)])
 def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
-    plan = random_pushes(20, [0.005], 0.01, np.random.default_rng(1))
-    physics = even_physics(slider_named(shape), 60, friction=0.15)
-    slowest, slow, fast = np.split(travelled(push(physics, at_speeds(plan, 0.005, 0.01, 0.15))), 3)
+    plan = random_pushes(8, [0.005], 0.005, np.random.default_rng(1))
+    physics = even_physics(slider_named(shape), 24, friction=0.15)
+    slowest, slow, fast = np.split(travelled(push(physics, at_speeds(plan, 0.005, 0.01, 0.15), rest=0.0)), 3)
     assert np.all(relative(slow - slowest, slowest) < 0.005)
     assert np.all(relative(fast - slowest, slowest) > 0.05)
     assert np.any(relative(fast - slowest, slowest) > 0.12)
@@ -158,9 +161,9 @@ def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
 @pytest.mark.parametrize("shape", ["rect1", "ellip3", "hex"])
 def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -> None:
     rng = np.random.default_rng(2)
-    speed, direction = rng.uniform(0.05, 0.25, 8), rng.uniform(-np.pi, np.pi, 8)
+    speed, direction = rng.uniform(0.05, 0.15, 8), rng.uniform(-np.pi, np.pi, 8)
     velocity = np.column_stack([speed * np.cos(direction), speed * np.sin(direction), np.zeros(8)])
-    end = travelled(let_go(even_physics(slider_named(shape), 8), velocity, duration=0.15))
+    end = travelled(let_go(even_physics(slider_named(shape), 8), velocity, duration=0.09))
     assert np.hypot(*end[:, :2].T) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
     assert np.arctan2(end[:, 1], end[:, 0]) == pytest.approx(direction, abs=1e-3)
     assert np.all(np.abs(end[:, 2]) < 1e-6)
@@ -169,9 +172,9 @@ def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -
 @pytest.mark.slow
 def test_friction_dissipates_energy_until_rest() -> None:
     slider = slider_named("ellip2")
-    velocity = np.random.default_rng(3).normal(size=(20, 3)) * [0.1, 0.1, 2.0]
-    motion = let_go(even_physics(slider, 20), velocity, duration=0.25)
-    speed = np.diff(motion.slider, axis=1) / 2e-4
+    velocity = np.random.default_rng(3).normal(size=(8, 3)) * [0.05, 0.05, 1.0]
+    motion = let_go(even_physics(slider, 8), velocity, duration=0.13)
+    speed = np.diff(motion.slider, axis=1) / LET_GO_STEP
     energy = 0.5 * (slider.mass * np.sum(speed[..., :2] ** 2, axis=2) + slider.inertia * speed[..., 2] ** 2)
     assert np.all(np.diff(energy, axis=1) <= 1e-9 * energy[:, :1])
     assert np.all(energy[:, -1] < 1e-12 * energy[:, 0])
@@ -179,20 +182,20 @@ def test_friction_dissipates_energy_until_rest() -> None:
 
 @pytest.mark.slow
 def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
-    plan = random_pushes(20, [0.04, 0.1], 0.01, np.random.default_rng(4), angle_limit=1.0)
+    plan = random_pushes(8, [0.04, 0.1], 0.005, np.random.default_rng(4), angle_limit=1.0)
     mirrored = np.concatenate([plan.contact, (0.25 - plan.contact) % 1.0])  # left and right of the square
     angle = np.concatenate([plan.angle, -plan.angle])
     both = PushPlan(mirrored, angle, np.tile(plan.speed, 2), np.tile(plan.travel, 2))
-    one, other = np.split(travelled(push(even_physics(slider_named("rect1"), 40), both)), 2)
+    one, other = np.split(travelled(push(even_physics(slider_named("rect1"), 16), both, rest=0.0)), 2)
     assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
 
 
 @pytest.mark.slow
 def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
-    plan = random_pushes(10, [0.04, 0.1], 0.01, np.random.default_rng(5))
-    poses = np.random.default_rng(6).normal(size=(10, 3)) * [0.03, 0.03, 1.0]
+    plan = random_pushes(6, [0.04, 0.1], 0.005, np.random.default_rng(5))
+    poses = np.random.default_rng(6).normal(size=(6, 3)) * [0.03, 0.03, 1.0]
     twice = PushPlan(*(np.tile(values, 2) for values in (plan.contact, plan.angle, plan.speed, plan.travel)))
-    motion = push(even_physics(slider_named("hex"), 20), twice, np.concatenate([poses, np.zeros((10, 3))]))
+    motion = push(even_physics(slider_named("hex"), 12), twice, np.concatenate([poses, np.zeros((6, 3))]), rest=0.0)
     there, here = np.split(travelled(motion), 2)
     assert np.allclose(rotate(there[:, :2], -poses[:, 2]), here[:, :2], atol=1e-9)
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
@@ -211,8 +214,8 @@ def test_outcome_converges_with_smaller_time_steps() -> None:
 
 
 def test_surface_friction_changes_the_force_but_not_the_motion_of_a_slow_push() -> None:
-    plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.005), np.full(2, 0.01))
-    light, heavy = (push(even_physics(slider_named("rect1"), 2, friction=f), plan) for f in (0.15, 0.3))
+    plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.01), np.full(2, 0.008))
+    light, heavy = (push(even_physics(slider_named("rect1"), 2, friction=f), plan, rest=0.0) for f in (0.15, 0.3))
     assert np.all(relative(travelled(heavy) - travelled(light), travelled(light)) < 0.005)
     force = [np.median(np.hypot(m.wrench[..., 0], m.wrench[..., 1]), axis=1) for m in (light, heavy)]
     assert force[1] / force[0] == pytest.approx(2.0, rel=0.01)
@@ -228,9 +231,9 @@ def test_force_through_the_centre_equals_friction_times_weight() -> None:
 
 @pytest.mark.slow
 def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
-    plan = random_pushes(24, [0.04, 0.15], 0.01, np.random.default_rng(8))
-    physics = even_physics(slider_named("ellip3"), 24, contact_friction=0.25)
-    motion = push(physics, plan)
+    plan = random_pushes(16, [0.04, 0.1], 0.006, np.random.default_rng(8))
+    physics = even_physics(slider_named("ellip3"), 16, contact_friction=0.25)
+    motion = push(physics, plan, rest=0.0)
     poses, tips = motion.slider[:, :-1].reshape(-1, 3), motion.pusher[:, :-1].reshape(-1, 2)
     normal = rotate(physics.outline.project(to_body(tips, poses)).normal, poses[:, 2])
     force = motion.wrench[:, 1:, :2].reshape(-1, 2)
@@ -242,8 +245,8 @@ def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
 
 @pytest.mark.slow
 def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
-    plan = random_pushes(24, [0.04, 0.15], 0.01, np.random.default_rng(9))
-    physics = even_physics(slider_named("rect1"), 24)
+    plan = random_pushes(12, [0.04, 0.12], 0.005, np.random.default_rng(9))
+    physics = even_physics(slider_named("rect1"), 12)
     motion = push(physics, plan)
     gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
     gap = gap.reshape(motion.time.shape)

@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from sensed_motion import sensed
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.recordings.streams import Recording
@@ -47,27 +49,41 @@ def spec_of(plan: PushPlan, **options: object) -> SimulationSpec:
     return SimulationSpec("rect1", GLASS, plan, **{"place_spread": 0.0, "turn_spread": 0.0, **options})
 
 
-def middle_pushes(angle: Array, speed: float = 0.02) -> PushPlan:
-    """Pushes at the middle of the lowest side."""
+def middle_pushes(angle: Array, speed: float = 0.02, travel: float = 0.005) -> PushPlan:
+    """Pushes of a window at the middle of the lowest side."""
     n = len(angle)
-    return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, 0.009))
+    return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, travel))
 
 
-def some_pushes(n: int = 10) -> PushPlan:
-    return random_pushes(n, [0.02], 0.009, np.random.default_rng(4), angle_limit=0.8)
+def some_pushes(n: int = 6) -> PushPlan:
+    return random_pushes(n, [0.02], 0.006, np.random.default_rng(4), angle_limit=0.8)
+
+
+def repeated(plan: PushPlan, times: int) -> PushPlan:
+    """The whole plan several times."""
+    return plan.take(np.tile(np.arange(len(plan)), times))
+
+
+def of_push(values: Sequence[float], moment: Moment) -> Array:
+    """The value of each push, from one for each row of the plan."""
+    return np.asarray(values, dtype=np.float64)[moment.conditions.row]
 
 
 ON_GLASS = spec_of(some_pushes())
-ON_ABS = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
-outcomes_of, recording_of = cache(push_outcomes), cache(simulate)  # a spec is equal only to itself
+ON_ABS = SimulationSpec("rect1", "abs", some_pushes(3), seed=3)
+WITHOUT_NOISE = replace(ON_ABS, sensors=QUIET)
+recording_of = cache(sensed)  # a spec is equal only to itself
 
 
-def mean_outcome(spec: SimulationSpec) -> Array:
-    return np.asarray(outcomes_of(spec).outcomes.mean(axis=0))
+def outcomes_by_push(spec: SimulationSpec) -> Array:
+    """The outcome (n, 3) of the first window of each push."""
+    table = push_outcomes(spec)
+    return np.array([table.outcomes[table.push_id == str(row)][0] for row in range(len(spec.pushes))])
 
 
-def constant(value: float) -> Changes:
-    return Changes(contact_friction=lambda moment: np.full(len(moment.travelled), value))
+def friction_changes(values: Sequence[float]) -> Changes:
+    """A change of the contact friction for each push."""
+    return Changes(contact_friction=lambda moment: of_push(values, moment))
 
 
 def streams(recording: Recording) -> list[Array]:
@@ -106,113 +122,104 @@ def test_pickled_spec_gives_the_same_recording() -> None:
 
 def test_directed_drag_without_anisotropy_equals_isotropic_drag() -> None:
     level = Changes(grain=lambda moment: np.zeros((len(moment.travelled), 2)))
-    directed = push_outcomes(replace(ON_GLASS, changes=level)).outcomes
-    assert directed == pytest.approx(outcomes_of(ON_GLASS).outcomes, abs=1e-9)
+    directed, _ = moved_and_forces(replace(ON_GLASS, changes=level))
+    assert directed == pytest.approx(moved_and_forces(ON_GLASS)[0], abs=1e-9)
 
 
 def test_more_contact_friction_reduces_slip() -> None:
-    spec = spec_of(middle_pushes(np.array([0.9, -0.9])))
-    along_edge = [_slip(replace(spec, changes=constant(change))) for change in (-0.15, 0.0, 0.2)]
-    assert along_edge[0] > along_edge[1] > along_edge[2]
+    plan = repeated(middle_pushes(np.array([0.9, -0.9]), travel=0.009), 3)
+    along_edge = _slip(spec_of(plan, changes=friction_changes([-0.15, -0.15, 0.0, 0.0, 0.2, 0.2]))).reshape(3, 2)
+    assert np.all(np.diff(along_edge.mean(axis=1)) < 0.0)
 
 
-def _slip(spec: SimulationSpec) -> float:
-    """Mean change of the contact from a push's first window to its last, as a share of the perimeter."""
+def _slip(spec: SimulationSpec) -> Array:
+    """Change of the contact from the first window of each push to its last, as a share of the perimeter."""
     table = push_outcomes(spec)
-    by_push = [table.inputs[table.push_id == push, 1] for push in table.pushes]
-    return float(np.mean([abs(contact[-1] - contact[0]) for contact in by_push]))
+    by_push = [table.inputs[table.push_id == str(row), 1] for row in range(len(spec.pushes))]
+    return np.array([abs(contact[-1] - contact[0]) for contact in by_push])
 
 
 def test_contact_friction_is_never_negative() -> None:
-    spec = spec_of(some_pushes(4))
-    assert mean_outcome(replace(spec, changes=constant(-9.0))) == pytest.approx(
-        mean_outcome(replace(spec, changes=constant(-0.25))), abs=1e-12
-    )
+    spec = spec_of(repeated(some_pushes(4), 2), changes=friction_changes([-9.0] * 4 + [-0.25] * 4))
+    beyond, none = np.split(outcomes_by_push(spec), 2)
+    assert beyond == pytest.approx(none, abs=1e-12)
 
 
 @pytest.mark.slow
 def test_lower_table_friction_changes_the_force_but_not_the_motion() -> None:
     half = replace(ON_GLASS, changes=Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)))
-    plain, slippery = outcomes_of(ON_GLASS).outcomes, push_outcomes(half).outcomes
+    (plain, force), (slippery, of_half) = moved_and_forces(ON_GLASS), moved_and_forces(half)
     assert np.max(np.abs(slippery - plain)) < 0.03 * np.max(np.abs(plain))
-    assert _largest_force(half) == pytest.approx(0.5 * _largest_force(ON_GLASS), rel=0.05)
+    assert of_half == pytest.approx(0.5 * force, rel=0.05)
 
 
 @cache
-def _largest_force(spec: SimulationSpec) -> float:
-    """Median force at the middle of the pushes, N."""
+def moved_and_forces(spec: SimulationSpec) -> tuple[Array, Array]:
+    """Motion (n, 3) of the slider in each push, and median force (n,) during it, N."""
     (batch,) = run_pushes(spec)
-    force = np.hypot(batch.motion.wrench[..., 0], batch.motion.wrench[..., 1])
-    return float(np.median(force[force > 0.0]))
+    order, motion = np.argsort(batch.rows), batch.motion
+    force = np.hypot(motion.wrench[..., 0], motion.wrench[..., 1])
+    return (motion.slider[:, -1] - motion.slider[:, 0])[order], np.array([np.median(f[f > 0.0]) for f in force[order]])
 
 
 def test_mass_added_at_the_centre_changes_the_force_but_not_the_motion() -> None:
     loaded = replace(ON_GLASS, changes=Changes(added_mass=0.4))
-    plain, heavy = outcomes_of(ON_GLASS).outcomes, push_outcomes(loaded).outcomes
+    (plain, force), (heavy, of_heavy) = moved_and_forces(ON_GLASS), moved_and_forces(loaded)
     assert np.max(np.abs(heavy - plain)) < 0.03 * np.max(np.abs(plain))
     heavier = 1.0 + 0.4 / ON_GLASS.slider.mass
-    assert _largest_force(loaded) == pytest.approx(heavier * _largest_force(ON_GLASS), rel=0.05)
+    assert of_heavy == pytest.approx(heavier * force, rel=0.05)
 
 
 def test_slider_with_load_on_its_rim_turns_less() -> None:
-    spec = spec_of(PushPlan(np.full(2, 0.19), np.zeros(2), np.full(2, 0.02), np.full(2, 0.009)))
+    spec = spec_of(PushPlan(np.full(3, 0.19), np.zeros(3), np.full(3, 0.02), np.full(3, 0.005)))
     points = support_points(spec.slider.outline)
     rim = np.sum(points**2, axis=1) / np.mean(np.sum(points**2, axis=1)) - 1.0
-    turns = [
-        abs(mean_outcome(replace(spec, changes=Changes(load=lambda moment, k=k: np.tile(k * rim, (2, 1)))))[2])
-        for k in (-0.8, 0.0, 0.8)
-    ]
-    assert turns[0] > turns[1] > turns[2]
+    loaded = Changes(load=lambda moment: np.outer(of_push([-0.8, 0.0, 0.8], moment), rim))
+    assert np.all(np.diff(np.abs(outcomes_by_push(replace(spec, changes=loaded))[:, 2])) < 0.0)
 
 
 def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
-    spec = spec_of(middle_pushes(np.zeros(1)))
+    spec = spec_of(middle_pushes(np.zeros(2)))
     x = support_points(spec.slider.outline)[:, 0]
     heading = spec.slider.outline.inward_normal(np.array([0.125]))[0]
     left = x * -heading[1] if abs(heading[1]) > 0.5 else support_points(spec.slider.outline)[:, 1] * heading[0]
-    loaded = replace(spec, changes=Changes(load=lambda moment: 30.0 * left[None, :]))
-    assert abs(mean_outcome(spec)[2]) < abs(mean_outcome(loaded)[2])
-    assert mean_outcome(loaded)[2] > 0.005  # the loaded left side lags, so the slider turns left
+    loaded = Changes(load=lambda moment: np.outer(of_push([0.0, 30.0], moment), left))
+    plain, turn = outcomes_by_push(replace(spec, changes=loaded))[:, 2]
+    assert abs(plain) < abs(turn)
+    assert turn > 0.005  # the loaded left side lags, so the slider turns left
 
 
 @pytest.mark.slow
 def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
-    plain = spec_of(middle_pushes(np.zeros(1)), turn_spread=1.0)
-
-    def turned(heading: float) -> Array:
-        """The effect of the grain on a push of a slider with this heading."""
-        grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.travelled), 1)))
-        return _at_heading(replace(plain, changes=grain), heading) - _at_heading(plain, heading)
-
-    along, opposite, right = turned(0.3), turned(0.3 + np.pi), turned(0.3 + np.pi / 2.0)
+    grain = Changes(grain=lambda moment: np.outer(of_push([0.02, 0.02, 0.02, 0.0, 0.0, 0.0], moment), [0.0, 1.0]))
+    headings = np.tile([0.3, 0.3 + np.pi, 0.3 + np.pi / 2.0], 2)
+    with_it, without = np.split(outcomes_by_push(at_headings(headings, grain)), 2)
+    along, opposite, right = with_it - without
     assert abs(along[1]) > 3e-5
     assert opposite == pytest.approx(along, abs=0.02 * abs(along[1]))
     assert right[1] == pytest.approx(-along[1], rel=0.1)
 
 
-def _at_heading(spec: SimulationSpec, heading: float) -> Array:
-    """The mean outcome of pushes of a slider with this heading."""
-    drawn = float(spec.rng(1).standard_normal((1, 3))[0, 2])
-    return mean_outcome(replace(spec, turn_spread=heading / drawn))
+def at_headings(headings: Array, changes: Changes) -> SimulationSpec:
+    """The same push of sliders with these headings."""
+    start = np.column_stack([np.zeros((len(headings), 2)), headings])
+    return spec_of(middle_pushes(np.zeros(len(headings))), changes=changes, start=start)
 
 
 def test_grain_of_the_slider_turns_with_it() -> None:
     def grain(moment: Moment) -> Array:
         return rotate(np.tile([0.0, 0.4], (len(moment.travelled), 1)), 2.0 * moment.pose[:, 2])
 
-    spec = replace(spec_of(middle_pushes(np.zeros(1))), changes=Changes(grain=grain))
-    assert _at_heading(spec, 0.9) == pytest.approx(_at_heading(spec, -0.5), rel=0.02, abs=1e-7)
+    one, other = outcomes_by_push(at_headings(np.array([0.9, -0.5]), Changes(grain=grain)))
+    assert one == pytest.approx(other, rel=0.02, abs=1e-7)
 
 
 def test_tilted_table_pulls_the_slider_downhill() -> None:
-    spec = spec_of(middle_pushes(np.zeros(1)))
+    spec = spec_of(middle_pushes(np.zeros(3)))
     ahead = spec.slider.outline.inward_normal(np.array([0.125]))[0]
     left = np.array([-ahead[1], ahead[0], 0.0])
-    outcomes = [
-        mean_outcome(replace(spec, changes=Changes(pull=lambda moment, s=s: s * left[None, :])))[1]
-        for s in (-0.3, 0.0, 0.3)
-    ]
-    assert outcomes[0] < outcomes[1] < outcomes[2]
+    slope = Changes(pull=lambda moment: np.outer(of_push([-0.3, 0.0, 0.3], moment), left))
+    assert np.all(np.diff(outcomes_by_push(replace(spec, changes=slope))[:, 1]) > 0.0)
 
 
 def test_resting_slider_stays_on_a_gentle_slope() -> None:
@@ -224,11 +231,10 @@ def test_resting_slider_stays_on_a_gentle_slope() -> None:
 
 @pytest.mark.slow
 def test_viscous_drag_is_proportional_to_speed() -> None:
-    drag = Changes(viscosity=lambda moment: np.full(len(moment.travelled), 20.0))
-    added = []
-    for speed in (0.02, 0.04):
-        spec = spec_of(middle_pushes(np.zeros(1), speed))
-        added.append(_largest_force(replace(spec, changes=drag)) - _largest_force(spec))
+    drag = Changes(viscosity=lambda moment: of_push([20.0, 20.0, 0.0, 0.0], moment))
+    plan = replace(middle_pushes(np.zeros(4)), speed=np.tile([0.02, 0.04], 2))
+    with_it, without = np.split(moved_and_forces(spec_of(plan, changes=drag))[1], 2)
+    added = with_it - without
     assert added[0] == pytest.approx(20.0 * 0.02, rel=0.15)
     assert added[1] == pytest.approx(2.0 * added[0], rel=0.15)
 
@@ -272,10 +278,8 @@ def test_recorded_topic_does_not_change_the_pushes() -> None:
 
 
 def test_pauses_delay_the_pushes() -> None:
-    spec = SimulationSpec("rect1", "abs", some_pushes(3), seed=3, sensors=QUIET)
-    plain, paused = (
-        simulate(replace(spec, pauses=pauses)).pusher.stamp for pauses in (None, np.array([0.0, 4.0, 1.0]))
-    )
+    plain = recording_of(WITHOUT_NOISE).pusher.stamp
+    paused = simulate(replace(WITHOUT_NOISE, pauses=np.array([0.0, 4.0, 1.0]))).pusher.stamp
     assert (paused[-1] - paused[0]) / 1e9 == pytest.approx((plain[-1] - plain[0]) / 1e9 + 5.0, abs=0.05)
 
 
@@ -312,8 +316,5 @@ def test_compliant_rod_bends_only_under_force() -> None:
     assert np.median(away[force > 0.8]) == pytest.approx(5e-4 * np.median(force[force > 0.8]), rel=0.1)
 
 
-WITHOUT_NOISE = replace(ON_ABS, sensors=QUIET)
-
-
 def _both(faults: Faults) -> tuple[Recording, Recording]:
-    return recording_of(WITHOUT_NOISE), simulate(replace(WITHOUT_NOISE, faults=faults))
+    return recording_of(WITHOUT_NOISE), sensed(WITHOUT_NOISE, faults=faults)
