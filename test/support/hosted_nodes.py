@@ -32,6 +32,7 @@ from ros_harness import START_TIMEOUT, keep_tables, node_arguments, wait_until
 
 from push_predictor.nodes.predict_server import PredictServer, start_server
 from push_predictor.nodes.push_replay import PushReplay
+from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.runtime import Stop, _Life
 from push_predictor.resources import share_path
 
@@ -39,14 +40,16 @@ PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_
 NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
     "predict_server": (lambda stop: PredictServer(), start_server, {}),
     "push_replay": (PushReplay, None, PROFILES),
+    "push_validator": (PushValidator, None, {}),
 }
 
 
 class HostedNode:
     """A node that a thread of this process spins; what ROS logs goes to a file."""
 
-    def __init__(self, log: Path) -> None:
-        self._log = log
+    def __init__(self, life: _Life, stop: Stop, log: Path) -> None:
+        self._life, self._stop, self._log = life, stop, log
+        self._status: int | None = None
 
     def text(self) -> str:
         """Everything logged so far."""
@@ -57,6 +60,13 @@ class HostedNode:
         assert wait_until(lambda: text in self.text(), timeout), f"{text!r} was not logged:\n{self.text()}"
         return self.text()
 
+    def stop(self) -> int:
+        """End the node as a signal would; returns the status that its process would have."""
+        if self._status is None:
+            self._stop.request()
+            self._status = self._life.end()
+        return self._status
+
 
 @contextmanager
 def hosted_node(
@@ -66,7 +76,7 @@ def hosted_node(
     namespace: str | None = None,
     params: Mapping[str, Any] | None = None,
 ) -> Iterator[HostedNode]:
-    """As `node_process`, one at a time. Leaving ends the node as a signal would, and raises what made it fail."""
+    """As `node_process`, one at a time. Leaving ends the node, and raises what made it fail."""
     make_node, start, environment = NODES[executable]
     if executable == "predict_server":
         keep_tables(params)
@@ -75,11 +85,11 @@ def hosted_node(
     with _stderr_in_file() as log, patch.dict(os.environ, environment):
         life = _Life(executable, make_node, stop, arguments, start)
         life.begin()
+        node = HostedNode(life, stop, log)
         try:
-            yield HostedNode(log)
+            yield node
         finally:
-            stop.request()
-            assert life.end() == 0, log.read_text()
+            assert node.stop() == 0, log.read_text()
 
 
 @contextmanager
