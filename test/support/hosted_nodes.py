@@ -50,6 +50,7 @@ class HostedNode:
     def __init__(self, life: _Life, stop: Stop, log: Path) -> None:
         self._life, self._stop, self._log = life, stop, log
         self._status: int | None = None
+        self.pid = os.getpid()
 
     def text(self) -> str:
         """Everything logged so far."""
