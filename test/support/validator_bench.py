@@ -37,6 +37,7 @@ from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import push_replay
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import taken
 from push_predictor.recordings.write import write_recording
 from push_predictor_interfaces.srv import Burst
 
@@ -78,7 +79,9 @@ def beginning(source: Path, seconds: float, path: Path) -> Path:
     slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
     end = slider.stamp[0] + round(seconds * 1e9)
     streams = {"slider": rows(slider, slider.stamp < end), "pusher": rows(pusher, pusher.stamp < end)}
-    write_recording(path, replace(recording, **streams, wrench=wrench_rows(wrench, wrench.stamp < end)))
+    scalars = {name: taken(stream, stream.stamp < end) for name, stream in recording.scalars.items()}
+    wrench = wrench_rows(wrench, wrench.stamp < end)
+    write_recording(path, replace(recording, **streams, wrench=wrench, scalars=scalars))
     return path
 
 
