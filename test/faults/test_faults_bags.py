@@ -140,7 +140,12 @@ print(most() - before)
 
 @pytest.mark.parametrize(
     ("compression", "noise"),
-    [(CompressionType.ZSTD, 4000), (CompressionType.ZSTD, 500), (CompressionType.LZ4, 500), (CompressionType.NONE, 4000)],
+    [
+        (CompressionType.ZSTD, 4000),
+        (CompressionType.ZSTD, 500),
+        (CompressionType.LZ4, 500),
+        (CompressionType.NONE, 4000),
+    ],
 )
 def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int

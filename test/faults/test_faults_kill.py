@@ -28,7 +28,16 @@ import numpy as np
 import pytest
 from rclpy.executors import SingleThreadedExecutor
 from ros_harness import NodeProcess, call, free_domain, node_process, ros_context, wait_until
-from validator_bench import HEXAGON, WRITTEN, Status, assert_same_as_offline, beginning, finish, replaying
+from validator_bench import (
+    HEXAGON,
+    WRITTEN,
+    Status,
+    assert_same_as_offline,
+    beginning,
+    finish,
+    hosting_replay,
+    replaying,
+)
 
 from examples.planner_client import PlannerClient
 from push_predictor.cli import main as push_predictor
@@ -121,7 +130,7 @@ def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
         with server(domain, model) as first:
             assert wait_until(lambda: len(planner.answers) >= 10, 60.0)
             status.wait_for_server()
-            with replaying(domain, recording=recording, rate=2.0):
+            with hosting_replay(domain, recording=recording, rate=2.0):
                 assert wait_until(lambda: len(received) >= 10, 60.0)
                 kill(first)
                 status.wait_for_message(f"predict_push: no answer within {TIMEOUT:g} s", 30.0)

@@ -219,9 +219,7 @@ def test_empty_and_huge_batches_are_answered(server: Server, size: int) -> None:
     del response, mean
     last, after = answered(server)
     assert last == good
-    print(
-        f"an answer took {1e6 * before:.0f} us before, {1e6 * during:.0f} meanwhile, {1e6 * after:.0f} after"
-    )
+    print(f"an answer took {1e6 * before:.0f} us before, {1e6 * during:.0f} meanwhile, {1e6 * after:.0f} after")
 
 
 # --- in the library -----------------------------------------------------------------------------------------------

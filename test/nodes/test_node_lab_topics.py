@@ -92,7 +92,11 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
     tmp_path: Path, tf_installed: None
 ) -> None:
     """From .db3 with the topics saved next to it, then from MCAP with the topics as parameters; after a wrong type."""
-    rig, domain, output = recorded(tmp_path, laboratory(short_recording(SECONDS)), LABORATORY), free_domain(), tmp_path / "out"
+    rig, domain, output = (
+        recorded(tmp_path, laboratory(short_recording(SECONDS)), LABORATORY),
+        free_domain(),
+        tmp_path / "out",
+    )
     db3 = write_db3(laboratory(short_recording(SECONDS)), tmp_path / "sqlite", short_recording(SECONDS).rig)
     save_topics(db3, LABORATORY)
     saved = save_topics(rig.bag, LABORATORY)

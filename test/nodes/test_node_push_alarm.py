@@ -79,7 +79,11 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     unchanged = record(folder / "unchanged", CLEAN + TRAINING, seed=1)
     table, rig = load_data([unchanged]), load_rig_for([unchanged])
     model = train_model(
-        table.take(np.isin(table.push_id, table.pushes[CLEAN:])), rig, "gp", name="gp", options=TrainingOptions(n_train=100)
+        table.take(np.isin(table.push_id, table.pushes[CLEAN:])),
+        rig,
+        "gp",
+        name="gp",
+        options=TrainingOptions(n_train=100),
     )
     save_model(model, folder / "gp.pushmodel")
     windows = find_windows(read_recording(unchanged), rig)

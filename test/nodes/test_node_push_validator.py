@@ -169,9 +169,7 @@ def watched(
     return out, received
 
 
-def test_a_replay_at_rate_10_gives_the_result_of_reading_the_recording(
-    watched, models: dict[str, Path], hexagon: Path
-):
+def test_a_replay_at_rate_10_gives_the_result_of_reading_the_recording(watched, models: dict[str, Path], hexagon: Path):
     out, _ = watched
     assert_same_as_offline(out, models["gp"], hexagon)
     assert_same_as_offline(out, models["analytical"], hexagon, suffix="_analytical")
@@ -425,9 +423,7 @@ def named(
         reserved_domain() as domain,
         ros_context(domain, "/cell") as node,
         hosted_node("predict_server", domain=domain, namespace="/cell", params=served),
-        validator(
-            domain, *CELL, *OWN_RIG, namespace="/cell", compare=["hexagon"], output=output, rig=rig
-        ) as process,
+        validator(domain, *CELL, *OWN_RIG, namespace="/cell", compare=["hexagon"], output=output, rig=rig) as process,
     ):
         bench = Bench(domain, node, process, output)
         bench.status.wait_for_first()

@@ -141,9 +141,7 @@ def keep_tables(params: Mapping[str, Any] | None) -> None:
     ModelRegistry().load_all(map(str, (params or {}).get("models", ())))
 
 
-def node_arguments(
-    *ros_args: str, namespace: str | None = None, params: Mapping[str, Any] | None = None
-) -> list[str]:
+def node_arguments(*ros_args: str, namespace: str | None = None, params: Mapping[str, Any] | None = None) -> list[str]:
     """The words after --ros-args: ros_args as they are, then namespace and parameters."""
     words = [*ros_args, *(["-r", f"__ns:={namespace}"] if namespace else [])]
     for name, value in (params or {}).items():
