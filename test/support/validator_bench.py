@@ -63,9 +63,9 @@ def hosting_replay(
 ) -> Iterator[HostedNode]:
     """The same in this process, without the check of the recording: both take a second of processor time."""
     params = _of_replay(recording, rate, more)
-    with patch.object(push_replay, "LARGEST_CHECKED", 0):
-        with hosted_node("push_replay", *ros_args, domain=domain, params=params) as node:
-            yield node
+    unchecked = patch.object(push_replay, "LARGEST_CHECKED", 0)
+    with unchecked, hosted_node("push_replay", *ros_args, domain=domain, params=params) as node:
+        yield node
 
 
 def _of_replay(recording: Path, rate: float, more: dict[str, Any]) -> dict[str, Any]:
