@@ -39,13 +39,20 @@ from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording
 
 KINDS, FORMS = 15, 9  # of damage, of bags; copy n has kind n % KINDS, and the form after KINDS copies is the next one
-COPIES = [KINDS * ((kind + 2 * turn) % FORMS) + kind for turn in range(4) for kind in range(KINDS)]
+COPIES = [KINDS * ((kind + 2 * turn) % FORMS) + kind for turn in range(2) for kind in range(KINDS)]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Four seconds of poses and forces in some ten chunks of 64 kB, with a rig and a summary."""
+    return write_bag(tmp_path_factory.mktemp("bags") / "bag.mcap", push_messages(4.0)).read_bytes()
 
 
 @pytest.fixture
-def bag(tmp_path: Path) -> Path:
-    """Four seconds of poses and forces in some ten chunks of 64 kB, with a rig and a summary."""
-    return write_bag(tmp_path / "bag.mcap", push_messages(4.0))
+def bag(written: bytes, tmp_path: Path) -> Path:
+    """A copy to be damaged."""
+    (path := tmp_path / "bag.mcap").write_bytes(written)
+    return path
 
 
 def chunks_of(data: bytes) -> list[int]:
@@ -65,7 +72,7 @@ def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
 
 @pytest.mark.slow
 def test_damaged_copies_are_read_as_far_as_they_are_intact() -> None:
-    """Every kind of damage in four forms of bag, which the mcap package wrote.
+    """Every kind of damage in two forms of bag, which the mcap package wrote.
 
     The long form: 2000 copies.
     """
@@ -131,8 +138,15 @@ print(most() - before)
 """
 
 
-@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
-@pytest.mark.parametrize("noise", [4000, 500], ids=["that_do_not_compress", "that_do"])
+@pytest.mark.parametrize(
+    ("compression", "noise"),
+    [
+        (CompressionType.ZSTD, 4000),
+        (CompressionType.ZSTD, 500),
+        (CompressionType.LZ4, 500),
+        (CompressionType.NONE, 4000),
+    ],
+)
 def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:
@@ -294,7 +308,7 @@ def test_file_with_damage_everywhere_is_read_in_bounded_time_with_bounded_notes(
     """Every message is on a channel without description; one note per message would be too slow."""
     record = struct.pack("<BQHIQQ", 5, 22 + 4, 7, 0, 0, 0) + b"\0\1\0\0"
     path = tmp_path / "wild.mcap"
-    path.write_bytes(b"\x89MCAP0\r\n" + 50_000 * record)
+    path.write_bytes(b"\x89MCAP0\r\n" + 10_000 * record)
     messages, notes = messages_and_notes(path)
     assert messages == []
     assert len(notes) < 100
@@ -306,7 +320,8 @@ def test_commands_on_damaged_bags_exit_with_0_or_1_and_one_line(bag: Path, capsy
     model = str(REPOSITORY / "resource" / "simulated_square_abs.pushmodel")
     for content in (data[:40_000], data[:100], b"", b"x", data[:30_000] + bytes(9000) + data[39_000:]):
         bag.write_bytes(content)
-        for command in (["info", str(bag)], ["validate", model, str(bag)]):
+        validate = [["validate", model, str(bag)]] if len(content) not in (100, 1) else []
+        for command in (["info", str(bag)], *validate):
             status = main(command)
             out, err = capsys.readouterr()
             lines = [line for line in err.splitlines() if not line.startswith("warning:")]

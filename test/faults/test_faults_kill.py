@@ -28,7 +28,16 @@ import numpy as np
 import pytest
 from rclpy.executors import SingleThreadedExecutor
 from ros_harness import NodeProcess, call, free_domain, node_process, ros_context, wait_until
-from validator_bench import HEXAGON, WRITTEN, Status, assert_same_as_offline, finish, replaying
+from validator_bench import (
+    HEXAGON,
+    WRITTEN,
+    Status,
+    assert_same_as_offline,
+    beginning,
+    finish,
+    hosting_replay,
+    replaying,
+)
 
 from examples.planner_client import PlannerClient
 from push_predictor.cli import main as push_predictor
@@ -113,7 +122,7 @@ class Planning(threading.Thread):
 def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
     domain: int, model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
-    inputs = load_model(model).training.inputs[:20]
+    inputs, recording = load_model(model).training.inputs[:20], beginning(HEXAGON, 8.3, tmp_path / "hexagon")
     with ros_context(domain) as node, validator(domain, model, tmp_path) as process:
         status, received = Status(node), residuals_received(node)
         status.wait_for_first()
@@ -121,7 +130,7 @@ def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
         with server(domain, model) as first:
             assert wait_until(lambda: len(planner.answers) >= 10, 60.0)
             status.wait_for_server()
-            with replaying(domain, rate=2.0):
+            with hosting_replay(domain, recording=recording, rate=2.0):
                 assert wait_until(lambda: len(received) >= 10, 60.0)
                 kill(first)
                 status.wait_for_message(f"predict_push: no answer within {TIMEOUT:g} s", 30.0)
@@ -132,7 +141,7 @@ def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
                     planner.stop()
                     logged = process.wait_for_text(WRITTEN, 120.0)
     assert "Requests sent again:" in logged and "given up: 0" in logged
-    assert_same_as_offline(tmp_path, model)
+    assert_same_as_offline(tmp_path, model, recording)
     text = capfd.readouterr().err
     assert "predict_push_batch: no response within 0.5 s, sending the request again" in text
     assert "predict_push_batch: responds again after" in text and "requests had no response" in text

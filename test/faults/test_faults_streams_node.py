@@ -24,20 +24,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from hosted_nodes import hosted_node
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from replay_bags import stamped
-from ros_harness import free_domain, node_process, ros_context, wait_until
+from ros_harness import free_domain, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
-from synthetic import START, Push, rows, square_rig, translating_push, wrench_rows
-from validator_bench import HEXAGON, Status
+from synthetic import START, Push, rows, square_pushes, square_rig, translating_push, wrench_rows
+from validator_bench import Status
 
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.online import stream_sync
 from push_predictor.online.stream_sync import LAGS, Samples, StreamSync
-from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
@@ -158,14 +158,14 @@ def offline(recordings: list[Recording]) -> PushTable:
 @pytest.mark.slow
 def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> None:
     model, rig, out = tmp_path / "model.pushmodel", tmp_path / "square.rig.yaml", tmp_path / "out"
-    save_model(train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="any"), model)
+    save_model(train_model(*square_pushes(20), "analytical", name="any"), model)
     save_rig(square_rig(), rig)
     recordings = day()
     expected_rows, domain = offline(recordings), free_domain()
     params = {"model": model, "rig": rig, "output": out, "report": False, "diagnostics_period": 0.2}
     with (
         ros_context(domain) as node,
-        node_process("push_validator", domain=domain, params={**params, "use_sim_time": True}) as process,
+        hosted_node("push_validator", domain=domain, params={**params, "use_sim_time": True}) as process,
     ):
         status, sensors = Status(node), Sensors(node)
         status.wait_for_first()

@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from hosted_nodes import hosted_node
 from mistakes import force_turned
-from ros_harness import free_domain, node_process, ros_context
-from validator_bench import HEXAGON, Status, replaying
+from ros_harness import free_domain, ros_context
+from validator_bench import HEXAGON, Status, beginning, replaying
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -36,12 +37,13 @@ pytestmark = pytest.mark.slow
 
 def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> None:
     """As a warning by the one, as an error by the other, which is strict."""
-    write_recording(tmp_path / "wrong", force_turned(read_recording(HEXAGON), np.pi))
-    model = train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="analytical")
+    some = beginning(HEXAGON, 12.5, tmp_path / "right")  # more than the 1000 poses of a first check
+    write_recording(tmp_path / "wrong", force_turned(read_recording(some), np.pi))
+    model = train_model(load_data([some]), load_rig_for([some]), "analytical", name="analytical")
     save_model(model, tmp_path / "analytical.pushmodel")
     domain = free_domain()
     params = {"model": tmp_path / "analytical.pushmodel", "diagnostics_period": 0.2, "strict": True}
-    with ros_context(domain) as node, node_process("push_validator", domain=domain, params=params) as validator:
+    with ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params) as validator:
         received, played = Status(node), Status(node, "push_replay")
         received.wait_for_first()
         with replaying(domain, recording=tmp_path / "wrong") as replay:

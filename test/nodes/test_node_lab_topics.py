@@ -24,6 +24,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 from diagnostic_msgs.msg import DiagnosticStatus
+from hosted_nodes import hosted_node
 from lab_bags import LABORATORY, Lab, laboratory, pose_rows, robot_in_tf, short_recording, write_db3
 from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
@@ -40,6 +41,7 @@ from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
 
+SECONDS = 6.0  # of the recording: three pushes
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
 IN_TF = Topics("/tf:block", "/tf:tip", "/force_torque_sensor_broadcaster/wrench", wrench_frame="ft")
 
@@ -54,8 +56,8 @@ class Rig:
 
 
 def recorded(folder: Path, lab: Lab, topics: Topics) -> Rig:
-    """Eight seconds of pushes, as an MCAP bag with its topics next to it."""
-    bag = lab.mcap(folder / "lab", short_recording().rig)
+    """Some seconds of pushes, as an MCAP bag with its topics next to it."""
+    bag = lab.mcap(folder / "lab", short_recording(SECONDS).rig)
     save_topics(bag, topics)
     model = folder / "square.pushmodel"
     save_model(train_model(load_data([bag]), load_rig_for([bag]), "analytical", name="square"), model)
@@ -64,7 +66,7 @@ def recorded(folder: Path, lab: Lab, topics: Topics) -> Rig:
 
 def robot_with_force() -> Lab:
     """Block and tip below moving frames of tf, and a force sensor that is mounted askew on the tip."""
-    recording = short_recording()
+    recording = short_recording(SECONDS)
     assert recording.wrench is not None
     lab, stamp = robot_in_tf(recording), recording.wrench.stamp
     mounted = measured_at(recording.wrench, poses_at(stamp, recording.pusher.stamp, pose_rows(recording.pusher)))
@@ -90,8 +92,12 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
     tmp_path: Path, tf_installed: None
 ) -> None:
     """From .db3 with the topics saved next to it, then from MCAP with the topics as parameters; after a wrong type."""
-    rig, domain, output = recorded(tmp_path, laboratory(short_recording()), LABORATORY), free_domain(), tmp_path / "out"
-    db3 = write_db3(laboratory(short_recording()), tmp_path / "sqlite", short_recording().rig)
+    rig, domain, output = (
+        recorded(tmp_path, laboratory(short_recording(SECONDS)), LABORATORY),
+        free_domain(),
+        tmp_path / "out",
+    )
+    db3 = write_db3(laboratory(short_recording(SECONDS)), tmp_path / "sqlite", short_recording(SECONDS).rig)
     save_topics(db3, LABORATORY)
     saved = save_topics(rig.bag, LABORATORY)
     (tmp_path / "qos.yaml").write_text(f"{LABORATORY.slider}: {{reliability: best_effort}}\n")
@@ -126,7 +132,7 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
         assert len(lines) == 1 and "[ERROR]" in lines[0], "logged once"
         assert f"pusher: {LABORATORY.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert f"wrench: {LABORATORY.wrench}, geometry_msgs/msg/WrenchStamped, reliable" in process.text()
-        status.wait_for("coverage check", "limited")  # eight seconds
+        status.wait_for("coverage check", "limited")  # six seconds
         assert "only for the part of the domain that was pushed" in status.message
         assert process.stop() == 0, process.text()
     save_topics(rig.bag, LABORATORY)
@@ -138,13 +144,13 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
     rig, domain, output = recorded(tmp_path, robot_with_force(), IN_TF), free_domain(), tmp_path / "out"
     with (
         ros_context(domain) as node,
-        node_process("predict_server", domain=domain, params={"models": [str(rig.model)]}),
+        hosted_node("predict_server", domain=domain, params={"models": [str(rig.model)]}),
         node_process("push_validator", domain=domain, params=parameters(rig, output)) as process,
     ):
         status = Status(node)
         status.wait_for_first()
         status.wait_for_server()
-        with replaying(domain, recording=rig.bag, rate=2.0):
+        with replaying(domain, recording=rig.bag, rate=3.0):
             process.wait_for_text(WRITTEN, 60.0)
         assert "Its axes are turned from 'ft' by tf." in process.text()
         assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
@@ -155,7 +161,7 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
 
 def assert_windows_of_the_poses(output: Path) -> None:
     """Assert the windows that the recording as PoseStamped has."""
-    recording = short_recording()
+    recording = short_recording(SECONDS)
     assert recording.rig is not None
     online = json.loads((output / "windows.json").read_text())["windows"]
     expected = find_windows(recording, recording.rig)

@@ -29,7 +29,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_harness import acquaint, free_domain, node_process, reserved_domain, ros_context, wait_until
 from synthetic import square_rig
-from validator_bench import WRITTEN, Status, replaying
+from validator_bench import WRITTEN, Status, beginning, hosting_replay
 
 from push_predictor.evaluation.alarm.evidence import alarm_json
 from push_predictor.evaluation.alarm.scores import Calibration, alarm_state, calibrate
@@ -41,30 +41,34 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import push_validator, runtime
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import rig_of_table
+from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.changes import PLAIN, Changes, Moment
-from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
+from push_predictor.simulation.rig_simulator import Sensors, SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushAlarm
 
 pytestmark = pytest.mark.slow
 
-PUSHES = 16
-CHANGE_AT = 5
+CLEAN, TRAINING, CHANGED = 6, 50, 14  # pushes
+CHANGE_AT = 3
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def tilted(moment: Moment) -> Array:
-    """The force on the slider of a table that is tilted by 3 degrees from push CHANGE_AT on."""
-    return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.4, 0.0)[:, None] * [0.0, 1.0, 0.0]
+    """The force on the slider of a table that is tilted by 6 degrees from push CHANGE_AT on."""
+    return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.8, 0.0)[:, None] * [0.0, 1.0, 0.0]
 
 
-def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES) -> Path:
+def record(path: Path, pushes: int, seed: int, changes: Changes = PLAIN) -> Path:
     plan = random_pushes(pushes, [0.05], 0.05, np.random.default_rng([seed, 0]))
-    write_recording(path, simulate(SimulationSpec("rect1", "abs", plan, seed=seed, name=path.name, changes=changes)))
+    few = Sensors(rate=40.0, wrench_rate=40.0)  # samples, which the nodes receive one by one
+    spec = SimulationSpec("rect1", "abs", plan, seed=seed, name=path.name, changes=changes, sensors=few)
+    write_recording(path, simulate(spec))
     return path
 
 
@@ -72,12 +76,22 @@ def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES
 def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A model, a recording like those it was trained on, and one whose table is tilted meanwhile."""
     folder = tmp_path_factory.mktemp("alarm")
-    training = [record(folder / "training", seed=1, pushes=50)]
-    options = TrainingOptions(n_train=100)
-    model = train_model(load_data(training), load_rig_for(training), "gp", name="gp", options=options)
+    unchanged = record(folder / "unchanged", CLEAN + TRAINING, seed=1)
+    table, rig = load_data([unchanged]), load_rig_for([unchanged])
+    model = train_model(
+        table.take(np.isin(table.push_id, table.pushes[CLEAN:])),
+        rig,
+        "gp",
+        name="gp",
+        options=TrainingOptions(n_train=100),
+    )
     save_model(model, folder / "gp.pushmodel")
-    changed = record(folder / "changed", seed=2, changes=Changes(pull=tilted))
-    return {"model": folder / "gp.pushmodel", "clean": record(folder / "clean", seed=3), "changed": changed}
+    windows = find_windows(read_recording(unchanged), rig)
+    first = next(window.start for window in windows if window.push_id == table.pushes[CLEAN])
+    seconds = 1e-9 * (first - read_recording(unchanged).slider.stamp[0]) - 0.5  # the tip is away
+    clean = beginning(unchanged, seconds, folder / "clean")
+    changed = record(folder / "changed", CHANGED, seed=2, changes=Changes(pull=tilted))
+    return {"model": folder / "gp.pushmodel", "clean": clean, "changed": changed}
 
 
 @dataclass
@@ -108,7 +122,7 @@ def outcomes(bench: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
         node.create_subscription(PushAlarm, "push_alarm", alarms.append, 10)
         status.wait_for_first()
         for number, recording in enumerate(("clean", "changed"), start=1):
-            with replaying(domain, recording=bench[recording], rate=15.0):
+            with hosting_replay(domain, recording=bench[recording], rate=15.0):
                 assert wait_until(lambda number=number: process.text().count(WRITTEN) >= number, 240.0), process.text()
             status.wait_for_news()
             status.wait_for("state", "waiting for samples")
@@ -184,7 +198,7 @@ def test_the_alarm_in_the_result_equals_the_offline_alarm(recording: str, outcom
 
 def test_a_recording_without_a_change_raises_no_alarm(clean: Outcome):
     assert clean.alarms == clean.late == []
-    assert clean.result["alarm"]["fired"] is False and clean.result["alarm"]["pushes"] == PUSHES
+    assert clean.result["alarm"]["fired"] is False and clean.result["alarm"]["pushes"] == CLEAN
     assert clean.status[2]["alarm"] == "quiet"
 
 

@@ -35,7 +35,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_harness import REPOSITORY, free_domain, node_environment, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Float64, String
-from validator_bench import HEXAGON, Status, replaying
+from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
 from push_predictor.nodes.qos import KEPT
@@ -57,8 +57,8 @@ BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 class Recorded:
     """A replay at rate 5 and a best-effort publisher, recorded by push_recorder."""
 
-    def __init__(self, bag: Path) -> None:
-        domain, self.bag = free_domain(), bag
+    def __init__(self, bag: Path, original: Path) -> None:
+        domain, self.bag, self.original = free_domain(), bag, original
         params = {"bag": bag, "covariate_topics": ["surface/temperature", LOSSY], "diagnostics_period": 0.2}
         with (
             ros_context(domain) as node,
@@ -69,11 +69,11 @@ class Recorded:
             publisher = node.create_publisher(Float32, LOSSY, BEST_EFFORT)
             node.create_timer(0.05, lambda: publisher.publish(Float32(data=0.5)))
             self.began = time.time_ns()
-            with replaying(domain, rate=5.0) as replay:
+            with hosting_replay(domain, recording=original, rate=5.0) as replay:
                 replay.wait_for_text("finished: published")
                 # The last pushes end before the last samples, and a status is sent only every 0.2 s.
-                status.wait_for("windows", "53")
-                status.wait_for("slider samples", str(len(read_recording(HEXAGON).slider.stamp)))
+                status.wait_for("windows", "25")
+                status.wait_for("slider samples", str(len(read_recording(original).slider.stamp)))
             self.ended = time.time_ns()
             self.waiting, self.last, self.identity = status.all[0][2], status.values, status.identity
             self.status, self.text = process.stop(signal.SIGINT), process.text()
@@ -81,25 +81,26 @@ class Recorded:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    return Recorded(tmp_path_factory.mktemp("recorded") / "monday")
+    folder = tmp_path_factory.mktemp("recorded")
+    return Recorded(folder / "monday", beginning(HEXAGON, 8.3, folder / "original"))
 
 
 def test_ctrl_c_ends_the_recording_with_status_0_and_a_summary(recorded: Recorded) -> None:
     assert recorded.status == 0, recorded.text
-    assert f"{recorded.bag}: " in recorded.text and "53 windows of 10 pushes" in recorded.text
+    assert f"{recorded.bag}: " in recorded.text and "25 windows of 4 pushes" in recorded.text
 
 
 def test_a_recorded_replay_has_the_windows_of_the_original(recorded: Recorded) -> None:
-    original, copy = read_recording(HEXAGON), read_recording(recorded.bag)
-    assert copy.rig is not None and copy.rig.to_record() == load_rig_for([HEXAGON]).to_record()
-    expected, found = find_windows(original, load_rig_for([HEXAGON])), find_windows(copy, copy.rig)
+    original, copy = read_recording(recorded.original), read_recording(recorded.bag)
+    assert copy.rig is not None and copy.rig.to_record() == load_rig_for([recorded.original]).to_record()
+    expected, found = find_windows(original, load_rig_for([recorded.original])), find_windows(copy, copy.rig)
     assert [(w.push_id, w.index, w.start, w.end) for w in found] == [
         (w.push_id, w.index, w.start, w.end) for w in expected
     ]
 
 
 def test_every_message_is_unchanged_and_logged_when_it_arrived(recorded: Recorded) -> None:
-    original, copy = open_bag(HEXAGON), open_bag(recorded.bag)
+    original, copy = open_bag(recorded.original), open_bag(recorded.bag)
     for topic in ("/slider/pose", "/pusher/pose", "/pusher/wrench", TEMPERATURE):
         sent, got = list(original.messages([topic])), list(copy.messages([topic]))
         assert [message.data for message in got] == [message.data for message in sent]
@@ -122,7 +123,7 @@ def test_qos_and_definitions_are_those_of_the_publishers(recorded: Recorded) -> 
 def test_rosbags_reads_it(recorded: Recorded) -> None:
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     with rosbag2.Reader(recorded.bag) as reader:
-        assert reader.message_count == sum(1 for _ in reader.messages()) > 4000
+        assert reader.message_count == sum(1 for _ in reader.messages()) > 2000
 
 
 def test_the_topics_are_saved(recorded: Recorded) -> None:
@@ -131,8 +132,8 @@ def test_the_topics_are_saved(recorded: Recorded) -> None:
 
 def test_diagnostics_have_the_state_and_the_figures(recorded: Recorded) -> None:
     assert recorded.waiting["state"] == "waiting for messages" and recorded.waiting["windows"] == "-"
-    assert recorded.last["state"] == "recording" and recorded.last["pushes"] == "10"
-    assert recorded.last["slider samples"] == "1878"
+    assert recorded.last["state"] == "recording" and recorded.last["pushes"] == "4"
+    assert recorded.last["slider samples"] == str(len(read_recording(recorded.original).slider.stamp))
     assert float(recorded.last["slider rate"]) == pytest.approx(100.0, rel=0.01)
     assert 0.5 < float(recorded.last["share of contact"]) < 0.8
     assert recorded.identity == ("/push_recorder: recording", "hex")
@@ -140,7 +141,7 @@ def test_diagnostics_have_the_state_and_the_figures(recorded: Recorded) -> None:
 
 def test_push_replay_plays_it(recorded: Recorded) -> None:
     count = sum(1 for _ in open_bag(recorded.bag).messages())
-    with replaying(free_domain(), recording=recorded.bag, rate=20.0, wait_for_subscribers=0.0) as replay:
+    with hosting_replay(free_domain(), recording=recorded.bag, rate=20.0, wait_for_subscribers=0.0) as replay:
         assert f"finished: published {count} messages" in replay.wait_for_text("finished: published")
 
 

@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 import ros_harness as harness
 from geometry_msgs.msg import PoseWithCovariance
+from hosted_nodes import hosted_node
 from synthetic import square_pushes
 
 from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
@@ -58,7 +59,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ask(folder: Path) -> Iterator[Ask]:
     """A function from changes of the usual request to the response."""
     domain = harness.free_domain()
-    running = harness.node_process("predict_server", domain=domain, params={"models": [str(folder)]})
+    running = hosted_node("predict_server", domain=domain, params={"models": [str(folder)]})
     with running, harness.ros_context(domain) as node:
         client = node.create_client(RolloutPushes, "rollout_pushes")
         yield lambda **change: harness.call(client, request(**change))

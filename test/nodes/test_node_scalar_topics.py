@@ -35,7 +35,7 @@ from ros_harness import free_domain, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float32, Float64, Float64MultiArray, String
-from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
+from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay
 
 from msg_adapters.residual_schema import RESIDUAL_TYPE
 from push_predictor.errors import RequestError
@@ -54,7 +54,7 @@ from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import load_evidence
-from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
+from push_predictor.simulation.rig_simulator import Sensors, SimulationSpec, random_pushes, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -78,8 +78,9 @@ def float64(value: float) -> bytes:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Pushes with a scalar that jumps ten times a second, one that starts late and has a stamp, and a rare one."""
     folder, rng = tmp_path_factory.mktemp("scalars"), np.random.default_rng(0)
-    plan = random_pushes(10, [0.03], 0.02, rng)
-    write_recording(folder / "pushes", simulate(SimulationSpec("rect1", "abs", plan, name="pushes")))
+    plan = random_pushes(8, [0.03], 0.02, rng)
+    few = Sensors(rate=50.0, wrench_rate=50.0)  # samples, which the nodes receive one by one
+    write_recording(folder / "pushes", simulate(SimulationSpec("rect1", "abs", plan, name="pushes", sensors=few)))
     bag = open_bag(folder / "pushes")
     messages = [
         (m.topic, m.type, m.log_time, m.data) for m in bag.messages() if "pusher" in m.topic or "slider" in m.topic
@@ -91,7 +92,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for at in np.arange(0.4 * lasts, lasts, 1.0):
         time = begin + int(at * SECOND)
         messages.append((ROD, "sensor_msgs/msg/Temperature", time + 10**6, stamped(time, [20.0 + rng.normal(), 0.0])))
-    for at in np.arange(0.3, lasts, 7.0):
+    for at in np.arange(0.3, lasts, 4.0):
         messages.append((HUMIDITY, "std_msgs/msg/Float32", begin + int(at * SECOND), float32(rng.normal())))
     for at in np.arange(0.2, lasts, 0.13):
         time, load = begin + int(at * SECOND), [0.0, 0.0, 0.0, 0.0, rng.normal(), 0.0]
@@ -131,7 +132,7 @@ class Watched:
             status = Status(node)
             status.wait_for_first()
             self.before = status.message
-            with replaying(domain, recording=recording, rate=8.0):
+            with hosting_replay(domain, recording=recording, rate=8.0):
                 process.wait_for_text(WRITTEN, 90.0)
             status.wait_for("state", "waiting for samples")
             assert process.stop() == 0, process.text()

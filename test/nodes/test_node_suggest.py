@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from hosted_nodes import hosted_node
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from synthetic import square_pushes
@@ -55,7 +56,7 @@ def ask(folder: Path) -> Iterator[Ask]:
     """A function from the fields of a request to the response."""
     domain = harness.free_domain()
     params = {"models": [str(folder)], "default_model": "gp"}
-    running = harness.node_process("predict_server", domain=domain, params=params)
+    running = hosted_node("predict_server", domain=domain, params=params)
     with running, harness.ros_context(domain) as node:
         client = node.create_client(SuggestPushes, "suggest_pushes")
         yield lambda **fields: harness.call(client, SuggestPushes.Request(**{"count": 3, **fields}))

@@ -30,6 +30,7 @@ from typing import Any
 import pytest
 import ros_harness as harness
 from action_msgs.msg import GoalStatus
+from hosted_nodes import hosted_node
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from made_up_traces import made_up_trace, pushes, slippery
@@ -114,7 +115,7 @@ def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
 ) -> None:
     before = names(drifting)
     first = server.trace(drifting, covariates=[])
-    worker = server.held(first)
+    worker = server.held(first, "motion")  # it has written something by then
     status, result = server.trace(tmp_path / "other").end()
     assert status == GoalStatus.STATUS_ABORTED and not result.success and result.error_code == result.BUSY
     assert "one at a time" in result.message and "deployed" in result.message
@@ -224,13 +225,13 @@ def test_goal_without_data_uses_those_of_a_running_validator(server: Server, dri
 
 def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:
     before = names(drifting)
-    with server_of(place / "deployed.pushmodel", trace_alpha=0.05) as server:
+    with server_of(place / "deployed.pushmodel", hosted_node, trace_alpha=0.05) as server:
         harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE)))
         assert not server.trace(drifting).accepted
         harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE)))
         goal = server.trace(drifting, covariates=[])
         worker = server.held(goal)
-        assert server.process.stop(signal.SIGINT) == 0
+        assert server.process.stop() == 0
         assert harness.wait_until(lambda: not Path(f"/proc/{worker}").exists(), 30.0)
         status, result = goal.end()
         assert status == GoalStatus.STATUS_ABORTED and "the node ends" in result.message

@@ -119,13 +119,10 @@ def node_process(
 
     ros_args follow --ros-args as they are, such as "-r", "slider/pose:=/vicon/pose". params: name to value.
     """
-    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *ros_args]
-    if namespace:
-        command += ["-r", f"__ns:={namespace}"]
-    for name, value in (params or {}).items():
-        command += ["-p", f"{name}:={json.dumps(str(value) if isinstance(value, Path) else value)}"]
+    arguments = node_arguments(*ros_args, namespace=namespace, params=params)
+    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *arguments]
     if executable == "predict_server":
-        ModelRegistry().load_all(map(str, (params or {}).get("models", ())))  # keeps tables, as `train` does
+        keep_tables(params)
     with tempfile.TemporaryDirectory(prefix="push_node_") as folder:
         log = Path(folder) / "output.txt"
         with log.open("wb") as output:
@@ -137,6 +134,19 @@ def node_process(
             yield process
         finally:
             _end(process)
+
+
+def keep_tables(params: Mapping[str, Any] | None) -> None:
+    """Compute and keep the tables of the models of a server, as `train` does."""
+    ModelRegistry().load_all(map(str, (params or {}).get("models", ())))
+
+
+def node_arguments(*ros_args: str, namespace: str | None = None, params: Mapping[str, Any] | None = None) -> list[str]:
+    """The words after --ros-args: ros_args as they are, then namespace and parameters."""
+    words = [*ros_args, *(["-r", f"__ns:={namespace}"] if namespace else [])]
+    for name, value in (params or {}).items():
+        words += ["-p", f"{name}:={json.dumps(str(value) if isinstance(value, Path) else value)}"]
+    return words
 
 
 def node_environment(domain: int) -> dict[str, str]:

@@ -88,9 +88,12 @@ class Server:
         children = [int(pid) for task in tasks for pid in task.read_text().split()]
         return [pid for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
 
-    def held(self, goal: Goal) -> int:
-        """The process of a trace at work, stopped: it does not end by itself, however long the test takes."""
-        assert goal.reached("motion")
+    def held(self, goal: Goal, stage: str = "") -> int:
+        """The process of a trace at work, stopped: it does not end by itself, however long the test takes.
+
+        stage: that it has reached; by default it has only started, which takes little processor time.
+        """
+        assert goal.reached(stage) if stage else harness.wait_until(lambda: bool(self.workers()))
         (worker,) = self.workers()
         os.kill(worker, signal.SIGSTOP)
         return worker
@@ -125,11 +128,12 @@ class Goal:
 
 
 @contextlib.contextmanager
-def server_of(model: Path, **params: Any) -> Iterator[Server]:
+def server_of(model: Path, start: Any = harness.node_process, **params: Any) -> Iterator[Server]:
+    """A running server; start: `hosted_node` for one in this process."""
     params = {"models": [str(model)], **params}
     with (
         harness.reserved_domain() as domain,
-        harness.node_process("predict_server", domain=domain, params=params) as process,
+        start("predict_server", domain=domain, params=params) as process,
         harness.ros_context(domain) as node,
     ):
         server = Server(process, node, domain)

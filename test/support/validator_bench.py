@@ -22,9 +22,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from hosted_nodes import HostedNode, hosted_node
 from rclpy.node import Node
 from ros_harness import REPOSITORY, START_TIMEOUT, NodeProcess, acquaint, call, node_process, wait_until
 from std_srvs.srv import Trigger
@@ -33,7 +35,9 @@ from synthetic import rows, wrench_rows
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.store.model_file import load_model
+from push_predictor.nodes import push_replay
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import taken
 from push_predictor.recordings.write import write_recording
 from push_predictor_interfaces.srv import Burst
 
@@ -49,9 +53,23 @@ def replaying(
     domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
 ) -> Iterator[NodeProcess]:
     """Run push_replay, which waits for subscribers."""
-    params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
-    with node_process("push_replay", *ros_args, domain=domain, params=params) as process:
+    with node_process("push_replay", *ros_args, domain=domain, params=_of_replay(recording, rate, more)) as process:
         yield process
+
+
+@contextmanager
+def hosting_replay(
+    domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
+) -> Iterator[HostedNode]:
+    """The same in this process, without the check of the recording: both take a second of processor time."""
+    params = _of_replay(recording, rate, more)
+    unchecked = patch.object(push_replay, "LARGEST_CHECKED", 0)
+    with unchecked, hosted_node("push_replay", *ros_args, domain=domain, params=params) as node:
+        yield node
+
+
+def _of_replay(recording: Path, rate: float, more: dict[str, Any]) -> dict[str, Any]:
+    return {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
 
 
 def beginning(source: Path, seconds: float, path: Path) -> Path:
@@ -61,12 +79,14 @@ def beginning(source: Path, seconds: float, path: Path) -> Path:
     slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
     end = slider.stamp[0] + round(seconds * 1e9)
     streams = {"slider": rows(slider, slider.stamp < end), "pusher": rows(pusher, pusher.stamp < end)}
-    write_recording(path, replace(recording, **streams, wrench=wrench_rows(wrench, wrench.stamp < end)))
+    scalars = {name: taken(stream, stream.stamp < end) for name, stream in recording.scalars.items()}
+    wrench = wrench_rows(wrench, wrench.stamp < end)
+    write_recording(path, replace(recording, **streams, wrench=wrench, scalars=scalars))
     return path
 
 
 def play_some(node: Node, messages: int) -> None:
-    """Let a paused replay publish its first messages, once its subscribers are there."""
+    """Let a paused replay publish its next messages, once its subscribers are there."""
     client = node.create_client(Burst, "push_replay/burst")
     acquaint(node, "push_replay")  # a repeated call would publish twice as many
     request = Burst.Request(num_messages=messages)

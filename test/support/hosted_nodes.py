@@ -1,0 +1,107 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nodes in the test's own process, with their real start, executor, middleware and end.
+
+A process of its own takes a second of processor time: it is for tests of signals, of files and of what several nodes
+do together.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from ros_harness import START_TIMEOUT, keep_tables, node_arguments, wait_until
+
+from push_predictor.nodes.predict_server import PredictServer, start_server
+from push_predictor.nodes.push_replay import PushReplay
+from push_predictor.nodes.push_validator import PushValidator
+from push_predictor.nodes.runtime import Stop, _Life
+from push_predictor.resources import share_path
+
+PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}  # as main() of a replay
+NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
+    "predict_server": (lambda stop: PredictServer(), start_server, {}),
+    "push_replay": (PushReplay, None, PROFILES),
+    "push_validator": (PushValidator, None, {}),
+}
+
+
+class HostedNode:
+    """A node that a thread of this process spins; what ROS logs goes to a file."""
+
+    def __init__(self, life: _Life, stop: Stop, log: Path) -> None:
+        self._life, self._stop, self._log = life, stop, log
+        self._status: int | None = None
+        self.pid = os.getpid()
+
+    def text(self) -> str:
+        """Everything logged so far."""
+        return self._log.read_text(errors="replace")
+
+    def wait_for_text(self, text: str, timeout: float = START_TIMEOUT) -> str:
+        """Wait until it has logged `text`; returns everything logged. Raises AssertionError otherwise."""
+        assert wait_until(lambda: text in self.text(), timeout), f"{text!r} was not logged:\n{self.text()}"
+        return self.text()
+
+    def stop(self) -> int:
+        """End the node as a signal would; returns the status that its process would have."""
+        if self._status is None:
+            self._stop.request()
+            self._status = self._life.end()
+        return self._status
+
+
+@contextmanager
+def hosted_node(
+    executable: str,
+    *ros_args: str,
+    domain: int,
+    namespace: str | None = None,
+    params: Mapping[str, Any] | None = None,
+) -> Iterator[HostedNode]:
+    """As `node_process`, one at a time. Leaving ends the node, and raises what made it fail."""
+    make_node, start, environment = NODES[executable]
+    if executable == "predict_server":
+        keep_tables(params)
+    environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **environment}
+    stop, arguments = Stop(), ["--ros-args", *node_arguments(*ros_args, namespace=namespace, params=params)]
+    with _stderr_in_file() as log, patch.dict(os.environ, environment):
+        life = _Life(executable, make_node, stop, arguments, start)
+        life.begin()
+        node = HostedNode(life, stop, log)
+        try:
+            yield node
+        finally:
+            assert node.stop() == 0, log.read_text()
+
+
+@contextmanager
+def _stderr_in_file() -> Iterator[Path]:
+    """Redirect the file descriptor, which ROS writes its log to."""
+    before = os.dup(2)
+    with tempfile.NamedTemporaryFile(prefix="hosted_node_") as output:
+        os.dup2(output.fileno(), 2)
+        try:
+            yield Path(output.name)
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+            os.write(2, Path(output.name).read_bytes())  # for pytest's report of a failure
