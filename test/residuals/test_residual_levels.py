@@ -57,7 +57,14 @@ def deployed() -> PushModel:
 @pytest.fixture
 def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computing responses takes most of the time."""
-    library = [mechanism for mechanism in LIBRARY if mechanism.name in FEW]
+    in_library(monkeypatch, *FEW)
+
+
+def in_library(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """These mechanisms alone are searched for, and steps are taken among them."""
+    library = [mechanism for mechanism in LIBRARY if mechanism.name in names]
+    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", library)
+    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
@@ -100,7 +107,6 @@ def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushMode
     assert found.terms[0].p_value < 0.002
 
 
-@pytest.mark.usefixtures("a_library_of_three")
 def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
     """Two pushes with an outlying covariate and outlying outcomes gain much, and prove little."""
     table = pushes(60, 3)
@@ -151,9 +157,9 @@ def test_effect_that_only_some_contacts_show_is_an_error_of_the_mechanics(
 def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
     always = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), -0.12)
     earlier = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), before)
-    table = pushes(150, 1, earlier) if before else pushes(150, 1)
+    table = pushes(100, 1, earlier) if before else pushes(100, 1)
     model = train_model(table, square_rig(), "analytical", name="deployed")
-    found = motion_effects(model, evidence_of(model, pushes(120, 8, always)), 0.01, ["elapsed_time"])
+    found = motion_effects(model, evidence_of(model, pushes(100, 8, always)), 0.01, ["elapsed_time"])
     (term,) = found.terms
     assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
 
@@ -188,15 +194,18 @@ def with_gap(table: PushTable) -> PushTable:
     return replace(table, outcomes=outcomes, covariates={**table.covariates, "contact_gap": gap})
 
 
-@pytest.mark.usefixtures("a_library_of_three")
-def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome() -> None:
+def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """With single windows of its pushes training shows no gap without the window's own noise."""
-    training, later = with_gap(pushes(120, 1)), with_gap(pushes(120, 7))
+    training, later = with_gap(pushes(100, 1)), with_gap(pushes(100, 7))
     model = train_model(training, square_rig(), "analytical", name="deployed")
     single = replace(model, training=training.take(np.unique(training.push_id, return_index=True)[1]))
     names = ["contact_gap", "elapsed_time"]
-    same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
-    unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
+    with monkeypatch.context() as patch:
+        in_library(patch, *FEW)
+        same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
+        unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
     assert not same.terms and not same.uncompared
     assert not unknown.terms and unknown.uncompared == ("contact_gap",)
     with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
@@ -208,7 +217,7 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
             ["contact_gap"],
             inside=outside,
         )
-    plain = replace(training, outcomes=pushes(120, 1).outcomes)
+    plain = replace(training, outcomes=pushes(100, 1).outcomes)
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
     assert term.best.covariate == "contact_gap"
