@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pushes are integrated less finely than for a prediction: errors of 0.1 % are far below the noise of these tests."""
+"""Pushes are integrated and simulated less finely than for a user: the errors are far below these tests' noise."""
 
 from __future__ import annotations
 
@@ -20,10 +20,20 @@ from collections.abc import Iterator
 
 import pytest
 
+from push_predictor.simulation import dynamics
+
 
 @pytest.fixture(scope="module", autouse=True)
 def coarse_integration() -> Iterator[None]:
     """A displacement by the analytical model takes a fifth of the time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_simulation() -> Iterator[None]:
+    """A simulated recording takes half the steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dynamics, "TRAVEL_STEP", 2.0 * dynamics.TRAVEL_STEP)
         yield
