@@ -29,6 +29,7 @@ from push_predictor.cli import main
 from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text, map_covariates
 from push_predictor.evaluation.report.maps import fine_cells, push_map
+from push_predictor.evaluation.report.page import SECTIONS
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
@@ -124,6 +125,7 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", SECTIONS[:1])  # the maps
     monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)  # the text is checked, not the pictures
     monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)
     monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)

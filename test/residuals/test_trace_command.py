@@ -48,7 +48,7 @@ SECTION_5 = {
 
 @pytest.fixture(scope="module", autouse=True)
 def a_library_of_two() -> Iterator[None]:
-    """Which mechanisms are searched for, and in which steps, is no matter of the command, and takes most of the time."""
+    """The search and the steps take most of the time, and the command does not depend on their mechanisms."""
     few = [mechanism for mechanism in LIBRARY if mechanism.name in ("contact_friction", "pressure_spread")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
