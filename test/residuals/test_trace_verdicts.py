@@ -59,14 +59,14 @@ from push_predictor.simulation.spec import SimulationSpec
 pytestmark = pytest.mark.slow
 
 
-def spec(seed: int, pushes: int = 45) -> SimulationSpec:
+def spec(seed: int, pushes: int) -> SimulationSpec:
     plan = random_pushes(pushes, (0.02,), travel=0.014, rng=np.random.default_rng(seed))
     return SimulationSpec("rect1", "delrin", plan, seed=seed, surface_seed=1, slider_seed=1, turn_spread=3.0)
 
 
 @cache
-def learnt(mean: MeanChoice = "zero") -> PushModel:
-    recording = simulate(spec(1, 60))
+def learnt(mean: MeanChoice = "zero", pushes: int = 60) -> PushModel:
+    recording = simulate(spec(1, pushes))
     assert recording.rig is not None
     table = windows_to_table(find_windows(recording, recording.rig))
     options = TrainingOptions(n_train=150, mean=mean)
@@ -89,8 +89,8 @@ def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
 
 
-def loaded(changes: Changes, faults: Faults) -> LoadedData:
-    recording = simulate(replace(spec(2), changes=changes, faults=faults))
+def loaded(changes: Changes, faults: Faults, pushes: int = 45) -> LoadedData:
+    recording = simulate(replace(spec(2, pushes), changes=changes, faults=faults))
     assert recording.rig is not None
     return LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig)
 
@@ -269,7 +269,7 @@ def test_the_gap_of_pushes_of_one_window_is_rejected_by_name() -> None:
 @pytest.mark.usefixtures("a_library_of_four")
 def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> None:
     plan = random_pushes(30, (0.06,), travel=0.02, rng=np.random.default_rng(5))
-    fast = simulate(replace(spec(2), pushes=plan))
+    fast = simulate(replace(spec(2, len(plan)), pushes=plan))
     assert fast.rig is not None
     result = trace_json(trace(learnt(), LoadedData(cut_again([fast], fast.rig), (fast,), fast.rig)))
     (shift,) = result["input_shift"]
@@ -286,7 +286,7 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
-    found = trace(learnt("mechanics"), loaded(slippery, Faults()), covariates=["elapsed_time"])
+    found = trace(learnt("mechanics", 80), loaded(slippery, Faults(), 60), covariates=["elapsed_time"])
     (effect,) = found.effects
     assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "session")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1
