@@ -37,7 +37,7 @@ from push_predictor.types import Array
 
 pytestmark = pytest.mark.slow
 
-TABLE = noisy_pushes(60)
+TABLE = noisy_pushes(36)
 
 
 def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:
@@ -87,16 +87,16 @@ def test_pushes_far_apart_share_little_and_equal_pushes_all() -> None:
 
 
 def test_a_sparse_model_has_nearly_the_features_of_a_dense_one() -> None:
-    table = noisy_pushes(150)
+    table = noisy_pushes(75)
     push = some()
-    dense, sparse = (features_of(trained("vhgp", table, inducing=m), push) for m in (None, 120))
+    dense, sparse = (features_of(trained("vhgp", table, inducing=m), push) for m in (None, 60))
     np.testing.assert_allclose(
         np.sum(sparse.values**2, axis=2).mean(axis=0), np.sum(dense.values**2, axis=2).mean(axis=0), rtol=0.3
     )
 
 
 def test_a_prior_model_has_about_the_variance_of_its_draws() -> None:
-    model, push = trained("prior", empty_table()), some(200)
+    model, push = trained("prior", empty_table()), some()
     found, moments = features_of(model, push), model.predictor.moments(push)
     drawn = (moments.covariance - moments.process_covariance) / found.noise_sd[:, :, None] / found.noise_sd[:, None]
     ratio = squares(found.values).mean(axis=0) / drawn.mean(axis=0)

@@ -24,6 +24,7 @@ from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
+from push_predictor.design import batch
 from push_predictor.design.batch import (
     CHOSEN_OF_PRIOR,
     FIRST,
@@ -49,6 +50,13 @@ from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def a_quarter_of_the_pushes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time is proportional to the candidates, and to the pushes that matter."""
+    monkeypatch.setattr(batch, "CANDIDATES", batch.CANDIDATES // 4)
+    monkeypatch.setattr(batch, "MATTER", batch.MATTER // 4)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +96,10 @@ class TestCandidates:
         found = candidate_pushes(learnt, Limits(excluded=((0.0, excluded),)), 256)
         assert found.shape == (256, 3) and found[:, 1].min() > excluded
 
-    def test_an_outline_of_which_hardly_anything_is_left_is_refused(self, learnt: PushModel) -> None:
+    def test_an_outline_of_which_hardly_anything_is_left_is_refused(
+        self, learnt: PushModel, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("push_predictor.design.candidates.MOST_DRAWN", 2**13)
         slits = tuple((k / 1000 + 1e-9, (k + 1) / 1000 - 1e-9) for k in range(1000))
         with pytest.raises(RequestError, match=r"excluded.*leave more of the outline"):
             candidate_pushes(learnt, Limits(excluded=slits), 1024)
@@ -147,7 +158,7 @@ class TestSuggestedPushes:
         assert not np.array_equal(chosen.inputs[0], expected[7])
         assert _spread_evenly(known, 2) == [7, 8]
         assert _spread_evenly(few_pushes(FIRST), 2) == [None, None]
-        assert _spread_evenly(few_pushes(7, mean="mechanics"), 2) == [None, None]
+        assert _spread_evenly(few_pushes(4, mean="mechanics"), 2) == [None, None]
 
     def test_of_a_prior_model_are_spread_evenly_from_the_sixth_on(self, untrained: PushModel) -> None:
         short = Limits(travel=0.004)
@@ -155,11 +166,11 @@ class TestSuggestedPushes:
         found = suggest_pushes(untrained, 8, short).inputs
         np.testing.assert_array_equal(found[CHOSEN_OF_PRIOR:], expected[CHOSEN_OF_PRIOR:8])
         assert not np.array_equal(found[:CHOSEN_OF_PRIOR], expected[:CHOSEN_OF_PRIOR])
-        many = train_model(noisy_pushes(260, windows_per_push=1), square_rig(), "prior", name="many")
+        many = train_model(noisy_pushes(batch.CANDIDATES + 4, windows_per_push=1), square_rig(), "prior", name="many")
         assert _spread_evenly(many, 2) == [4, 5]  # after its last candidate the sequence starts again
 
     def test_are_where_the_model_was_not_trained(self) -> None:
-        known = train_model(one_side(noisy_pushes(200)), square_rig(), "gp", name="one side")
+        known = train_model(one_side(noisy_pushes(90)), square_rig(), "gp", name="one side")
         found = suggest_pushes(known, 5, Limits(angle=(-1.0, 1.0)))
         assert np.mean(found.inputs[:, 2] < 0.0) >= 0.8
         assert 0.0 < found.variance_left[-1] < found.variance_left[0] < 1.0
@@ -199,7 +210,7 @@ class TestSuggestedPushes:
         assert noise[0, 1, 2, 0] == 0.0
 
     def test_the_windows_of_a_learnt_model_correlate_as_its_residuals_do(self) -> None:
-        known = train_model(drifting_pushes(60), square_rig(), "gp", name="shared")
+        known = train_model(drifting_pushes(40), square_rig(), "gp", name="shared")
         tried = courses(known, np.array([[0.02, 0.1, 0.3]]), 0.012)
         found = information_of(known, tried, Push(tried.inputs[0], np.full(3, 0.2), {}))
         noise = found.noise[0].reshape(3, 3, 3, 3)

@@ -60,11 +60,11 @@ PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "re
 
 
 @pytest.fixture(scope="module", autouse=True)
-def one_layout() -> Iterator[None]:
-    """Pictures are laid out once (a second time only moves ticks) and are small."""
+def no_layout() -> Iterator[None]:
+    """Pictures are not laid out, which only moves ticks and labels, and are small."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.reporting.canvas.LAYOUTS", 1)
-        patch.setattr("push_predictor.reporting.canvas.DPI", 80)  # half the usual: sizes in pixels prove nothing
+        patch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
+        patch.setattr("push_predictor.reporting.canvas.DPI", 40)  # sizes in pixels prove nothing
         yield
 
 

@@ -35,7 +35,7 @@ from push_predictor.simulation.changes import Changes, Moment
 from push_predictor.simulation.rig_simulator import push_outcomes
 from push_predictor.simulation.sensors import Faults
 
-SMALL = Size(training=25, least=20, most=24, rows=40, kind="analytical")
+SMALL = Size(training=12, least=8, most=10, rows=30, kind="analytical")
 
 
 def gain_of(value: float, high: float = -0.01, traced: float = -0.5) -> dict[str, Any]:
@@ -334,7 +334,7 @@ def test_equal_seeds_draw_equal_truths() -> None:
 
 def test_a_fifth_of_the_effects_on_the_motion_have_a_second_one() -> None:
     spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 8)
-    drawn = [drawn_for(spec, "library", np.random.default_rng(seed)) for seed in range(300)]
+    drawn = [drawn_for(spec, "library", np.random.default_rng(seed)) for seed in range(150)]
     both = [one for one in drawn if one.second]
     motion = CYCLE.count("library") + CYCLE.count("outside")
     assert 0.15 < len(both) / len(drawn) * CYCLE.count("library") / motion < 0.25

@@ -28,8 +28,9 @@ from push_predictor.simulation.rig_simulator import simulate
 
 @pytest.fixture
 def short(monkeypatch):
-    for name, pushes in (("PLAIN", 2), ("TRACED", 3), ("REST", 2)):
-        monkeypatch.setattr(hidden, name, pushes)
+    """Few pushes, and short ones."""
+    for name, value in (("PLAIN", 2), ("TRACED", 3), ("REST", 2), ("TRAVEL", 0.012)):
+        monkeypatch.setattr(hidden, name, value)
 
 
 @pytest.fixture

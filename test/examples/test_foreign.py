@@ -69,9 +69,10 @@ TRUTH_KEYS = {
 
 @pytest.fixture(autouse=True, scope="module")
 def _coarse_steps() -> Iterator[None]:
-    """Coarser steps than for a recording, to save time."""
+    """Coarser steps than for a recording, and fewer judged pushes, to save time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(engine, "STEPS", 100)
+        patch.setattr(engine, "STEPS", 50)
+        patch.setattr(recording, "JUDGED", 3)
         yield
 
 

@@ -16,11 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from examples import measured_recordings
 from examples.measured_recordings import Split, joined, mcube_splits, mlab_splits
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.read import read_recording, require_rig
@@ -32,6 +35,14 @@ from push_predictor.recordings.windows.push_window import PushWindow, WindowOpti
 
 WOOD = "mlab wood_patch to wood_30_90_30_30_30_90"
 MIXED = "30_90_30_30_30_90"  # of the log that joins two sessions, the later one first
+
+
+@pytest.fixture(scope="module", autouse=True)
+def logs_are_read_once() -> Iterator[None]:
+    """Their splits differ in where they are cut."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_recordings, "_read", cache(measured_recordings._read))
+        yield
 
 
 @pytest.fixture(scope="module")

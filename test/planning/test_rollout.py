@@ -19,6 +19,7 @@ from __future__ import annotations
 import gc
 import weakref
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -52,6 +53,7 @@ AT_REST = np.zeros(3)
 PUSH = [0.02, 0.1, 0.2, 1.0]  # five windows
 
 
+@cache
 def rows(count: int = 40) -> PushTable:
     """Windows of 0.2 s, five a push."""
     rng = np.random.default_rng(0)
@@ -80,6 +82,12 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
     heading = np.array([heading_of(contact, angle, model)])
     moved = model.predictor.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
     return displaced(AT_REST[None], heading, moved)[0]
+
+
+@pytest.fixture
+def coarse_integration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of distributions."""
+    monkeypatch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
 
 
 @pytest.mark.slow
@@ -130,6 +138,7 @@ def test_rollout_is_equivariant_under_translation_and_rotation() -> None:
     np.testing.assert_allclose(there.covariance, covariance_in_world(here.covariance, np.full(2, 2.0)), atol=1e-15)
 
 
+@pytest.mark.usefixtures("coarse_integration")
 def test_uncertainty_of_the_start_is_propagated() -> None:
     """A slider whose heading is off goes off sideways by the way it is pushed; without noise that is all."""
     model, sd = model_with(CERTAIN), np.array([1e-3, 2e-3, 0.02])
@@ -142,6 +151,7 @@ def test_uncertainty_of_the_start_is_propagated() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.05)
 
 
+@pytest.mark.usefixtures("coarse_integration")
 def test_uncertainty_grows_with_each_push() -> None:
     rolled = rollout(model_with(NOISY), AT_REST, CERTAIN, [PUSH] * 4, 2000)
     spread = np.linalg.det(rolled.covariance)
@@ -181,6 +191,7 @@ def test_slider_does_not_move_after_the_tip_has_passed() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_integration")
 def test_unimodal_steps_can_lead_to_two_modes() -> None:
     """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
@@ -259,6 +270,7 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_integration")
 def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     turned = [

@@ -299,7 +299,13 @@ def test_log_without_a_count_is_read_to_its_end(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("line", "text", "words"),
-    [(5, "1 2", ":5: '1 2', expected force: 3"), (4, "1.5", ":4: 1.5"), (4, "-1", ":4"), (2, "a b", ":2: 'a b'")],
+    [
+        (5, "1 2", ":5: '1 2', expected force: 3"),
+        (5, "1 nan 2", ":5: '1 nan 2', expected force: 3 finite"),
+        (4, "1.5", ":4: 1.5"),
+        (4, "-1", ":4"),
+        (2, "a b", ":2: 'a b'"),
+    ],
 )
 def test_invalid_line_of_a_log_is_rejected_with_its_number(tmp_path: Path, line: int, text: str, words: str) -> None:
     lines = ["1", *_mlab_push()]

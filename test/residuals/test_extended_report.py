@@ -29,6 +29,7 @@ from push_predictor.cli import main
 from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text, map_covariates
 from push_predictor.evaluation.report.maps import fine_cells, push_map
+from push_predictor.evaluation.report.page import SECTIONS
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
@@ -124,8 +125,10 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", SECTIONS[:1])  # the maps
     monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)  # the text is checked, not the pictures
     monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)
+    monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
     model = extended(base, slippery(), grain())
     save_model(model, tmp_path / "extended.pushmodel")
     save_model(base, tmp_path / "plain.pushmodel")
@@ -141,5 +144,9 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
 
 
 @pytest.mark.slow
-def test_readme_figure_accepts_an_extended_model(base: PushModel, table: PushTable, tmp_path: Path) -> None:
+def test_readme_figure_accepts_an_extended_model(
+    base: PushModel, table: PushTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
+    monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
     assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

@@ -46,7 +46,7 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 BLOCKS, ROWS = 40, 3  # a block
-FEW = ("contact_friction", "pressure_spread", "centre_of_friction", "body_anisotropy", "tilted_surface", "inertia")
+FEW = ("contact_friction", "pressure_spread", "tilted_surface")
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +55,16 @@ def deployed() -> PushModel:
 
 
 @pytest.fixture
-def a_library_of_six(monkeypatch: pytest.MonkeyPatch) -> None:
+def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computing responses takes most of the time."""
-    library = [mechanism for mechanism in LIBRARY if mechanism.name in FEW]
+    in_library(monkeypatch, *FEW)
+
+
+def in_library(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """These mechanisms alone are searched for, and steps are taken among them."""
+    library = [mechanism for mechanism in LIBRARY if mechanism.name in names]
+    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", library)
+    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
@@ -83,7 +90,7 @@ def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_proje
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("a_library_of_six")
+@pytest.mark.usefixtures("a_library_of_three")
 def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(deployed: PushModel) -> None:
     """Twelve recordings of 40 pushes at level 0.2: if that is the rate, seven or more have a probability of 0.4 %."""
     count = 0
@@ -144,13 +151,14 @@ def test_effect_that_only_some_contacts_show_is_an_error_of_the_mechanics(
     assert needed_terms([acting, second], found) == ((acting, second) if everywhere else (acting,))
 
 
+@pytest.mark.usefixtures("a_library_of_three")
 @pytest.mark.parametrize("before, session", [(0.0, True), (-0.12, False)])
 def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
     always = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), -0.12)
     earlier = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), before)
-    table = pushes(150, 1, earlier) if before else pushes(150, 1)
+    table = pushes(100, 1, earlier) if before else pushes(100, 1)
     model = train_model(table, square_rig(), "analytical", name="deployed")
-    found = motion_effects(model, evidence_of(model, pushes(120, 8, always)), 0.01, ["elapsed_time"])
+    found = motion_effects(model, evidence_of(model, pushes(100, 8, always)), 0.01, ["elapsed_time"])
     (term,) = found.terms
     assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
 
@@ -185,14 +193,18 @@ def with_gap(table: PushTable) -> PushTable:
     return replace(table, outcomes=outcomes, covariates={**table.covariates, "contact_gap": gap})
 
 
-def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome() -> None:
+def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """With single windows of its pushes training shows no gap without the window's own noise."""
-    training, later = with_gap(pushes(120, 1)), with_gap(pushes(120, 7))
+    training, later = with_gap(pushes(100, 1)), with_gap(pushes(100, 7))
     model = train_model(training, square_rig(), "analytical", name="deployed")
     single = replace(model, training=training.take(np.unique(training.push_id, return_index=True)[1]))
     names = ["contact_gap", "elapsed_time"]
-    same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
-    unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
+    with monkeypatch.context() as patch:
+        in_library(patch, *FEW)
+        same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
+        unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
     assert not same.terms and not same.uncompared
     assert not unknown.terms and unknown.uncompared == ("contact_gap",)
     with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
@@ -204,7 +216,7 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
             ["contact_gap"],
             inside=outside,
         )
-    plain = replace(training, outcomes=pushes(120, 1).outcomes)
+    plain = replace(training, outcomes=pushes(100, 1).outcomes)
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
     assert term.best.covariate == "contact_gap"
@@ -227,7 +239,7 @@ def test_training_is_compared_as_a_whole_with_pushes_everywhere_and_with_pushes_
         assert len(baseline_of(deployed, mechanics, inputs).evidence.table) == len(deployed.training)
 
 
-@pytest.mark.usefixtures("a_library_of_six")
+@pytest.mark.usefixtures("a_library_of_three")
 def test_name_of_a_mechanism_stays_if_the_ladder_explains_what_it_leaves(
     deployed: PushModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -45,7 +45,7 @@ UNIT = {"clock_offset": 0.0025, "frame_rotation": 0.002, "frame_shift": 0.00025}
 
 
 def spec(seed: int, contact_friction: float = 0.25) -> SimulationSpec:
-    pushes = random_pushes(PUSHES, (0.02, 0.05), rng=np.random.default_rng(seed))
+    pushes = random_pushes(PUSHES, (0.02, 0.05), travel=0.025, rng=np.random.default_rng(seed))
     return SimulationSpec("rect1", "plywood", pushes, seed=seed, contact_friction=contact_friction)
 
 

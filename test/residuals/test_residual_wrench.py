@@ -235,7 +235,7 @@ def test_windows_without_a_force_give_no_finding() -> None:
 
 @pytest.mark.slow
 def test_drift_of_the_force_in_a_recording_is_found_and_leaves_the_motion_unchanged() -> None:
-    pushes = random_pushes(60, (0.02, 0.05), rng=np.random.default_rng(3))
+    pushes = random_pushes(40, (0.02, 0.05), travel=0.02, rng=np.random.default_rng(3))
     recording = simulate(SimulationSpec("rect1", "delrin", pushes, seed=3))
     rig, wrench = recording.rig, recording.wrench
     assert rig is not None and wrench is not None

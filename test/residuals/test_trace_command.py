@@ -20,7 +20,7 @@ import contextlib
 import io
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ from synthetic import square_rig
 
 import push_predictor.residuals.trace as trace_module
 from push_predictor.cli import main
+from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table_file import write_table
@@ -43,6 +44,17 @@ SECTION_5 = {
     "verdict", "effect_present", "channel", "kind", "covariates", "equivalent", "undecided", "motion_model_changed",
     "effects", "before", "refit", "after", "gain", "minimum_detectable", "remaining", "experiment", "tested", "pushes",
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def a_library_of_two() -> Iterator[None]:
+    """The search and the steps take most of the time, and the command does not depend on their mechanisms."""
+    few = [mechanism for mechanism in LIBRARY if mechanism.name in ("contact_friction", "pressure_spread")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
+        patch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", few)
+        patch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -272,7 +272,9 @@ def test_pushes_after_a_rest_settle_whether_time_or_distance_drives(
 ) -> None:
     """Both grow together until the rest: afterwards time is ahead, and contact friction has followed it."""
     few = [each for each in LIBRARY if each.name in ("contact_friction", "pressure_spread", "tilted_surface")]
-    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)  # responses take most of it
+    for module in ("candidates.enumeration", "selection.further_steps"):  # responses and steps take most of the time
+        monkeypatch.setattr(f"push_predictor.residuals.{module}.LIBRARY", few)
+    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
     first, further = pushes(150, 5), pushes(20, 6)
     time = np.concatenate([first.covariates["elapsed_time"], 1500.0 + 0.2 * further.covariates["elapsed_time"]])
     count = np.concatenate([first.covariates["push_index"], 150.0 + further.covariates["push_index"]])

@@ -1,0 +1,39 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pushes are integrated and simulated less finely than for a user: the errors are far below these tests' noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from push_predictor.simulation import dynamics
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """A displacement by the analytical model takes a fifth of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_simulation() -> Iterator[None]:
+    """A simulated recording takes half the steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dynamics, "TRAVEL_STEP", 2.0 * dynamics.TRAVEL_STEP)
+        yield
