@@ -57,11 +57,10 @@ def plain(figure):
 
 
 def equal_scales(figure):
-    one, other = figure.subplots(1, 2)
-    one.plot([0, 1], [0, 3])
-    one.set_aspect("equal")
-    other.plot([0, 1e6], [0, 1])
-    other.set(title="title", xlabel="label")
+    axes = figure.subplots(2, 2)
+    for ax, reach in zip(axes[0], (1.0, 1e3), strict=True):
+        ax.plot([0, reach], [0, reach])
+        ax.set(title="title", xlabel="label", ylabel="label", aspect="equal")
 
 
 def colour_bar(figure):
@@ -75,7 +74,7 @@ def colour_bar(figure):
 def test_what_is_spared_moves_nothing(paint, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def places():
         seen = []
-        draw(tmp_path / "picture.png", (3.0, 2.0), lambda figure: (seen.append(figure), paint(figure)))
+        draw(tmp_path / "picture.png", (3.0, 3.0), lambda figure: (seen.append(figure), paint(figure)))
         shown = [*seen[0].axes, *(text for text in seen[0].findobj(Text) if text.get_text())]
         return np.array([artist.get_window_extent().extents for artist in shown])
 
