@@ -32,6 +32,7 @@ from rclpy.qos import (
 )
 
 from push_predictor.errors import RequestError
+from push_predictor.recordings.bag.fast_yaml import load_fast
 
 DEPTH = 1000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -122,7 +123,7 @@ def _policy(field: str, policy: Any, value: Any) -> Any:
 
 def _was_latched(recorded: str) -> bool:
     try:
-        profiles = yaml.safe_load(recorded)
+        profiles = load_fast(recorded)
     except yaml.YAMLError:
         return False  # written by another tool; the default suits every subscriber except late ones
     if not isinstance(profiles, list) or not profiles:

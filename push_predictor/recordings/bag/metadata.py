@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.fast_yaml import load_fast
 from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
 
 METADATA_FILE = "metadata.yaml"
@@ -70,7 +71,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
 
     path = folder / METADATA_FILE
     try:
-        information = yaml.safe_load(path.read_text(encoding="utf-8"))[_ROOT]
+        information = load_fast(path.read_text(encoding="utf-8"))[_ROOT]
         files = tuple(str(name) for name in information.get("relative_file_paths") or ())
     except FileNotFoundError:
         return BagMetadata()
@@ -85,7 +86,7 @@ def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Map
     import yaml
 
     try:
-        information = yaml.safe_load(metadata["rosbag2"]["serialized_metadata"])
+        information = load_fast(metadata["rosbag2"]["serialized_metadata"])
     except (*_DAMAGED, yaml.YAMLError):
         return {}
     return _records(information.get("custom_data")) if isinstance(information, dict) else {}
