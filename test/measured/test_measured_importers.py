@@ -180,14 +180,22 @@ def test_the_bag_of_aluminium_run_1_equals_its_text_files(
     assert bag.wrench is not None and np.any(bag.wrench.torque != 0.0)
 
 
-def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(measured_data: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def bags(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[ImportReport, dict[str, Recording]]:
+    """The bags of mlab, by name."""
     pytest.importorskip("rosbags")
-    report = import_source("rosbag1", [measured_data / "mlab" / "bags"], tmp_path)
-    assert report.recordings == 6
+    report = import_source("rosbag1", [measured_data / "mlab" / "bags"], tmp_path_factory.mktemp("bags"))
+    return report, {path.name: read_recording(path) for path in report.written}
+
+
+def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(
+    bags: tuple[ImportReport, dict[str, Recording]],
+) -> None:
+    report, recordings = bags
+    assert report.recordings == len(recordings) == 6
     assert sum("header stamps lead the bag's clock by 36" in line for line in report.repaired) == 5
     assert any("2812 of 2896 frames" in line for line in report.dropped)
-    for path in report.written:
-        recording = read_recording(path)
+    for recording in recordings.values():
         assert recording.rig is None
         span = recording.pusher.stamp[-1] - recording.pusher.stamp[0]
         assert recording.wrench is not None and abs(recording.wrench.stamp[0] - recording.pusher.stamp[0]) < 1e9
@@ -196,11 +204,9 @@ def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(measured_data: P
 
 @pytest.mark.parametrize("name", ["robot_push_many", "robot_push_many_3", "robot_push_many_5", "robot_push_many_6_sd"])
 def test_in_the_mlab_bags_the_force_on_the_pusher_opposes_its_motion(
-    measured_data: Path, tmp_path: Path, name: str
+    bags: tuple[ImportReport, dict[str, Recording]], name: str
 ) -> None:
-    pytest.importorskip("rosbags")
-    report = import_source("rosbag1", [measured_data / "mlab" / "bags" / f"{name}.bag"], tmp_path)
-    recording = read_recording(report.written[0])
+    recording = bags[1][name]
     assert recording.wrench is not None
     grid = np.arange(recording.pusher.stamp[0], recording.pusher.stamp[-1], 100_000_000)
     tip = np.column_stack(
