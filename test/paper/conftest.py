@@ -12,14 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The figures are drawn coarsely. test_report draws and lays out figures as a reader sees them."""
+"""Figures are drawn and models are trained coarsely: the claims are tested, test_report and test/models the rest."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 
 import pytest
+
+from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum
+from push_predictor.reporting.canvas import STYLE
+from push_predictor.types import Array
 
 # rosdep has no key of diptest: `colcon test` goes without the tests of the paper's package, unless pip installed it.
 collect_ignore_glob = [] if find_spec("diptest") else ["test_*.py"]
@@ -27,8 +32,23 @@ collect_ignore_glob = [] if find_spec("diptest") else ["test_*.py"]
 
 @pytest.fixture(scope="module", autouse=True)
 def coarse_pictures() -> Iterator[None]:
-    """Draw few pixels and do not fit axes and labels: of a section's time each takes a quarter."""
+    """Draw few pixels and no ticks, and do not fit axes and labels: each takes a good part of a section's time."""
     with pytest.MonkeyPatch.context() as coarse:
         coarse.setattr("push_predictor.reporting.canvas.DPI", 40)
         coarse.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
+        for part in ("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"):
+            coarse.setitem(STYLE, part, False)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_models() -> Iterator[None]:
+    """End every search for hyperparameters after few steps: half of a section's time."""
+    whole = Descent.run
+
+    def begun(self: Descent, cost: Cost, first: Array) -> Minimum:
+        return whole(replace(self, most_iterations=3), cost, first)
+
+    with pytest.MonkeyPatch.context() as coarse:
+        coarse.setattr(Descent, "run", begun)
         yield
