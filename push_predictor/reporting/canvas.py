@@ -29,7 +29,6 @@ from push_predictor.recordings.atomic import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
@@ -87,14 +86,15 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
         raise PushPredictorError(
             f"{path.name}: pictures need matplotlib ({error}); pip install 'push_predictor[report]'"
         ) from None
+    image = io.BytesIO()
     with rc_context(STYLE):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         paint(figure)
         _place_empty_labels(figure)
         _lay_out(figure)
-        canvas.draw()
-    write_whole(path, _png(canvas))
+        canvas.print_png(image, pil_kwargs={"compress_level": COMPRESSION})
+    write_whole(path, image.getvalue())
     return path
 
 
@@ -118,15 +118,6 @@ def _lay_out(figure: Figure) -> None:
 def _settles_at_once(figure: Figure) -> bool:
     """Whether a second layout would move nothing by as much as a pixel."""
     return all(axes.get_aspect() == "auto" and axes.get_label() != "<colorbar>" for axes in figure.axes)
-
-
-def _png(canvas: FigureCanvasAgg) -> bytes:
-    """The figure as drawn, without the alpha channel: it is opaque."""
-    from PIL import Image
-
-    image, pixels = io.BytesIO(), np.asarray(canvas.buffer_rgba())[..., :3]
-    Image.fromarray(pixels).save(image, "png", compress_level=COMPRESSION, dpi=(DPI, DPI))
-    return image.getvalue()
 
 
 def outside_legend(

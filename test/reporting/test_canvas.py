@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 from repository import REPOSITORY
 
 from push_predictor.reporting.canvas import STYLE, draw, outside_legend
@@ -75,6 +74,8 @@ def test_what_is_spared_moves_nothing(paint, tmp_path: Path, monkeypatch: pytest
     def places():
         seen = []
         draw(tmp_path / "picture.png", (3.0, 3.0), lambda figure: (seen.append(figure), paint(figure)))
+        from matplotlib.text import Text  # not at the top: every worker imports every test
+
         shown = [*seen[0].axes, *(text for text in seen[0].findobj(Text) if text.get_text())]
         return np.array([artist.get_window_extent().extents for artist in shown])
 
