@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Figures are drawn and models are trained coarsely: the claims are tested, test_report and test/models the rest."""
+"""Models are trained coarsely: the claims are tested here, training in test/models."""
 
 from __future__ import annotations
 
@@ -23,22 +23,10 @@ from importlib.util import find_spec
 import pytest
 
 from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum
-from push_predictor.reporting.canvas import STYLE
 from push_predictor.types import Array
 
 # rosdep has no key of diptest: `colcon test` goes without the tests of the paper's package, unless pip installed it.
 collect_ignore_glob = [] if find_spec("diptest") else ["test_*.py"]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_pictures() -> Iterator[None]:
-    """Draw few pixels and no ticks, and do not fit axes and labels: each takes a good part of a section's time."""
-    with pytest.MonkeyPatch.context() as coarse:
-        coarse.setattr("push_predictor.reporting.canvas.DPI", 40)
-        coarse.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
-        for part in ("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"):
-            coarse.setitem(STYLE, part, False)
-        yield
 
 
 @pytest.fixture(scope="module", autouse=True)
