@@ -110,7 +110,9 @@ def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp_path: Path) -> None:
     study, pushes = made_up_study(tmp_path), next(iter(made_up_corpus().sets.values()))
-    four = section(study).findings[0]
+    made = section(study)
+    four = made.findings[0]
+    assert made.pictures[0].path.is_file()
     assert four.verdict == "holds in part" and "4 of the paper's 16 sets, shapes: 2, surfaces: 2" in four.sentence
     every = replace(study.simulated, sets=dict.fromkeys(FULL.pairs, pushes))
     assert section(replace(study, simulated=every)).findings[0].verdict == "holds"
