@@ -58,7 +58,7 @@ LONGEST = {  # files that take a quarter of a minute or more; half of the worker
 }  # fmt: skip
 
 
-DRAWN_AS_FOR_READERS = {"test_canvas", "test_report"}
+DRAWN_AS_FOR_READERS = {"test_canvas", "test_report", "test_paper_report"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
