@@ -22,7 +22,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Collection, Generator, Mapping
+from collections.abc import Collection, Generator, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from threadpoolctl import threadpool_limits
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+from push_predictor.reporting import canvas
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of node processes: two threads cost several times the CPU time
 # The tests start some hundred processes. Without its bytecode on disk each would compile the package again: 0.3 s.
@@ -55,6 +56,9 @@ LONGEST = {  # files that take a quarter of a minute or more; half of the worker
     "test_node_push_alarm", "test_node_push_replay", "test_node_push_validator", "test_node_scalar_topics",
     "test_node_trace_residual",
 }  # fmt: skip
+
+
+DRAWN_AS_FOR_READERS = {"test_canvas", "test_report", "test_paper_report"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -112,6 +116,18 @@ def _places(needs_ros: Mapping[Path, bool], slow: Collection[Path]) -> dict[Path
         for (early, _), group in groups.items()
         for index, path in enumerate(group)
     }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_pictures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Draw few pixels and no ticks, and do not fit axes and labels: that is three quarters of the time of a figure."""
+    with pytest.MonkeyPatch.context() as coarse:
+        if request.module.__name__ not in DRAWN_AS_FOR_READERS:
+            coarse.setattr(canvas, "DPI", 40)
+            coarse.setattr(canvas, "LAYOUTS", 0)
+            for part in ("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"):
+                coarse.setitem(canvas.STYLE, part, False)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -34,9 +34,10 @@ from benchmarks.measured.square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.load import distinct_pushes, load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array
@@ -85,12 +86,15 @@ def mcube_tables(data: Path, work: Path, quick: bool) -> None:
 def leave_one_run_out(runs: Sequence[Path], kind: str, fit: bool = False, stride: float | None = None) -> list[Fold]:
     """For every run, a model trained on the other runs. stride (s) overlaps training windows; test windows tile."""
     rig, options = load_rig_for(runs), WindowOptions(stride=stride)
-    return [
-        trained(
-            load_data([other for other in runs if other != run], None, options), load_data([run]), rig, kind, fit=fit
-        )
-        for run in runs
-    ]
+    tiled = [load_data([run]) for run in runs]
+    training = tiled if stride is None else [load_data([run], None, options) for run in runs]
+    return [trained(_without(k, runs, training), tiled[k], rig, kind, fit=fit) for k in range(len(runs))]
+
+
+def _without(k: int, runs: Sequence[Path], tables: Sequence[PushTable]) -> PushTable:
+    """The tables of all runs but one, as load_data gives them: it would read each run again for every other."""
+    others = [j for j in range(len(runs)) if j != k]
+    return concatenate(distinct_pushes([runs[j].name for j in others], [tables[j] for j in others]))
 
 
 def mean_speed(recording: Recording, start: int, end: int) -> float:

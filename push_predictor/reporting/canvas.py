@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 DPI = 160
 LEGEND_PAD = 0.12  # inches around a legend outside the axes
-LAYOUTS = 2  # the first moves colour bars, which changes their ticks: the second fits
+LAYOUTS = 2  # the first moves colour bars and axes of equal scales, which changes their ticks: the second fits
+COMPRESSION = 3  # of PNG: a file of a tenth more bytes than by the default of 6, in half the time
 UNITS = (1e3, 1e3, 180.0 / np.pi)  # factors from m, m, rad to mm, mm, deg
 UNIT_NAMES = ("mm", "mm", "deg")
 SYMBOLS = (r"$\Delta x$", r"$\Delta y$", r"$\Delta\theta$")
@@ -52,6 +53,7 @@ STYLE = {
     "axes.spines.right": False,
     "axes.grid": False,
     "axes.axisbelow": True,
+    "axes.titley": 1.0,  # where it would be put; to find that out, the ticks are computed again in each layout
     "grid.color": "#e4e4e4",
     "hatch.color": "#c4c4c4",
     "hatch.linewidth": 0.6,
@@ -89,19 +91,33 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         paint(figure)
+        _place_empty_labels(figure)
         _lay_out(figure)
-        canvas.print_png(image)
+        canvas.print_png(image, pil_kwargs={"compress_level": COMPRESSION})
     write_whole(path, image.getvalue())
     return path
+
+
+def _place_empty_labels(figure: Figure) -> None:
+    """Give axis labels without text any place: it is searched for among the ticks, in each layout and when drawn."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if not axis.get_label_text():
+                axis.set_label_coords(0.5, 0.5)
 
 
 def _lay_out(figure: Figure) -> None:
     """Fix the positions of the axes. `savefig` would draw the whole figure once more for each layout."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        for _ in range(LAYOUTS):
+        for _ in range(min(LAYOUTS, 1) if _settles_at_once(figure) else LAYOUTS):
             engine.execute(figure)
         figure.set_layout_engine("none")
+
+
+def _settles_at_once(figure: Figure) -> bool:
+    """Whether a second layout would move nothing by as much as a pixel."""
+    return all(axes.get_aspect() == "auto" and axes.get_label() != "<colorbar>" for axes in figure.axes)
 
 
 def outside_legend(

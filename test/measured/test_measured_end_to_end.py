@@ -146,31 +146,27 @@ def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: d
 # --- through the real nodes -------------------------------------------------------------------------------------
 
 
+Served = tuple[int, dict[str, PushModel]]
+
+
 @pytest.fixture(scope="module")
-def models(imported: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, PushModel]]:
-    """A folder of model files, and the models: of each block from runs 1 to 3, of the hexagon from its own push."""
-    made: dict[str, PushModel] = {}
-    for block in ("Al", "St"):
-        runs = block_runs(imported, block)[:3]
-        table, rig = load_data(runs), load_rig_for(runs)
-        for kind in ("vhgp", "gp", "analytical"):
-            made[f"{block}_{kind}"] = train_model(table, rig, kind, name=f"{block}_{kind}")
-    path = imported[HEXAGON]
-    table = load_data([path], None, WindowOptions(stride=0.01))
-    made["hex_analytical"] = train_model(table, load_rig_for([path]), "analytical", name="hex_analytical")
-    folder = tmp_path_factory.mktemp("models")
-    for name, model in made.items():
+def served(
+    request: pytest.FixtureRequest, imported: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Served]:
+    """The ROS domain in which a predict_server serves the models of a slider, and these models by name.
+
+    Of a block from runs 1 to 3, of the hexagon from its own push.
+    """
+    slider, kinds = request.param
+    runs = [imported[HEXAGON]] if slider == "hex" else block_runs(imported, slider)[:3]
+    table = load_data(runs, None, WindowOptions(stride=0.01 if slider == "hex" else None))
+    rig, folder, domain = load_rig_for(runs), tmp_path_factory.mktemp("models"), free_domain()
+    models = {f"{slider}_{kind}": train_model(table, rig, kind, name=f"{slider}_{kind}") for kind in kinds}
+    for name, model in models.items():
         save_model(model, folder / f"{name}.pushmodel")
-    return folder, made
-
-
-@pytest.fixture(scope="module")
-def server(models: tuple[Path, dict[str, PushModel]]) -> Iterator[int]:
-    """The ROS domain in which a predict_server serves all of them."""
-    domain = free_domain()
-    with node_process("predict_server", domain=domain, params={"models": [str(models[0])]}) as process:
+    with node_process("predict_server", domain=domain, params={"models": [str(folder)]}) as process:
         process.wait_for_text("active with the models", 120.0)
-        yield domain
+        yield domain, models
 
 
 def validated_online(recording: Path, names: list[str], domain: int, out: Path) -> None:
@@ -186,17 +182,16 @@ def validated_online(recording: Path, names: list[str], domain: int, out: Path) 
 
 
 # Of each block a run that its models were not trained on, or that turns as no other; a ROS 1 bag; a single window.
-LONG = [pytest.param(run, marks=pytest.mark.long) for run in ("St_block_metal_3", BAG)]
+AL, ST, HEX = ("Al", ("vhgp", "analytical")), ("St", ("vhgp", "gp", "analytical")), ("hex", ("analytical",))
+LONG = [
+    pytest.param(slider, run, marks=pytest.mark.long)
+    for slider, run in ((AL, BAG), (ST, "St_block_metal_3"), (HEX, HEXAGON))
+]
 
 
-@pytest.mark.parametrize("run", ["Al_block_metal_4", HEXAGON, *LONG])
+@pytest.mark.parametrize(("served", "run"), [(AL, "Al_block_metal_4"), *LONG], indirect=["served"])
 def test_online_validation_of_a_measured_push_equals_offline(
-    measured_data: Path,
-    imported: dict[str, Path],
-    models: tuple[Path, dict[str, PushModel]],
-    server: int,
-    tmp_path: Path,
-    run: str,
+    measured_data: Path, imported: dict[str, Path], served: Served, tmp_path: Path, run: str
 ) -> None:
     if run == BAG:
         pytest.importorskip("rosbags")
@@ -204,13 +199,13 @@ def test_online_validation_of_a_measured_push_equals_offline(
         (recording,) = import_source("rosbag1", [source], tmp_path / "bag").written
     else:
         recording = imported[run]
-    block = "hex" if run == HEXAGON else "St" if run.startswith("St") else "Al"
-    names = ["hex_analytical"] if block == "hex" else [f"{block}_{kind}" for kind in ("vhgp", "gp", "analytical")]
-    validated_online(recording, names, server, tmp_path)
+    domain, models = served
+    names = list(models)
+    validated_online(recording, names, domain, tmp_path)
     for name in names:
         suffix = "" if name == names[0] else f"_{name}"
         online = json.loads((tmp_path / f"windows{suffix}.json").read_text())
-        windows, comparison = validate_recording(models[1][name], recording)
+        windows, comparison = validate_recording(models[name], recording)
         assert online["refused"] == [] and online["unanswered"] == 0
         for ours, theirs in zip(window_log(windows, comparison), online["windows"], strict=True):
             assert all(ours[key] == theirs[key] for key in ("push_id", "window", "start", "end"))

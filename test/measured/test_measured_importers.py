@@ -37,6 +37,7 @@ from push_predictor.recordings.table_file import read_table
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.types import Array
 
+BAGS = ("robot_push_many", "robot_push_many_6_sd", "robot_push_steelblock")
 RUNS = [f"{block}_block_metal_{run}" for block in ("Al", "St") for run in (1, 2, 3, 4)]
 
 
@@ -180,27 +181,34 @@ def test_the_bag_of_aluminium_run_1_equals_its_text_files(
     assert bag.wrench is not None and np.any(bag.wrench.torque != 0.0)
 
 
-def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(measured_data: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def bags(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[ImportReport, dict[str, Recording]]:
+    """Three bags of mlab, by name: reading all six takes three seconds."""
     pytest.importorskip("rosbags")
-    report = import_source("rosbag1", [measured_data / "mlab" / "bags"], tmp_path)
-    assert report.recordings == 6
-    assert sum("header stamps lead the bag's clock by 36" in line for line in report.repaired) == 5
+    sources = [measured_data / "mlab" / "bags" / f"{name}.bag" for name in BAGS]
+    report = import_source("rosbag1", sources, tmp_path_factory.mktemp("bags"))
+    return report, {path.name: read_recording(path) for path in report.written}
+
+
+def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(
+    bags: tuple[ImportReport, dict[str, Recording]],
+) -> None:
+    report, recordings = bags
+    assert report.recordings == len(recordings) == 3
+    assert sum("header stamps lead the bag's clock by 36" in line for line in report.repaired) == 3
     assert any("2812 of 2896 frames" in line for line in report.dropped)
-    for path in report.written:
-        recording = read_recording(path)
+    for recording in recordings.values():
         assert recording.rig is None
         span = recording.pusher.stamp[-1] - recording.pusher.stamp[0]
         assert recording.wrench is not None and abs(recording.wrench.stamp[0] - recording.pusher.stamp[0]) < 1e9
         assert span > 30e9
 
 
-@pytest.mark.parametrize("name", ["robot_push_many", "robot_push_many_3", "robot_push_many_5", "robot_push_many_6_sd"])
+@pytest.mark.parametrize("name", BAGS[:2])
 def test_in_the_mlab_bags_the_force_on_the_pusher_opposes_its_motion(
-    measured_data: Path, tmp_path: Path, name: str
+    bags: tuple[ImportReport, dict[str, Recording]], name: str
 ) -> None:
-    pytest.importorskip("rosbags")
-    report = import_source("rosbag1", [measured_data / "mlab" / "bags" / f"{name}.bag"], tmp_path)
-    recording = read_recording(report.written[0])
+    recording = bags[1][name]
     assert recording.wrench is not None
     grid = np.arange(recording.pusher.stamp[0], recording.pusher.stamp[-1], 100_000_000)
     tip = np.column_stack(

@@ -62,11 +62,11 @@ def test_the_exact_mirror_is_as_good(square_pushes):
 
 @pytest.mark.parametrize("flip", [flip for flip in FLIPS if flip not in (AS_CONTRACT, MIRRORED)])
 def test_every_other_flip_is_far_off(square_pushes, flip):
-    assert flipped_score(square_pushes, flip) > 1.6
+    assert flipped_score(tuple(values[::7] for values in square_pushes), flip) > 1.6
 
 
 def test_the_fit_finds_even_pressure_in_the_measured_square(square_pushes):
-    inputs, duration, outcomes = (values[::7] for values in square_pushes)
+    inputs, duration, outcomes = (values[::21] for values in square_pushes)
     textbook = AnalyticalPush(shape_outline("rect1"), 0.00475)
     fitted = fit_analytical(textbook, inputs, duration, outcomes)
     assert fitted.support.length == pytest.approx(textbook.support.length, rel=0.05)

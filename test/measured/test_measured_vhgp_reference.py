@@ -105,7 +105,7 @@ def test_the_stored_posterior_is_reproduced(measured_data: Path, n: int, output:
     np.testing.assert_allclose(whole.outcome_variance, fields["Vy_test"], rtol=1e-8)
 
 
-@pytest.mark.parametrize(("n", "slack"), [(100, 0.03), (500, 0.0)])
+@pytest.mark.parametrize(("n", "slack"), [(100, 0.03), pytest.param(500, 0.0, marks=pytest.mark.long)])
 def test_trained_on_the_same_rows_our_density_is_as_good(measured_data: Path, n: int, slack: float) -> None:
     square, reference = load_square(measured_data), load_reference(measured_data, n)
     # The reference has dy to the right.

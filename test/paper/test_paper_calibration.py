@@ -354,7 +354,7 @@ def test_speed_claim_is_not_decided_with_an_empty_group() -> None:
 
 def study(tmp_path: Path, simulated: Corpus, *measured: Corpus) -> Study:
     return Study(
-        replace(QUICK, sizes=(20, 200), seeds=1), Work(tmp_path / "work", cores=1), tmp_path, simulated, measured, {}
+        replace(QUICK, sizes=(20,), seeds=1), Work(tmp_path / "work", cores=1), tmp_path, simulated, measured, {}
     )
 
 

@@ -230,7 +230,8 @@ def test_fast_pushes_make_up_nearly_all_of_the_spread():
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    return made_up_study(tmp_path_factory.mktemp("study"))
+    made = made_up_study(tmp_path_factory.mktemp("study"), replace(PLAN, sizes=(20,)))
+    return replace(made, simulated=made_up_corpus(speeds=(0.02, 0.1)))  # fast pushes take the analytical model long
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.data import section, speed_counts
+from push_predictor_paper.claims.data import grid_finding, section, speed_counts
 from push_predictor_paper.data.corpus import Corpus, PushSet, learning_set, learning_spec, pair_number, travel_for
 from push_predictor_paper.data.repetitions import FEWEST, grid_spec, repeat_push
 from push_predictor_paper.estimate import Estimate, over_seeds
@@ -62,8 +62,9 @@ def test_sets_share_slider_or_table_but_not_their_noise() -> None:
 
 
 @pytest.mark.slow
-def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path) -> None:
-    small = replace(QUICK, pushes=6, speeds=(0.05, 0.1))
+def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("push_predictor_paper.data.corpus.WINDOWS_PER_PUSH", 1)
+    small = replace(QUICK, pushes=2, speeds=(0.05,))
     kept = learning_set(small, "rect1", "abs", tmp_path)
     again = learning_set(small, "rect1", "abs")
     np.testing.assert_array_equal(kept.table.outcomes, again.table.outcomes)
@@ -109,13 +110,14 @@ def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp_path: Path) -> None:
     study, pushes = made_up_study(tmp_path), next(iter(made_up_corpus().sets.values()))
-    four = section(study).findings[0]
+    made = section(study)
+    four = made.findings[0]
+    assert made.pictures[0].path.is_file()
     assert four.verdict == "holds in part" and "4 of the paper's 16 sets, shapes: 2, surfaces: 2" in four.sentence
     every = replace(study.simulated, sets=dict.fromkeys(FULL.pairs, pushes))
     assert section(replace(study, simulated=every)).findings[0].verdict == "holds"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "repetitions, known, verdict",
     [
@@ -126,14 +128,10 @@ def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp
         (20, 55, "does not hold"),  # 20 repetitions give a Gaussian's deviation to 31 %
     ],
 )
-def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(
-    tmp_path: Path, repetitions: int, known: int, verdict: str
-) -> None:
-    study = made_up_study(tmp_path, replace(PLAN, contacts=11, angle_step=0.75, repetitions=repetitions))
-    grid = study.reference_grid
+def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(repetitions: int, known: int, verdict: str) -> None:
+    grid = made_up_grid(replace(PLAN, contacts=11, angle_step=0.75, repetitions=repetitions))
     few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in grid.cells[known:]]
-    changed = replace(grid, cells=(*grid.cells[:known], *few))
-    assert section(replace(study, grids={"plywood": changed})).findings[1].verdict == verdict
+    assert grid_finding(replace(grid, cells=(*grid.cells[:known], *few))).verdict == verdict
 
 
 def test_sets_of_several_corpora_do_not_hide_each_other(tmp_path: Path) -> None:

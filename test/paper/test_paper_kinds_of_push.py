@@ -24,8 +24,10 @@ import paper_studies
 import pytest
 from push_predictor_paper.claims.repeated_pushes.kinds_of_push import section
 from push_predictor_paper.claims.repeated_pushes.kinds_of_push_rules import (
+    Figure,
     apart,
     draws_together_fans_out,
+    final_spread,
     growth,
     has_modes,
     kinds_of,
@@ -34,7 +36,7 @@ from push_predictor_paper.claims.repeated_pushes.kinds_of_push_rules import (
     to_the_end,
     whole_paths,
 )
-from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions
+from push_predictor_paper.data.repetitions import DRAWS, PATH_POINTS, RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.study import Study
 
@@ -129,6 +131,13 @@ def test_relative_spread_and_growth_of_rays_are_what_they_were_made_with() -> No
     assert growth(paths) == pytest.approx(1.0, abs=0.02)
     assert growth(rays(3e-4, 4000, power=2.0)) == pytest.approx(1.0 / half, abs=0.05)
     assert growth(rays(3e-4, 4000, power=0.0)) == pytest.approx(half, abs=0.05)
+
+
+@pytest.mark.parametrize("figure", [final_spread, relative_spread, growth])
+def test_resampled_figures_are_those_of_the_paths_drawn(figure: Figure) -> None:
+    paths = rays(3e-4, power=0.5)
+    rows = np.random.default_rng(0).integers(0, len(paths), (DRAWS, len(paths)))
+    np.testing.assert_allclose(resampled(paths, figure)[1], [figure(paths[drawn]) for drawn in rows])
 
 
 @pytest.mark.slow

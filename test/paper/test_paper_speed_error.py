@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study
 from push_predictor_paper.claims.comparison import speed_error
-from push_predictor_paper.claims.comparison.speed_error import captured, rank_correlation, unreliable
+from push_predictor_paper.claims.comparison.speed_error import captured, rank_correlation, spearman, unreliable
 from push_predictor_paper.figures.speed_error import SpeedCurve
 from push_predictor_paper.fits.held_out import (
     FEWEST_PUSHES,
@@ -34,6 +34,7 @@ from push_predictor_paper.fits.held_out import (
     speed_groups,
     within_nmse,
 )
+from scipy.stats import spearmanr
 
 CORPUS = made_up_corpus()
 SPEEDS = np.array([0.02, 0.1, 0.2, 0.4])
@@ -82,6 +83,14 @@ def test_too_few_pushes_decide_nothing():
 def test_growth_at_high_speed_alone_holds_in_part():
     held = windows((1.0, 0.02, 0.2, 0.8))
     assert unreliable(CORPUS, held, curve(held)).verdict == "holds in part"
+
+
+def test_resampled_rank_correlations_are_those_of_repeated_pairs():
+    rng = np.random.default_rng(0)
+    error, speed = np.round(rng.standard_normal(30), 1), rng.integers(0, 4, 30).astype(float)
+    weights = rng.multinomial(30, np.full(30, 1.0 / 30.0), size=5)
+    repeated = [spearmanr(np.repeat(error, w), np.repeat(speed, w)).statistic for w in weights]
+    np.testing.assert_allclose(spearman(error, speed, weights.astype(float)), repeated)
 
 
 def test_the_rank_correlation_knows_no_units_of_speed_s_spread():

@@ -163,21 +163,19 @@ def test_the_simulator_knows_no_model() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay", "push_validator"])
-def test_a_node_starts_without_the_slow_packages_of_scipy(node: str) -> None:
-    """They take 0.6 s to import. A node needs no optimiser, and push_predictor.normal_scores replaces scipy.stats."""
+def test_a_node_starts_without_what_it_needs_later_or_never() -> None:
+    """Slow packages of scipy take 0.6 s to import: no node needs an optimiser or scipy.stats (normal_scores).
+
+    The server needs matrices and special functions for a push outside the table, and readers of recordings for a trace.
+    """
     slow = {"scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.spatial"}
-    check = f"import sys, push_predictor.nodes.{node}; sys.exit(str({slow} & sys.modules.keys() or '') or None)"
-    subprocess.run([sys.executable, "-c", check], check=True, cwd=REPOSITORY)
-
-
-@pytest.mark.slow
-def test_the_server_imports_what_few_requests_need_when_they_need_it() -> None:
-    """Matrices and special functions wait for a push outside the table, readers of recordings for a trace."""
     late = {"scipy.special", "scipy.linalg", "threadpoolctl", "multiprocessing", "mcap", "csv", "sqlite3"}
+    nodes = {"predict_server": slow | late, "push_recorder": slow, "push_replay": slow, "push_validator": slow}
     check = (
-        "import sys; from push_predictor.blas_threads import limit_process; limit_process()\n"
-        f"import push_predictor.nodes.predict_server; sys.exit(str({late} & sys.modules.keys() or '') or None)"
+        "import importlib, sys; from push_predictor.blas_threads import limit_process; limit_process()\n"
+        f"for node, unwanted in {nodes}.items():\n"
+        "    importlib.import_module(f'push_predictor.nodes.{node}')\n"
+        "    if found := unwanted & sys.modules.keys(): sys.exit(f'{node}: {found}')\n"
     )
     subprocess.run([sys.executable, "-c", check], check=True, cwd=REPOSITORY)
 

@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import setuptools
 import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import Package, parse_package
@@ -97,6 +96,8 @@ def package(name: str) -> Package:
 @cache
 def setup_arguments(name: str) -> dict[str, Any]:
     """What setup.py passes to setuptools."""
+    import setuptools  # not at the top: every worker imports every test
+
     given: dict[str, Any] = {}
     before, setuptools.setup = setuptools.setup, given.update
     here = Path.cwd()

@@ -45,7 +45,7 @@ def section(study: Study) -> Section:
     return Section(
         key="data",
         title="The data",
-        findings=(_learning_finding(study, counts), _grid_finding(study.reference_grid)),
+        findings=(_learning_finding(study, counts), grid_finding(study.reference_grid)),
         tables=(*(_corpus_table(corpus) for corpus in study.corpora), _grid_table(study)),
         pictures=(_picture(study, counts),),
         notes=(*NOTES, *(note for corpus in study.corpora for note in corpus.notes)),
@@ -142,7 +142,8 @@ def _learning_verdict(sets: int, poor: int, speeds: int) -> Verdict:
     return "holds" if sets >= PAPER_SETS and not poor else "holds in part"
 
 
-def _grid_finding(grid: RepeatedGrid) -> Finding:
+def grid_finding(grid: RepeatedGrid) -> Finding:
+    """Whether the grid has the paper's size and the deviations of its pushes are known."""
     widths = np.array([_half_width(cell) for cell in grid.seen]).reshape(-1, 3)
     seen = np.array([len(cell.outcomes) >= ENOUGH_SEEN * cell.commanded for cell in grid.seen], dtype=bool)
     given = int(np.sum(seen & (widths <= WELL_KNOWN).all(axis=1)))

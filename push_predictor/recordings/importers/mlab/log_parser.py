@@ -101,7 +101,20 @@ class _Lines:
         count = self.count(f"the number of {what}s")
         if len(self.lines) - self.next < count:
             raise _EndedError
-        return np.array([self.row(width, what) for _ in range(count)]).reshape(-1, width)
+        values = _numbers([words for _, words in self.lines[self.next : self.next + count]], width)
+        if values is None:  # line by line, which names the wrong one
+            return np.array([self.row(width, what) for _ in range(count)]).reshape(-1, width)
+        self.next += count
+        return values
+
+
+def _numbers(rows: list[list[str]], width: int) -> Array | None:
+    """The rows (n, width) as numbers, None unless all are finite."""
+    try:
+        values = np.array(rows, dtype=np.float64).reshape(len(rows), width)
+    except ValueError:
+        return None
+    return values if np.all(np.isfinite(values)) else None
 
 
 def read_log(path: Path, notes: Notes) -> list[LogPush]:

@@ -19,7 +19,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.reporting.canvas import Picture, draw
@@ -107,13 +106,27 @@ def rank_correlation(windows: HeldOut, kind: str) -> Estimate:
     scaled = windows.levelled().error(kind).sum(axis=1)
     pushes, first, push = np.unique(windows.push_id, return_index=True, return_inverse=True)
     error, speed = np.bincount(push, scaled) / np.bincount(push), windows.speeds[windows.group[first]]
-    weights = push_bootstrap(pushes).astype(np.int64)
-    draws = [_spearman(np.repeat(error, w), np.repeat(speed, w)) for w in weights]
-    return of_draws(_spearman(error, speed), np.array(draws))
+    once = np.ones((1, len(pushes)))
+    return of_draws(float(spearman(error, speed, once)[0]), spearman(error, speed, push_bootstrap(pushes)))
 
 
-def _spearman(first: Array, second: Array) -> float:
-    return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])
+def spearman(first: Array, second: Array, weights: Array) -> Array:
+    """Rank correlations (d,) of samples in which each of n pairs occurs as often as its weight (d, n)."""
+    one, other = (_centred(_ranks(values, weights), weights) for values in (first, second))
+    with np.errstate(invalid="ignore"):  # NaN in a draw of one speed
+        squares = np.sum(weights * one**2, axis=1) * np.sum(weights * other**2, axis=1)
+        return np.asarray(np.sum(weights * one * other, axis=1) / np.sqrt(squares))
+
+
+def _ranks(values: Array, weights: Array) -> Array:
+    """Ranks (d, n), of equal values their mean."""
+    different, place = np.unique(values, return_inverse=True)
+    counts = weights @ np.eye(len(different))[place]
+    return np.asarray((np.cumsum(counts, axis=1) - 0.5 * (counts - 1.0))[:, place])
+
+
+def _centred(ranks: Array, weights: Array) -> Array:
+    return np.asarray(ranks - np.sum(weights * ranks, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
 
 
 def _grows(ranks: list[Estimate]) -> Verdict:

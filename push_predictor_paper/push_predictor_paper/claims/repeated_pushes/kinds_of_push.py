@@ -113,7 +113,7 @@ def _growth_finding(kinds: Kinds) -> Finding:
 def _apart_finding(kinds: Kinds) -> Finding:
     ratios = [_ratio(kinds, figure) for figure in (final_spread, relative_spread)]
     narrow, wide = (
-        f"{1e3 * final_spread(paths):.2f} mm ({relative_spread(paths):.0%})"
+        f"{1e3 * float(final_spread(paths)):.2f} mm ({relative_spread(paths):.0%})"
         for paths in (kinds.paths[k][1::2] for k in (kinds.convergent, kinds.divergent))
     )
     return Finding(
@@ -182,10 +182,10 @@ def _json(kinds: Kinds) -> dict[str, Any]:
             "fraction": cell.fraction,
             "angle": cell.angle,
             "repetitions": len(paths),
-            "way": travel(paths[:, -1]),
-            "spread": final_spread(paths),
-            "relative_spread": relative_spread(paths),
-            "growth": growth(paths),
+            "way": float(travel(paths[:, -1])),
+            "spread": float(final_spread(paths)),
+            "relative_spread": float(relative_spread(paths)),
+            "growth": float(growth(paths)),
             "dip_family_wise_p": p.tolist(),
         }
         for cell, paths, p in zip(kinds.cells, kinds.paths, kinds.p, strict=True)

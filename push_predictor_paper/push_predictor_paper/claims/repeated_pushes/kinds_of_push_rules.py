@@ -38,7 +38,7 @@ STILL_TURN = float(np.radians(0.3))  # the tracker's noise, several times over
 STOPPED = 0.05  # of the repetitions: pushes of which more stop early are of tips that slid off
 LEAST_TRAVEL = 0.002  # m: below it the tip grazes, and a spread relative to the distance means little
 LARGEST_STEP = 3.0 * GRID_SPEED * STEP * 1e-9  # m between points of a path: the tip cannot have pushed so far
-Figure = Callable[[Array], float]  # of paths (r, t, 3)
+Figure = Callable[[Array], Array]  # of paths (..., r, t, 3), (...): by their beginning, middle and end
 APART = 2.0  # how much further apart divergent pushes should end than convergent ones
 
 
@@ -87,26 +87,30 @@ def whole_paths(paths: Array) -> Array:
     return np.asarray(paths[steps.max(axis=1) <= LARGEST_STEP])
 
 
-def relative_spread(paths: Array, place: int = -1) -> float:
-    """Spread of paths (r, t, 3) at a place along them over the mean displacement there."""
-    ends = paths[:, place, :2]
-    return float(spread(ends) / travel(ends))
+def relative_spread(paths: Array, place: int = -1) -> Array:
+    """Spread of paths (..., r, t, 3) at a place along them over the mean displacement there, (...)."""
+    ends = paths[..., place, :2]
+    return spread(ends) / travel(ends)
 
 
-def final_spread(paths: Array) -> float:
-    """Spread (m) of the ends of paths (r, t, 3)."""
-    return spread(paths[:, -1, :2])
+def final_spread(paths: Array) -> Array:
+    """Spread (m) of the ends of paths (..., r, t, 3), (...)."""
+    return spread(paths[..., -1, :2])
 
 
-def growth(paths: Array) -> float:
-    """Relative spread at the end over that half-way; above 1 the paths fan out."""
-    return relative_spread(paths) / relative_spread(paths, paths.shape[1] // 2)
+def growth(paths: Array) -> Array:
+    """Relative spread at the end over that half-way, (...); above 1 the paths (..., r, t, 3) fan out."""
+    return relative_spread(paths) / relative_spread(paths, _middle(paths))
 
 
 def resampled(paths: Array, figure: Figure, seed: int = 0) -> tuple[float, Array]:
     """A figure of paths (r, t, 3), and its resamples (DRAWS,) over repetitions."""
     rows = np.random.default_rng(seed).integers(0, len(paths), (DRAWS, len(paths)))
-    return float(figure(paths)), np.array([figure(paths[drawn]) for drawn in rows])
+    return float(figure(paths)), figure(paths[:, [0, _middle(paths), -1]][rows])
+
+
+def _middle(paths: Array) -> int:
+    return int(paths.shape[-2]) // 2
 
 
 def apart(ratios: Sequence[Estimate]) -> Verdict:
@@ -138,11 +142,11 @@ def _modes(paths: Sequence[Array]) -> Array:
     return np.array([p_values(dip(one[:, -1].T), len(one), draws) for one in paths])
 
 
-def spread(ends: Array) -> float:
-    """Root mean square distance of points ends (r, 2) from their mean."""
-    return float(np.sqrt(np.sum(np.var(ends, axis=0, ddof=1))))
+def spread(ends: Array) -> Array:
+    """Root mean square distance of points ends (..., r, 2) from their mean, (...)."""
+    return np.asarray(np.sqrt(np.sum(np.var(ends, axis=-2, ddof=1), axis=-1)))
 
 
-def travel(ends: Array) -> float:
-    """Length of the mean displacement of ends (r, 2 or 3)."""
-    return float(np.hypot(*ends[:, :2].mean(axis=0)))
+def travel(ends: Array) -> Array:
+    """Length of the mean displacement of ends (..., r, 2 or 3), (...)."""
+    return np.asarray(np.linalg.norm(ends[..., :2].mean(axis=-2), axis=-1))

@@ -1,0 +1,51 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The push logs of MLab_EXP: numbers as written, and every wrong line named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.importers.mlab.log_parser import read_log
+from push_predictor.recordings.importers.report import Notes
+
+POSE = "1 2 3 1 0 0 0"
+LINES = ["1", POSE, POSE, "2", "0.5 1e-3 -2", "0.6 1 2", "1", f"0.7 {POSE}"]
+
+
+def log(folder: Path, *changes: tuple[int, str]) -> Path:
+    """A log of one push with some lines changed."""
+    lines = list(LINES)
+    for place, line in changes:
+        lines[place] = line
+    path = folder / "log.txt"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_tables_have_the_numbers_of_their_lines(tmp_path: Path) -> None:
+    (push,) = read_log(log(tmp_path), Notes())
+    np.testing.assert_array_equal(push.force, [[0.5, 1e-3, -2.0], [0.6, 1.0, 2.0]])
+    np.testing.assert_array_equal(push.robot, [[0.7, 1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize("line", ["0.6 1 nan", "0.6 1 inf", "0.6 1", "0.6 1 2 3", "0.6 1 x"])
+def test_a_wrong_line_of_a_table_is_named(tmp_path: Path, line: str) -> None:
+    with pytest.raises(ImportSourceError, match=r"log\.txt:6: '0\.6 1.*', expected force: 3 finite numbers"):
+        read_log(log(tmp_path, (5, line)), Notes())
