@@ -70,6 +70,14 @@ def test_damaged_copy_is_refused_or_predicts_like_the_original(
     assert refused > 0.6 * COPIES
 
 
+def test_rejects_a_whole_file_that_is_followed_by_the_end_of_another(files: dict[str, Path], tmp_path: Path) -> None:
+    """A smaller model that was written over a larger one and did not shorten it."""
+    path = tmp_path / "m.model"
+    path.write_bytes(files["gp"].read_bytes() + files["vhgp"].read_bytes()[-300:-30])
+    with pytest.raises(ModelFileError, match="does not end with the record"):
+        load_model(path)
+
+
 def test_rejects_array_with_a_smaller_declared_size(tmp_path: Path) -> None:
     """One flipped bit turns doubles into singles: half of the bytes are read, and no checksum is compared."""
     path = tmp_path / "m.model"

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from push_predictor.models.mechanics.analytical import ACCURACY
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,
@@ -72,7 +73,8 @@ def test_model_of_every_format_predicts_what_it_did(version: int) -> None:
     assert isinstance(model.predictor, PREDICTORS[version])
     expected = json.loads((FILES / "predictions.json").read_text())[f"format_{version}"]
     found = model.predict_rows(INPUTS, DURATION, COVARIATES)
-    np.testing.assert_allclose(found.mean, expected["mean"], rtol=1e-6, atol=1e-9)
+    learnt_alone = isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.mean is None
+    np.testing.assert_allclose(found.mean, expected["mean"], rtol=1e-6 if learnt_alone else 0.1 * ACCURACY, atol=1e-9)
     np.testing.assert_allclose(found.covariance, expected["covariance"], rtol=1e-6, atol=1e-13)
     np.testing.assert_allclose(found.process_covariance, expected["process_covariance"], rtol=1e-6, atol=1e-13)
 

@@ -28,6 +28,8 @@ from push_predictor.errors import ModelFileError
 
 LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
 ENDING = ".npy"
+END = b"PK\x05\x06" + bytes(4)  # of an archive: how its last record begins
+END_SIZE = 22  # bytes of that record
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -40,7 +42,10 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             raise ModelFileError(f"{path}: a folder, pipe or device is not accepted, give a model file")
         if (size := path.stat().st_size) > LARGEST:
             raise ModelFileError(f"{path}: has {size} bytes, at most {LARGEST} are accepted")
-        with zipfile.ZipFile(io.BytesIO(path.read_bytes())) as archive:
+        data = path.read_bytes()
+        if data[-END_SIZE:].find(END) != 0:  # zipfile reads an archive that is followed by the rest of another file
+            raise ValueError("it does not end with the record that ends an archive")
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
             if unpacked > LARGEST:
                 raise ModelFileError(f"{path}: unpacks to {unpacked} bytes, at most {LARGEST} are accepted")

@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import exp
+from math import exp, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -42,7 +42,6 @@ from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRe
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.tabulated.push_chart import Chart, Whole
-from push_predictor.models.tabulated.single_moments import moments_in_numbers
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.table_sides import Side, table_sides
 from push_predictor.types import Array
@@ -121,7 +120,28 @@ class PredictionTable:
         values = self.spline.at(point[self.columns], box).tolist()
         latent = [max(value, least) for value, least in zip(values[3:6], self.least, strict=True)]
         process = exp(values[6]), exp(values[7]), exp(values[8])
-        return moments_in_numbers(values[:3], latent, process, bounded_one(values[9:]) if len(values) > 9 else None)
+        return _in_numbers(values[:3], latent, process, bounded_one(values[9:]) if len(values) > 9 else None)
+
+
+def _in_numbers(
+    mean: Sequence[float],
+    latent: Sequence[float],
+    process: Sequence[float],
+    correlation: tuple[float, float, float] | None,
+) -> list[float]:
+    """3 numbers of the mean, 9 of the outcome's and 9 of the process covariance, row by row: the same as `covariances`.
+
+    latent, process (3): variances of the functions and of the process. correlation: of outputs 1 and 2, 1 and 3, 2 and
+    3; None where they are independent.
+    """
+    (u, v, w), (p, q, r) = latent, process
+    a, b, c = u + p, v + q, w + r
+    if correlation is None:
+        return [*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r]
+    r12, r13, r23 = correlation
+    pq, pr, qr = r12 * sqrt(p * q), r13 * sqrt(p * r), r23 * sqrt(q * r)
+    ab, ac, bc = pq + r12 * sqrt(u * v), pr + r13 * sqrt(u * w), qr + r23 * sqrt(v * w)
+    return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
 
 
 def tabulate(
