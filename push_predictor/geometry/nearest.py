@@ -77,9 +77,9 @@ def _on_polygon(outline: Outline) -> Nearest:
         most = x * normal_x + y * normal_y - offset
         if most > 0.0 and 0.0 < x * along_x + y * along_y - first < 1.0:
             return x - most * normal_x, y - most * normal_y, normal_x, normal_y, most
-        return anew(x, y)
+        return on_farthest_edge(x, y)
 
-    def anew(x: float, y: float) -> tuple[float, float, float, float, float]:
+    def on_farthest_edge(x: float, y: float) -> tuple[float, float, float, float, float]:
         """On the edge with the largest signed distance, unless a corner is nearest."""
         nonlocal last
         most = -inf

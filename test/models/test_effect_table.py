@@ -135,7 +135,7 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
     ("kind", "case"),
     [
         *[("about nothing", case) for case in ("linear", "step and linear")],
-        ("about mechanics", "linear"),
+        pytest.param("about mechanics", "linear", marks=pytest.mark.long),
         *[("analytical", case) for case in ("linear", "step and linear")],
         pytest.param("fitted", "linear", marks=pytest.mark.long),
     ],

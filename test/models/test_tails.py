@@ -261,7 +261,7 @@ def test_too_few_pushes_and_constant_residuals_have_no_tails() -> None:
 # In models
 
 
-@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+@pytest.mark.parametrize("kind", ["gp", pytest.param("vhgp", marks=pytest.mark.long)])
 def test_intervals_cover_new_pushes_that_share_an_error(kind: str) -> None:
     model, test = trained(kind), shared_errors(400, 7)
     answer = predicted(model, test)

@@ -358,7 +358,7 @@ def study(tmp_path: Path, simulated: Corpus, *measured: Corpus) -> Study:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_section_has_its_tables_and_pictures_for_every_corpus(tmp_path: Path) -> None:
     made = section(study(tmp_path, corpus(), corpus("measured")))
     assert len(made.tables) == 4 + 3 and len(made.findings) == 5 + 4  # speeds: of the simulated set only

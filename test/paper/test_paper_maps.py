@@ -288,7 +288,7 @@ def test_places_are_listed_one_by_one_or_as_a_mirrored_range() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_section_has_both_figures_and_speaks_of_measured_sets_only_in_words(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")

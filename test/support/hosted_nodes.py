@@ -36,7 +36,8 @@ from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.runtime import Stop, _Life
 from push_predictor.resources import share_path
 
-PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}  # as main() of a replay
+# As main() of a replay. Fast DDS reads it once: it counts only where no other node came first in this process.
+PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}
 NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
     "predict_server": (lambda stop: PredictServer(), start_server, {}),
     "push_replay": (PushReplay, None, PROFILES),
@@ -62,7 +63,7 @@ class HostedNode:
         return self.text()
 
     def stop(self) -> int:
-        """End the node as a signal would; returns the status that its process would have."""
+        """End the node as by its own request; returns the status that its process would have."""
         if self._status is None:
             self._stop.request()
             self._status = self._life.end()

@@ -43,7 +43,7 @@ class AnalyticalPredictor(OfMechanics):
         """See Predictor."""
         mean = self.physics.displacement(push.inputs, push.duration)
         covariance = self.covariance[None].repeat(len(mean), axis=0)
-        return Moments(mean, covariance, covariance)
+        return Moments(mean, covariance, covariance.copy())
 
     def with_scalar_mechanics(self) -> AnalyticalPredictor:
         """See Predictor."""

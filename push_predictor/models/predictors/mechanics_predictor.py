@@ -35,7 +35,7 @@ class MechanicsPredictor(OfFittedMechanics):
         """See Predictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
         covariance = self.covariance[None].repeat(len(mean), axis=0)
-        return Moments(mean, covariance, covariance)
+        return Moments(mean, covariance, covariance.copy())
 
     def with_scalar_mechanics(self) -> MechanicsPredictor:
         """See Predictor."""

@@ -185,7 +185,7 @@ def from_nodes(
         matrices = [axis.coarse_to_coefficients(count) for axis, count in zip(axes, nodes.coarse, strict=True)]
         parts += [_along_all(matrices, values) for values in coupling]
     order = [3 * output + part for part in range(3) for output in range(3)] + list(range(9, len(parts)))
-    # In single precision, a millionth of a standard deviation: half the memory.
+    # In single precision: half the memory, with an error that the comparison with the model contains.
     coefficients = np.empty((*np.broadcast_shapes(*(part.shape for part in parts)), len(parts)), dtype=np.float32)
     for place, k in enumerate(order):  # what is constant has one box
         coefficients[..., place] = parts[k]

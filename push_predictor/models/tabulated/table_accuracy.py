@@ -22,7 +22,7 @@ import numpy as np
 
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain
+from push_predictor.models.tabulated.tabulated_domain import FASTEST, TabulatedDomain
 from push_predictor.types import Array
 
 MEAN_TOLERANCE = 1e-3  # predicted standard deviations
@@ -87,9 +87,8 @@ def compared_with(
 
 
 def outside_pushes(model: PushModel, count: int) -> Array:
-    """At most `count` pushes (n, 3) outside the domain, of all contacts and angles, from half to twice its speeds."""
-    speed = model.training.inputs[:, 0]
-    low, high = [0.5 * speed.min(), 0.0, -STEEPEST], [2.0 * speed.max(), 1.0, STEEPEST]
+    """At most `count` pushes (n, 3) outside the domain, of all contacts and angles, and speeds as in a wide table."""
+    low, high = [0.0, 0.0, -STEEPEST], [FASTEST * float(model.training.inputs[:, 0].max()), 1.0, STEEPEST]
     spread = np.random.default_rng(0).uniform(low, high, (20 * count, 3))
     return np.asarray(spread[~model.in_domain(spread)][:count])
 

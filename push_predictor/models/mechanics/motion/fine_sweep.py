@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sweep for small tolerances: steps of fourth order, which are checked the better the less smooth the motion is.
+"""The sweep for small tolerances, in steps of fourth order.
 
 An embedded method estimates the error from the stages of one step, and may miss a kink of the rate between them: where
-slip begins or ends, at a corner, where contact is lost. Where all stages have contacts of one kind there is none, and
-the estimate holds. Other steps are compared with two of half their length, and so are those that follow, until one is
-smooth.
+slip begins or ends, at a corner, where contact is lost. Where all stages have contacts of one kind, and the friction is
+constant, there is none, and the estimate holds. Other steps are compared with two of half their length, and so are
+those that follow, until one is smooth.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import numpy as np
 from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, TOUCHING, RateOf, Rates, size_of
 from push_predictor.types import Array, BoolArray, IntArray
 
+OF_CORNER, SHORTEST_AT_CORNER = 0.25, 1e-4  # of the allowed error: how far the disc may enter; m: in longer steps
 OF_TRAVEL_FINELY = 0.01  # of the accuracy: the error of a step that is allowed for the whole travel
 # Kutta's 3/8 rule (1901) of fourth order has its stages at 0, 1/3, 2/3 and 1 of a step. With these weights they and the
 # rate AFTER the step give the difference from a method of third order, also where rates depend on the travel alone.
@@ -61,6 +62,9 @@ def swept_finely(rate_of: RateOf, travel: Array, length: Array, accuracy: float)
             agree[in_halves] = size_of(after - coarse, length[rows])[in_halves] <= allowed[in_halves]
             for part, values in zip(last, after_fine, strict=True):
                 part[in_halves] = values
+            # Both are wrong alike where only their last stages have seen a corner: the disc enters the slider.
+            deeper = (np.minimum(first[1], 0.0) - last[1] > OF_CORNER * allowed) & (step > SHORTEST_AT_CORNER)
+            agree[in_halves] &= ~deeper[in_halves]
         pose[rows], done[rows] = np.where(agree[:, None], after, before), np.where(agree, at + step, at)
         refused = np.where(rough[rows], 0.5, 1.0)  # a step that is not smooth is tried again in halves
         longest[rows] = np.minimum(np.where(agree, 2.0, refused) * step, LONGEST_STEP)

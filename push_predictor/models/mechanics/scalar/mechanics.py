@@ -31,7 +31,13 @@ import numpy as np
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import NO_CHANGES, RECORDING, FittedMechanics
 from push_predictor.models.mechanics.forward import KIND_OF_NORMAL, KIND_OF_SLIP
-from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, OF_TRAVEL_FINELY
+from push_predictor.models.mechanics.motion.fine_sweep import (
+    AFTER,
+    DIFFERENCE,
+    OF_CORNER,
+    OF_TRAVEL_FINELY,
+    SHORTEST_AT_CORNER,
+)
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
 from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
@@ -343,10 +349,12 @@ def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> 
         smooth = apart or (one_kind and last[5] == first[5])
         if rough or not (apart or (smooth and step * _size(difference, last, length) <= allowed)):
             fine = _in_halves(rate, pose, done, step, first)
-            if _distance(fine, after, length) > allowed:
+            after_fine = rate(*fine, done + step)
+            deeper = min(gap, 0.0) - after_fine[3] > OF_CORNER * allowed and step > SHORTEST_AT_CORNER
+            if deeper or _distance(fine, after, length) > allowed:
                 longest, rough = 0.5 * step, True
                 continue
-            after, last = fine, rate(*fine, done + step)
+            after, last = fine, after_fine
         pose, done, longest, rough, first = after, done + step, min(2.0 * step, LONGEST_STEP), not smooth, last
     return pose
 

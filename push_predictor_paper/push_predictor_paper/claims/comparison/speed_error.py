@@ -120,8 +120,10 @@ def spearman(first: Array, second: Array, weights: Array) -> Array:
 
 def _ranks(values: Array, weights: Array) -> Array:
     """Ranks (d, n), of equal values their mean."""
-    different, place = np.unique(values, return_inverse=True)
-    counts = weights @ np.eye(len(different))[place]
+    order = np.argsort(values, kind="stable")
+    _, place = np.unique(values, return_inverse=True)
+    begins = np.flatnonzero(np.diff(values[order], prepend=np.nan))  # of each run of equal values
+    counts = np.add.reduceat(weights[:, order], begins, axis=1)
     return np.asarray((np.cumsum(counts, axis=1) - 0.5 * (counts - 1.0))[:, place])
 
 
