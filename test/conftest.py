@@ -57,7 +57,7 @@ LONGEST = {  # files that take seven seconds of processor time or more, or that 
 }  # fmt: skip
 
 
-DRAWN_AS_FOR_READERS = {"test_canvas", "test_report", "test_paper_report"}
+DRAWN_AS_FOR_READERS = {"test_canvas", "test_paper_report"}
 
 
 def pytest_configure(config: pytest.Config) -> None:

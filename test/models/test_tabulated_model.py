@@ -28,12 +28,14 @@ from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.gaussian_process.constant import fit_constant
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
+from push_predictor.models.store.table_file import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.table_accuracy import (
@@ -253,6 +255,22 @@ def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: st
     assert np.ptp(outside, axis=0) == pytest.approx([0.1, 1.0, 3.1], rel=0.05)
     assert answers.exact_count(outside) == 0 and not of(answers, outside).in_domain.any()
     assert_true_to_the_model(answers, outside)
+
+
+def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) -> None:
+    model = trained_widely("square", "vhgp")
+    predictor = model.predictor
+    assert isinstance(predictor, GaussianProcessPredictor)
+    first, second, third = predictor.regressions
+    constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
+    mixed = replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
+    computed, outside = tabulate(mixed), outside_pushes(mixed, 100)
+    assert_true_to_the_model(computed, outside)
+    write_tables(tmp_path / "tables", "digest", computed)
+    read = read_tables(tmp_path / "tables", "digest", mixed)
+    assert read is not None
+    for name in FIELDS:
+        assert np.array_equal(getattr(of(read, outside), name), getattr(of(computed, outside), name))
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
