@@ -43,7 +43,7 @@ style: $(VENV)/.installed $(VENV)/.tools
 types: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/mypy
 
-# Four workers on two cores: tests of nodes wait for each other's messages half of their time.
+# Four workers on two cores: tests of nodes wait for each other's messages.
 suite: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(MARKERS)
 

@@ -95,6 +95,7 @@ def test_a_sparse_model_has_nearly_the_features_of_a_dense_one() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_prior_model_has_about_the_variance_of_its_draws() -> None:
     model, push = trained("prior", empty_table()), some()
     found, moments = features_of(model, push), model.predictor.moments(push)

@@ -107,6 +107,7 @@ def test_the_same_seed_gives_the_same_bags(made: tuple[Path, Path], tmp_path: Pa
     assert (first / "training/training_0.mcap").read_bytes() != (first / "new/new_0.mcap").read_bytes()
 
 
+@pytest.mark.long
 def test_a_truth_file_has_all_keys_and_a_bag_its_rig(made: tuple[Path, Path]) -> None:
     data, truth = made
     assert set(json.loads((truth / "000.json").read_text())) == TRUTH_KEYS
@@ -159,6 +160,7 @@ def test_the_tip_stays_at_the_outline_but_for_its_compliance(rig: Rig, inputs: S
     assert gap.min() > -strongest / rig.stiffness - 1e-4
 
 
+@pytest.mark.long
 def test_clean_ratio_is_zero_without_a_change_and_large_with_one(rig: Rig, inputs: SessionInputs) -> None:
     rng = np.random.default_rng(0)
     unchanged = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, ())
@@ -216,6 +218,7 @@ def test_engines_that_are_not_installed_are_refused_before_the_work(
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.long
 def test_training_writes_the_models_that_are_missing(
     made: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
