@@ -288,7 +288,7 @@ def test_rejects_truth_folder_inside_data_folder(tmp_path: Path) -> None:
             apart(tmp_path / "data", truth_folder)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_recording_contains_no_hint_of_the_truth(tmp_path: Path) -> None:
     data, hidden = tmp_path / "data", tmp_path / "truth"
     hidden.mkdir()

@@ -79,6 +79,7 @@ def test_joined_recordings_keep_all_samples_in_order(recording: Recording) -> No
 # --- mcube ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_runs_of_a_block_have_in_one_recording_the_windows_that_each_has_alone(
     measured_data: Path, blocks: dict[str, Split], tmp_path: Path
 ) -> None:
@@ -101,6 +102,7 @@ def test_runs_are_trained_on_traced_and_kept_in_order_of_time(blocks: dict[str, 
 # --- mlab -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_windows_of_a_log_add_up_to_the_measured_pushes(logs: dict[str, Split], table: PushTable) -> None:
     """A window of almost the whole push, so that few per cent of the measured displacement are outside it."""
     share = 5.3 / table.duration

@@ -102,6 +102,7 @@ def test_friction_never_returns_power(tracks: Tracks) -> None:
     assert work.min() >= -1e-9
 
 
+@pytest.mark.long
 def test_the_clean_ratio_is_zero_without_a_change_and_large_with_a_large_one(
     rig: Rig, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,6 +114,7 @@ def test_the_clean_ratio_is_zero_without_a_change_and_large_with_a_large_one(
     assert clean_ratio(noisy, session, 3, (change,), 1.0) > 1.0
 
 
+@pytest.mark.long
 def test_the_same_seed_writes_the_same_bag_and_a_whole_truth(tmp_path: Path) -> None:
     for name in ("first", "second"):
         write_pair(make_pair(6, 21, 2, 2), tmp_path / name / "data", tmp_path / name / "truth")

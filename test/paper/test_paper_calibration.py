@@ -192,7 +192,7 @@ def test_nine_corrected_intervals_jointly_cover_as_often_as_one() -> None:
     assert corrected(SURE, 1).text(".6f") == SURE.text(".6f")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_perfect_gaussian_model_is_seldom_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     """900 pushes of 4 windows, predicted as they were drawn, the outcomes of a push alike: at most 10 % rejected."""
     drawn = push_bootstrap(ids(900, 1))

@@ -239,7 +239,7 @@ def compared(study):
     return section(study)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_section_compares_all_three_kinds_with_the_paper(compared):
     paper = next(table for table in compared.tables if "paper" in table.head[1])
     assert paper.rows[0][1:4] == ("0.72", "0.38", "0.37")
@@ -280,7 +280,7 @@ def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
     assert first(paper[6]) - first(si[3]) == pytest.approx(13.8155, abs=0.011)  # two decimals in both cells
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_mean_gain_section_has_every_size_and_speed(study):
     made = mean_gain.section(study)
     assert {row[0] for row in made.tables[0].rows} >= {"20, by push", "20, random"}

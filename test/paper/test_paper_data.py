@@ -61,7 +61,7 @@ def test_sets_share_slider_or_table_but_not_their_noise() -> None:
     assert len({pair_number(*pair) for pair in FULL.pairs}) == 16
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("push_predictor_paper.data.corpus.WINDOWS_PER_PUSH", 1)
     small = replace(QUICK, pushes=2, speeds=(0.05,))

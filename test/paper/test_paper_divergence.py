@@ -110,6 +110,7 @@ def test_verdicts_on_the_median(ends: tuple[float, float], verdict: str) -> None
     assert good(Estimate(float(np.mean(ends)), *ends)) == verdict
 
 
+@pytest.mark.long
 def test_section_has_the_papers_figures_next_to_ours(made: Section) -> None:
     rows = {row[0]: row for row in made.tables[0].rows}
     assert rows["GP"][-2:] == ("22.63", "5.74") and rows["VHGP"][-2:] == ("15.32", "5.34")

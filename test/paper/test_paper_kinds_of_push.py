@@ -203,7 +203,7 @@ def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
     assert has_modes(p, power) == verdict
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -> None:
     """Findings, one row a push, a picture, numbers that JSON can hold."""
     grid = grid_of(rays(6e-4), drawn_together(1e-4), fanned_out(1e-3), rays(4e-4, apart_by=4e-3))

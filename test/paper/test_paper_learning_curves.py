@@ -186,7 +186,7 @@ def test_two_folds_show_their_range_and_three_an_interval():
     assert three.high == pytest.approx(0.3 + 4.303 * 0.1 / np.sqrt(3), abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_section_has_a_figure_per_surface_and_per_shape_and_every_pair_in_its_table(tmp_path):
     made = learning_curves.section(made_up_study(tmp_path, replace(PLAN, sizes=(20,))))
     assert [picture.path.exists() for picture in made.pictures] == [True, True]

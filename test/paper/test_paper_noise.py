@@ -184,7 +184,7 @@ def test_learned_noise_has_the_size_of_the_truth() -> None:
     assert within.value == pytest.approx(0.7) and within.low == within.high == within.value
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_section_keeps_simulated_and_measured_noise_apart(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")

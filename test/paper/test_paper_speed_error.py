@@ -171,7 +171,7 @@ def test_a_push_has_one_speed():
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_section_shows_every_speed(tmp_path):
     made = speed_error.section(made_up_study(tmp_path))
     assert len(made.findings) == 2 and made.pictures[0].path.exists()
