@@ -202,7 +202,7 @@ def test_second_report_reads_the_cache_and_is_the_same(
 ) -> None:
     """Pictures are not rendered again: the cache does not contain them."""
     monkeypatch.setattr(
-        "matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", lambda canvas, image: image.write(b"")
+        "matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", lambda canvas, image, **_: image.write(b"")
     )
     kept = kept_results(made)
     assert kept
