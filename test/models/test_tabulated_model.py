@@ -43,6 +43,7 @@ from push_predictor.models.tabulated.table_accuracy import (
     MEAN_TOLERANCE,
     TableAccuracy,
     outside_pushes,
+    probed,
     relative_error,
 )
 from push_predictor.models.tabulated.tabulated_domain import FASTEST, tabulated_domain, wide_box
@@ -255,6 +256,11 @@ def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: st
     assert np.ptp(outside, axis=0) == pytest.approx([0.1, 1.0, 3.1], rel=0.05)
     assert answers.exact_count(outside) == 0 and not of(answers, outside).in_domain.any()
     assert_true_to_the_model(answers, outside)
+
+
+def test_a_table_is_compared_with_the_model_outside_the_domain_too() -> None:
+    model = trained_widely("square", "gp")
+    assert np.sum(~model.in_domain(probed(model, 20).inputs)) == 20
 
 
 def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) -> None:
