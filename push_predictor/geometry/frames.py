@@ -30,10 +30,14 @@ def rotate(vectors: Array, angle: Array) -> Array:
     """Vectors (..., 2) rotated counter-clockwise by angle (..., rad)."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
-    first = np.asarray(cos * x - sin * y)
-    turned = np.empty((*first.shape, 2))  # np.stack takes several times as long
-    turned[..., 0], turned[..., 1] = first, sin * x + cos * y
-    return turned
+    return paired(np.asarray(cos * x - sin * y), np.asarray(sin * x + cos * y))
+
+
+def paired(x: Array, y: Array) -> Array:
+    """Points (..., 2) of coordinates (...); np.stack takes several times as long."""
+    points = np.empty((*x.shape, 2))
+    points[..., 0], points[..., 1] = x, y
+    return points
 
 
 def to_body(points: Array, poses: Array) -> Array:

@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.frames import rotate, to_body, to_world
+from push_predictor.geometry.frames import paired, rotate, to_body, to_world
 from push_predictor.types import Array, BoolArray, IntArray
 
 SMOOTH_TABLE = 8192  # chords that approximate the arc length of an ellipse: relative error 1e-8
@@ -224,7 +224,7 @@ class Outline:
         edge = distance.argmin(axis=0)
         nearest = edge * len(points) + np.arange(len(points))  # flat: take is faster than indices of both axes
         share, length = fraction.take(nearest), np.sqrt(distance.take(nearest))
-        away = _paired(away_x.take(nearest), away_y.take(nearest))
+        away = paired(away_x.take(nearest), away_y.take(nearest))
         inside = self._contains(offset_x, offset_y)
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
@@ -255,12 +255,12 @@ class Outline:
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        points = _paired(a * np.cos(parameter), b * np.sin(parameter))
+        points = paired(a * np.cos(parameter), b * np.sin(parameter))
         return points if self.pose == CENTRED else to_world(points, np.array(self.pose))
 
     def _curve_normal(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        normal = _paired(b * np.cos(parameter), a * np.sin(parameter))
+        normal = paired(b * np.cos(parameter), a * np.sin(parameter))
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         return np.asarray(normal if self.pose == CENTRED else rotate(normal, np.array(self.pose[2])))
 
@@ -302,13 +302,6 @@ class Outline:
             if np.all(np.abs(t - before) < PARAMETER_TOLERANCE):
                 break
         return np.asarray(np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0])))
-
-
-def _paired(x: Array, y: Array) -> Array:
-    """Points (..., 2) of coordinates (...); np.stack takes several times as long."""
-    points = np.empty((*np.shape(x), 2))
-    points[..., 0], points[..., 1] = x, y
-    return points
 
 
 def _signed_area(vertices: Array) -> float:

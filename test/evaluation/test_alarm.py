@@ -23,6 +23,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from coarse import coarse_mechanics
 from scipy.stats import binom
 from synthetic import square_rig
 
@@ -180,8 +181,7 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
 @pytest.fixture(scope="module", autouse=True)
 def coarse_integration() -> Iterator[None]:
     """Errors of 0.1 % are far below the noise of the pushes."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
+    with coarse_mechanics():
         yield
 
 

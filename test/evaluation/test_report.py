@@ -19,7 +19,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -57,15 +56,6 @@ from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting import html
 
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def no_layout() -> Iterator[None]:
-    """Pictures are not laid out, which only moves ticks and labels, and are small."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
-        patch.setattr("push_predictor.reporting.canvas.DPI", 40)  # sizes in pixels prove nothing
-        yield
 
 
 def rig_of(shape: str) -> Rig:

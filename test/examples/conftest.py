@@ -19,13 +19,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-
-from push_predictor.simulation import dynamics
+from coarse import coarse_simulator
 
 
 @pytest.fixture(scope="module", autouse=True)
-def coarse_simulation() -> Iterator[None]:
-    """A simulated recording takes a quarter of the steps."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dynamics, "TRAVEL_STEP", 4.0 * dynamics.TRAVEL_STEP)
+def coarsely() -> Iterator[None]:
+    """For all tests of this folder."""
+    with coarse_simulator(4.0):
         yield

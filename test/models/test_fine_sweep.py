@@ -21,8 +21,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, swept_finely
-from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, RateOf, Rates
+from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, KindRateOf, KindRates, swept_finely
+from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP
 from push_predictor.models.mechanics.scalar import mechanics as scalar
 from push_predictor.types import Array, IntArray
 
@@ -30,8 +30,8 @@ ACCURACY, LENGTH, TRAVEL = 1e-4, 0.03, 0.02
 Speed = Callable[[Array, Array], Array]  # along x, from x and the travel done, m
 
 
-def rates(speed: Speed, kind: Speed) -> RateOf:
-    def rate_of(rows: IntArray, pose: Array, done: Array) -> Rates:
+def rates(speed: Speed, kind: Speed) -> KindRateOf:
+    def rate_of(rows: IntArray, pose: Array, done: Array) -> KindRates:
         rate = np.zeros((len(rows), 3))
         rate[:, 0] = speed(pose[:, 0], done)
         return rate, np.zeros(len(rows)), np.ones(len(rows)), np.asarray(kind(pose[:, 0], done), dtype=np.float64)

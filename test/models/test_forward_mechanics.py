@@ -185,7 +185,7 @@ def test_demands_the_covariate_that_a_parameter_needs(parameter: MechanicsParame
 def test_a_disc_that_is_apart_moves_the_slider_from_its_touch_on() -> None:
     def rate(rows: IntArray, pose: Array, done: Array) -> Rates:
         push = np.tile([1.0, 0.0, 0.0], (len(rows), 1))
-        return push, np.array([0.0033, 0.0])[rows] - done + pose[:, 0], np.ones(len(rows)), np.zeros(len(rows))
+        return push, np.array([0.0033, 0.0])[rows] - done + pose[:, 0], np.ones(len(rows))
 
     pose = swept(rate, np.array([0.0075, 0.0075]), np.full(2, 0.03), 1e-3)
     assert pose[:, 0] == pytest.approx([0.0075 - 0.0033, 0.0075], abs=2.1e-5)

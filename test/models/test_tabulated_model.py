@@ -38,6 +38,7 @@ from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_file import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.prediction_table import on_grid
 from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
@@ -187,7 +188,8 @@ def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.M
     model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
     monkeypatch.setattr(prediction_table, "COUPLING_CELLS", 1.5)
     assert isinstance(model.predictor, GaussianProcessPredictor)
-    first = tabulated_domain(model, model.predictor, wide_box(model), REFINEMENTS[0]).table.knots
+    posteriors = [on_grid(regression) for regression in model.predictor.regressions]
+    first = tabulated_domain(model, model.predictor, posteriors, wide_box(model), REFINEMENTS[0]).table.knots
     answers = tabulate(model)
     assert answers.domain is not None and answers.domain.table.knots > first
     assert_true_to_the_model(answers)

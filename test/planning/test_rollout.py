@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import gc
 import weakref
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 import pytest
+from coarse import coarse_mechanics
 from synthetic import RADIUS, square_rig
 
 from benchmarks.planning.rollout_truth import EnergyDistance
@@ -85,9 +87,10 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
 
 
 @pytest.fixture
-def coarse_integration(monkeypatch: pytest.MonkeyPatch) -> None:
+def coarse_integration() -> Iterator[None]:
     """For tests of distributions."""
-    monkeypatch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
+    with coarse_mechanics():
+        yield
 
 
 @pytest.mark.slow

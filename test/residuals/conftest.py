@@ -19,21 +19,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-
-from push_predictor.simulation import dynamics
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """A displacement by the analytical model takes a fifth of the time."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.models.mechanics.analytical.ACCURACY", 1e-3)
-        yield
+from coarse import coarse_mechanics, coarse_simulator
 
 
 @pytest.fixture(scope="module", autouse=True)
-def coarse_simulation() -> Iterator[None]:
-    """A simulated recording takes half the steps."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dynamics, "TRAVEL_STEP", 2.0 * dynamics.TRAVEL_STEP)
+def coarsely() -> Iterator[None]:
+    """For all tests of this folder."""
+    with coarse_mechanics(), coarse_simulator(2.0):
         yield

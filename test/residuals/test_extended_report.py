@@ -126,8 +126,6 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", SECTIONS[:1])  # the maps
-    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)  # the text is checked, not the pictures
-    monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)
     monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
     model = extended(base, slippery(), grain())
     save_model(model, tmp_path / "extended.pushmodel")
@@ -147,6 +145,5 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
 def test_readme_figure_accepts_an_extended_model(
     base: PushModel, table: PushTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
     monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
     assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

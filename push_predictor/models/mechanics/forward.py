@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +41,15 @@ from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
     same_surface,
 )
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.contact_solution import RESTS, Driven, Touch, driven, driven_on_ellipsoid
-from push_predictor.models.mechanics.motion.fine_sweep import swept_finely
+from push_predictor.models.mechanics.motion.contact_solution import (
+    RESTS,
+    Driven,
+    Touch,
+    driven,
+    driven_on_ellipsoid,
+    kind_of,
+)
+from push_predictor.models.mechanics.motion.fine_sweep import KindRates, swept_finely
 from push_predictor.models.mechanics.motion.friction_cone import friction_cone
 from push_predictor.models.mechanics.motion.recorded_push import TruePush, true_push
 from push_predictor.models.mechanics.motion.sweep import FINE, Rates, swept
@@ -51,7 +59,6 @@ from push_predictor.types import Array, IntArray
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 BEND_STEP = 5e-4  # m of the tip's path, over which the acceleration of the slider is taken
-KIND_OF_SLIP, KIND_OF_NORMAL = 100.0, 2.7  # weights that give different numbers to different kinds of contact
 MOST_INERTIA = 0.8  # of the largest load: more would not be a correction
 
 
@@ -108,8 +115,9 @@ class PushMechanics:
     def poses(self, values: RowValues, push: TruePush) -> Array:
         """Poses (n, 3: x, y in m, heading in rad) of sliders after true pushes, in the frames of their first poses."""
         motion = Motion(self, values, push)
-        sweep = swept if self.accuracy > FINE else swept_finely
-        return sweep(motion.rate, push.travel, motion.length, self.accuracy)
+        if self.accuracy > FINE:
+            return swept(motion.rate, push.travel, motion.length, self.accuracy)
+        return swept_finely(motion.rate_and_kind, push.travel, motion.length, self.accuracy)
 
     def _known(self, key: str, support: PressureDistribution) -> LoadMap:
         if key not in self._tables:
@@ -150,6 +158,15 @@ class PushMechanics:
         return np.maximum(below - first, 0), share, list(EXPONENT_KNOTS[first : last + 1])
 
 
+class _Instant(NamedTuple):
+    """Rates, and the contacts and motions that they are of."""
+
+    rates: Rates
+    nearest: Projection
+    touch: Touch
+    motion: Driven
+
+
 class Motion:
     """The motion of sliders under pushes."""
 
@@ -166,14 +183,22 @@ class Motion:
         self.gradient, self.square = values.pair("gradient_x", "gradient_y"), of_rows.square
 
     def rate(self, rows: IntArray, pose: Array, done: Array) -> Rates:
-        """Change of the poses per metre of the tip's path, gap, approach of the disc and kind of contact: see sweep."""
+        """Change of the poses per metre of the tip's path, gap (m) and approach of the disc."""
+        return self._at(rows, pose, done).rates
+
+    def rate_and_kind(self, rows: IntArray, pose: Array, done: Array) -> KindRates:
+        """The same, and the kind of contact: see fine_sweep."""
+        found = self._at(rows, pose, done)
+        return *found.rates, self._kind(found)
+
+    def _at(self, rows: IntArray, pose: Array, done: Array) -> _Instant:
         found = self._quasi_static(rows, pose, done, None)
         if not self.values.active("inertia"):
             return found
-        ahead = pose + BEND_STEP * found[0]
-        later = self._quasi_static(rows, ahead, done + BEND_STEP, None)[0]
+        ahead = pose + BEND_STEP * found.rates[0]
+        later = self._quasi_static(rows, ahead, done + BEND_STEP, None).rates[0]
         centre = self.centre[rows]  # of mass: above that of the pressure while the slider rests
-        bend = _of_point(later, ahead, centre) - _of_point(found[0], pose, centre)
+        bend = _of_point(later, ahead, centre) - _of_point(found.rates[0], pose, centre)
         return self._quasi_static(rows, pose, done, self._inertial(rows, pose, bend / BEND_STEP))
 
     def _inertial(self, rows: IntArray, pose: Array, bend: Array) -> Array:
@@ -185,7 +210,7 @@ class Motion:
         size = np.maximum(1.0, np.linalg.norm(load, axis=1) * np.abs(share) / MOST_INERTIA)
         return np.asarray(-(share / size)[:, None] * load)
 
-    def _quasi_static(self, rows: IntArray, pose: Array, done: Array, inertial: Array | None) -> Rates:
+    def _quasi_static(self, rows: IntArray, pose: Array, done: Array, inertial: Array | None) -> _Instant:
         heading, length = pose[:, 2], self.length[rows]
         tip = self.push.tip[rows] + done[:, None] * self.push.ahead[rows]
         nearest = self.mechanics.outline.project(to_body(tip, pose))
@@ -196,15 +221,14 @@ class Motion:
         vx, vy = motion.vx + spin * centre[:, 1], motion.vy - spin * centre[:, 0]
         cos, sin = np.cos(heading), np.sin(heading)
         rate = np.stack([cos * vx - sin * vy, sin * vx + cos * vy, spin], axis=1)
-        return rate, nearest.distance - self.push.radius[rows], touch.along, self._kind(nearest, touch, motion)
+        return _Instant((rate, nearest.distance - self.push.radius[rows], touch.along), nearest, touch, motion)
 
-    def _kind(self, nearest: Projection, touch: Touch, motion: Driven) -> Array:
+    def _kind(self, found: _Instant) -> Array:
         """Of contacts (k,): slip and edge in one number; none is like that at a corner, where the normal turns."""
-        slip = np.where(touch.along > 0.0, motion.slip, RESTS)
+        touch, slip = found.touch, np.where(found.touch.along > 0.0, found.motion.slip, RESTS)
         if self.mechanics.outline.semi_axes is not None:
-            return np.asarray(KIND_OF_SLIP * slip)
-        kind = KIND_OF_SLIP * slip + touch.normal_x + KIND_OF_NORMAL * touch.normal_y
-        return np.where(nearest.at_vertex, np.nan, kind)
+            return slip
+        return np.where(found.nearest.at_vertex, np.nan, kind_of(slip, touch.normal_x, touch.normal_y))
 
     def _centre(self, rows: IntArray, heading: Array) -> Array:
         """Centre of friction (k, 2): a friction that grows along a direction moves it by the mean square there."""

@@ -22,7 +22,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.of_mechanics import OfMechanics
+from push_predictor.models.predictors.of_mechanics import OfMechanics, with_one_covariance
 from push_predictor.models.predictors.predictor import Moments
 from push_predictor.types import Array
 
@@ -42,8 +42,7 @@ class AnalyticalPredictor(OfMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.physics.displacement(push.inputs, push.duration)
-        covariance = self.covariance[None].repeat(len(mean), axis=0)
-        return Moments(mean, covariance, covariance.copy())
+        return with_one_covariance(mean, self.covariance)
 
     def with_scalar_mechanics(self) -> AnalyticalPredictor:
         """See Predictor."""

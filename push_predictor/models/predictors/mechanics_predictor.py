@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.of_mechanics import OfFittedMechanics
+from push_predictor.models.predictors.of_mechanics import OfFittedMechanics, with_one_covariance
 from push_predictor.models.predictors.predictor import Moments
 from push_predictor.types import Array
 
@@ -34,8 +34,7 @@ class MechanicsPredictor(OfFittedMechanics):
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
-        covariance = self.covariance[None].repeat(len(mean), axis=0)
-        return Moments(mean, covariance, covariance.copy())
+        return with_one_covariance(mean, self.covariance)
 
     def with_scalar_mechanics(self) -> MechanicsPredictor:
         """See Predictor."""

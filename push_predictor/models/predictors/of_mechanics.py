@@ -81,6 +81,12 @@ class OfMechanics(WithoutEffects, ABC):
         return self
 
 
+def with_one_covariance(mean: Array, covariance: Array) -> Moments:
+    """Moments with means (n, 3) and the same covariance (3, 3) for all, of the outcome and of the process."""
+    of_all = covariance[None].repeat(len(mean), axis=0)
+    return Moments(mean, of_all, of_all.copy())
+
+
 @dataclass(frozen=True, eq=False)
 class OfFittedMechanics(OfMechanics):
     """A predictor by mechanics with fitted parameters."""

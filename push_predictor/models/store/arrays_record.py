@@ -43,7 +43,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         if (size := path.stat().st_size) > LARGEST:
             raise ModelFileError(f"{path}: has {size} bytes, at most {LARGEST} are accepted")
         data = path.read_bytes()
-        if data[-END_SIZE:].find(END) != 0:  # zipfile reads an archive that is followed by the rest of another file
+        if not data[-END_SIZE:].startswith(END):  # zipfile reads an archive with the rest of another file after it
             raise ValueError("it does not end with the record that ends an archive")
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())

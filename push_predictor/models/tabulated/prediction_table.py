@@ -145,26 +145,30 @@ def _in_numbers(
 
 
 def tabulate(
-    predictor: GaussianProcessPredictor, chart: Chart, low: Array, high: Array, refinement: float = 1.0
+    predictor: GaussianProcessPredictor,
+    posteriors: Sequence[OnGrid],
+    chart: Chart,
+    low: Array,
+    high: Array,
+    refinement: float = 1.0,
 ) -> PredictionTable:
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
-    refinement: factor on the usual number of nodes and knots along each axis. Raises TooFineError, also for kernels
-    that are not products over the axes.
+    posteriors: of the predictor's regressions, see on_grid. refinement: factor on the usual number of nodes and knots
+    along each axis. Raises TooFineError, also for kernels that are not products over the axes.
     """
-    regressions = [on_grid(regression) for regression in predictor.regressions]
-    if not all(isinstance(kernel, SquaredExponential) for kernel, _ in _resolved(regressions, None)):
+    if not all(isinstance(kernel, SquaredExponential) for kernel, _ in _resolved(posteriors, None)):
         raise TooFineError("only squared exponential kernels are products over the axes of a table")
     sides = table_sides(predictor.scaling, chart, low, high)
-    resolved, correlation = _resolved(regressions, predictor.correlation), predictor.correlation
+    resolved, correlation = _resolved(posteriors, predictor.correlation), predictor.correlation
     cells = [_cells(side, resolved, refinement) for side in sides]
     knots = chart.boxes * int(np.prod([count + 1.0 for count in cells]))
     if knots > MOST_KNOTS:
         raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are allowed")
     coupled = [(correlation.kernel, COUPLING_CELLS)] if correlation else []
     coarse = [_cells(side, coupled, refinement) for side in sides] if correlation else []
-    least = predictor.reported_sd**2 * [_least_variance(regression) for regression in regressions]
-    values = _values(_Grid(sides, refinement), predictor, regressions)
+    least = predictor.reported_sd**2 * [_least_variance(regression) for regression in posteriors]
+    values = _values(_Grid(sides, refinement), predictor, posteriors)
     return from_nodes(TableNodes(cells, coarse, least.tolist(), values), predictor, chart, low, high)
 
 

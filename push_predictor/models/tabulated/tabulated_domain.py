@@ -27,7 +27,7 @@ from push_predictor.models.features import push_features
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
-from push_predictor.models.tabulated.prediction_table import PredictionTable, TableNodes, from_nodes, tabulate
+from push_predictor.models.tabulated.prediction_table import OnGrid, PredictionTable, TableNodes, from_nodes, tabulate
 from push_predictor.models.tabulated.push_chart import Chart, Whole, push_chart
 from push_predictor.types import Array, BoolArray
 
@@ -127,15 +127,16 @@ def narrow_box(model: PushModel) -> tuple[Array, Array]:
 def tabulated_domain(
     model: PushModel,
     predictor: GaussianProcessPredictor,
+    posteriors: Sequence[OnGrid],
     ends: tuple[Array, Array],
     refinement: float = 1.0,
 ) -> TabulatedDomain:
     """The domain of a model with this predictor, tabulated between these ends.
 
-    refinement: of the table. Raises TooFineError.
+    posteriors: its regressions, see prediction_table.on_grid; refinement: of the table. Raises TooFineError.
     """
     box = feature_box(model)
-    table = tabulate(predictor, box.chart, *ends, refinement)
+    table = tabulate(predictor, posteriors, box.chart, *ends, refinement)
     return TabulatedDomain(box.chart, box.low, box.high, table, *ends)
 
 

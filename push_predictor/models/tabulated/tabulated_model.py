@@ -27,7 +27,7 @@ push: `with_effect_table` tabulates them, with the mechanics that they change (e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -48,7 +48,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.tabulated.effect_table import EffectTable
 from push_predictor.models.tabulated.effect_table_build import build_effect_table
-from push_predictor.models.tabulated.prediction_table import TooFineError
+from push_predictor.models.tabulated.prediction_table import OnGrid, TooFineError, on_grid
 from push_predictor.models.tabulated.single_effects import SingleEffects
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import (
@@ -145,7 +145,7 @@ class TabulatedModel:
         if len(push.inputs) > 1 or not isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
             return self._exact.predict_rows(push.inputs, push.duration, push.covariates)
         inside = self._in_domain(push.inputs)
-        if self.model.covariate_ranges:
+        if self.model.covariate_ranges:  # an array of one True would take a tenth of the time
             inside = inside & self.model.covariates_seen(push)
         return Prediction(*self._exact.predictor.moments(push), inside)
 
@@ -235,23 +235,28 @@ def tabulate(model: PushModel) -> TabulatedModel:
         return TabulatedModel(model if table is None else with_base(model, table), how)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, ONLY_LEARNT)
-    exact, reasons = probed(learnt), []
+    exact, posteriors = probed(learnt), [on_grid(regression) for regression in learnt.predictor.regressions]
+    why = ""
     for ends in (wide_box(model), narrow_box(model)):
-        found = _accurate(learnt, learnt.predictor, ends, exact)
+        found = _accurate(learnt, learnt.predictor, posteriors, ends, exact)
         if not isinstance(found, str):
             return with_domain(model, *found)
-        reasons.append(found)
-    return TabulatedModel(model, f"exact: {reasons[-1]}")
+        why = found
+    return TabulatedModel(model, f"exact: {why}")
 
 
 def _accurate(
-    learnt: PushModel, predictor: GaussianProcessPredictor, ends: tuple[Array, Array], exact: Probes
+    learnt: PushModel,
+    predictor: GaussianProcessPredictor,
+    posteriors: Sequence[OnGrid],
+    ends: tuple[Array, Array],
+    exact: Probes,
 ) -> tuple[TabulatedDomain, TableAccuracy] | str:
     """The coarsest table between these ends that is accurate, and its errors; else why there is none."""
     how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(learnt, predictor, ends, refinement)
+            domain = tabulated_domain(learnt, predictor, posteriors, ends, refinement)
         except TooFineError as too_fine:
             return f"{how}{too_fine}"
         error = exact.error_of(domain)

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -27,9 +27,11 @@ from push_predictor.types import Array, IntArray
 ROOT_STEPS = 40
 ROOT_TOLERANCE = 1e-10  # rad: a push alone and among others then agree to 1e-11 m; secants need one step more
 RESTS = 2.0  # in place of the slip of a slider that the pusher leaves
+KIND_OF_SLIP, KIND_OF_NORMAL = 100.0, 2.7  # weights that give different numbers to different kinds of contact
 EVERY = slice(None)
 BISECT_EVERY = 6  # steps: next to a flat or an edge of the limit surface, secants converge slowly
 
+Numbers = TypeVar("Numbers", float, Array)
 Rows: TypeAlias = "IntArray | slice"
 # From some of the contacts (k,) and their load's force (x, y) and moment over length, (k,) each, to a twist (vx, vy, w
 # times length) up to a factor.
@@ -49,6 +51,11 @@ class Touch(NamedTuple):
     left_arm: Array
     along: Array
     across: Array
+
+
+def kind_of(slip: Numbers, normal_x: Numbers, normal_y: Numbers) -> Numbers:
+    """A number for contacts with straight edges that slip alike; normal: of the edge."""
+    return KIND_OF_SLIP * slip + normal_x + KIND_OF_NORMAL * normal_y
 
 
 class Driven(NamedTuple):

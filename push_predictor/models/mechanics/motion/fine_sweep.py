@@ -22,11 +22,12 @@ those that follow, until one is smooth.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, TOUCHING, RateOf, Rates, size_of
+from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, TOUCHING, size_of
 from push_predictor.types import Array, BoolArray, IntArray
 
 OF_CORNER, SHORTEST_AT_CORNER = 0.25, 1e-4  # of the allowed error: how far the disc may enter; m: in longer steps
@@ -36,7 +37,12 @@ OF_TRAVEL_FINELY = 0.01  # of the accuracy: the error of a step that is allowed 
 DIFFERENCE, AFTER = (1.0 / 24.0, -1.0 / 8.0, 1.0 / 8.0, 1.0 / 8.0), -1.0 / 6.0
 
 
-def swept_finely(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Array:
+# As sweep.Rates, and the kind of contact (k,): a number that stays the same while the rate is smooth.
+KindRates: TypeAlias = tuple[Array, Array, Array, Array]
+KindRateOf: TypeAlias = Callable[[IntArray, Array, Array], KindRates]
+
+
+def swept_finely(rate_of: KindRateOf, travel: Array, length: Array, accuracy: float) -> Array:
     """See sweep.swept: poses (n, 3)."""
     pose, done, longest = np.zeros((len(travel), 3)), np.zeros(len(travel)), np.minimum(travel, LONGEST_STEP)
     rows, rough = np.flatnonzero(travel > 0.0), np.zeros(len(travel), dtype=np.bool_)
@@ -82,7 +88,7 @@ class _Begin(NamedTuple):
     pose: Array
     done: Array
     step: Array
-    rates: Rates
+    rates: KindRates
 
 
 class _Stepped(NamedTuple):
@@ -101,7 +107,7 @@ def _with_halves(begin: _Begin, chosen: IntArray) -> _Begin:
     return _Begin(rows[every], pose[every], done[every], lengths, _taken(rates, every))
 
 
-def _stepped(rate_of: RateOf, begin: _Begin) -> tuple[_Stepped, Rates]:
+def _stepped(rate_of: KindRateOf, begin: _Begin) -> tuple[_Stepped, KindRates]:
     """Steps by Kutta's 3/8 rule, and the rates after them."""
     rows, pose, done, step, (k1, gap, _, kind) = begin
     h = step[:, None]
@@ -114,12 +120,12 @@ def _stepped(rate_of: RateOf, begin: _Begin) -> tuple[_Stepped, Rates]:
     return _Stepped(after, np.asarray(difference), one_kind), rate_of(rows, after, done + step)
 
 
-def _taken(rates: Rates, rows: IntArray | BoolArray | slice) -> Rates:
+def _taken(rates: KindRates, rows: IntArray | BoolArray | slice) -> KindRates:
     rate, gap, nearing, kind = (part[rows] for part in rates)
     return rate, gap, nearing, kind
 
 
-def _merged(chosen: BoolArray, one: Rates, other: Rates) -> Rates:
+def _merged(chosen: BoolArray, one: KindRates, other: KindRates) -> KindRates:
     """Row by row from `one` where chosen (k,), else from `other`."""
     rate = np.where(chosen[:, None], one[0], other[0])
     gap, nearing, kind = (np.where(chosen, a, b) for a, b in zip(one[1:], other[1:], strict=True))

@@ -32,10 +32,9 @@ FINE = 1e-4  # accuracy up to which fine_sweep is used
 TOUCHING = 2e-5  # m: a wider gap at the start of a step is no contact
 SHORTEST_STEP = 30.0  # accuracies of the longest: a jump of the rate is crossed in steps of this length
 
-# Change of the pose (k, 3) per metre, gap between disc and slider (k,) m, approach of the disc (k,), and the kind of
-# contact (k,): a number that stays the same while the rate is smooth.
-Rates: TypeAlias = tuple[Array, Array, Array, Array]
-# From the rows (k,), their poses (k, 3) and the travel done (k,) m to the rates there.
+# From the rows (k,), their poses (k, 3) and the travel done (k,) m to the change of the pose (k, 3) per metre, the gap
+# between disc and slider (k,) m, and whether the disc comes closer (k,).
+Rates: TypeAlias = tuple[Array, Array, Array]
 RateOf: TypeAlias = Callable[[IntArray, Array, Array], Rates]
 
 
@@ -49,7 +48,7 @@ def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Arr
     shortest = SHORTEST_STEP * accuracy * LONGEST_STEP
     pose, done, step = np.zeros((len(travel), 3)), np.zeros(len(travel)), np.minimum(travel, LONGEST_STEP)
     rows = np.flatnonzero(travel > 0.0)
-    first, gap, nearing, _ = rate_of(rows, pose[rows], done[rows]) if rows.size else (pose, done, done, done)
+    first, gap, nearing = rate_of(rows, pose[rows], done[rows]) if rows.size else (pose, done, done)
     while rows.size:
         h, before, at = np.minimum(step[rows], travel[rows] - done[rows]), pose[rows], done[rows]
         apart = gap >= TOUCHING
@@ -58,7 +57,7 @@ def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Arr
         k2, *_ = rate_of(rows, before + 0.5 * wide * first, at + 0.5 * h)
         k3, *_ = rate_of(rows, before + 0.75 * wide * k2, at + 0.75 * h)
         motion = wide * (2.0 * first + 3.0 * k2 + 4.0 * k3) / 9.0
-        last, gap_after, nearing_after, _ = rate_of(rows, before + motion, at + h)
+        last, gap_after, nearing_after = rate_of(rows, before + motion, at + h)
         error = wide * (-5.0 * first + 6.0 * k2 + 8.0 * k3 - 9.0 * last) / 72.0
         allowed = accuracy * (size_of(motion, length[rows]) + OF_TRAVEL * travel[rows])
         ratio = size_of(error, length[rows]) / allowed

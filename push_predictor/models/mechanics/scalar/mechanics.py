@@ -30,7 +30,7 @@ import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import NO_CHANGES, RECORDING, FittedMechanics
-from push_predictor.models.mechanics.forward import KIND_OF_NORMAL, KIND_OF_SLIP
+from push_predictor.models.mechanics.motion.contact_solution import kind_of
 from push_predictor.models.mechanics.motion.fine_sweep import (
     AFTER,
     DIFFERENCE,
@@ -64,7 +64,7 @@ AT_REST = (0.0, 0.0, 0.0)
 FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load")  # along a push
 
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach, and the
-# kind of contact; see sweep.Rates.
+# kind of contact; see fine_sweep.KindRates.
 Rates: TypeAlias = tuple[float, float, float, float, float, float]
 Rate: TypeAlias = Callable[[float, float, float, float], Rates]
 
@@ -234,7 +234,7 @@ class _Push:
         (tip_x, tip_y), (ahead_x, ahead_y), radius = self.tip, self.ahead, self.radius
         nearest, length, tolerance, last = self.model.nearest, self.surface.length, self.surface.tolerance, self.last
         same_centre, same_cone, same_twist, ellipsoid = self.centre, self.cone, self.twist, self.ellipsoid
-        of_normal = 0.0 if self.model.mechanics.outline.semi_axes is not None else 1.0
+        has_edges = self.model.mechanics.outline.semi_axes is None
 
         def rate(x: float, y: float, heading: float, done: float) -> Rates:
             c, s = cos(heading), sin(heading)
@@ -254,7 +254,7 @@ class _Push:
                 vx, vy, spin, slip = driven_scalar(twist, touch, left, right, last, tolerance)
             spin /= length
             vx, vy = vx + spin * centre_y, vy - spin * centre_x
-            kind = KIND_OF_SLIP * slip + of_normal * (nx + KIND_OF_NORMAL * ny)
+            kind = kind_of(slip, nx, ny) if has_edges else slip
             return c * vx - s * vy, s * vx + c * vy, spin, distance - radius, along, kind
 
         return rate
