@@ -25,7 +25,7 @@ import pytest
 from push_predictor.nodes.server.background import NICENESS, in_background
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="priorities of threads")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has priorities of single threads")
 def test_work_runs_at_low_priority_and_leaves_that_of_others() -> None:
     before, found = os.getpriority(os.PRIO_PROCESS, 0), []
 

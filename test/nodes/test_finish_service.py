@@ -80,18 +80,18 @@ def ended_run(session: Session, finish: FinishService) -> None:
 def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() -> None:
     service, session = Service(), Session(last_answers=30.0, report=True)
     finish = finish_service(service, session)
-    report = finish._writer.report
+    report: Any = finish._writer.report  # a fake, where `busy` is no property
     service.calls.append("first")
     ended_run(session, finish)
     session.written()
-    report.busy = True  # type: ignore[misc]  # a fake, where it is no property
+    report.busy = True
     finish.answer()
     assert not service.responses and not finish.requested, "nobody waits for the end of the next run"
     session.open(0.2)
     assert not session.drain_if_due(0.3, finish.requested, rig_changed=False)
     finish.answer()
     assert not service.responses
-    report.busy = False  # type: ignore[misc]
+    report.busy = False
     finish.answer()
     finish.answer()
     assert [caller for caller, _ in service.responses] == ["first"]
@@ -103,7 +103,8 @@ def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() 
 def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
     service, session = Service(), Session(last_answers=30.0, report=True)
     finish = finish_service(service, session)
-    finish._writer.report.busy = True  # type: ignore[misc]
+    report: Any = finish._writer.report
+    report.busy = True
     for caller in ("first", "second"):
         service.calls.append(caller)
         ended_run(session, finish)
@@ -113,7 +114,7 @@ def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
     finish.work()
     finish.answer()
     assert not service.responses
-    finish._writer.report.busy = False  # type: ignore[misc]
+    report.busy = False
     finish.answer()
     assert sorted(caller for caller, _ in service.responses) == ["first", "second", "third"]
 
@@ -121,14 +122,15 @@ def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
 def test_a_caller_gets_the_failure_of_its_own_run() -> None:
     service, session = Service(), Session(last_answers=30.0, report=False)
     finish = finish_service(service, session)
-    finish._writer.report.busy = True  # type: ignore[misc]
+    report: Any = finish._writer.report
+    report.busy = True
     service.calls.append("caller")
     ended_run(session, finish)
     session.failed("disk full")
     finish.answer()
     session.drain_if_due(0.2, finish_requested=True, rig_changed=False)
     session.written()
-    finish._writer.report.busy = False  # type: ignore[misc]
+    report.busy = False
     finish.answer()
     assert [(r.success, r.message) for _, r in service.responses] == [(False, "disk full")]
 

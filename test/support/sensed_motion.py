@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 from unittest.mock import patch
 
 from push_predictor.recordings.streams import Recording
@@ -27,10 +28,10 @@ from push_predictor.simulation.batches import Batch, run_pushes
 from push_predictor.simulation.spec import SimulationSpec
 
 
-def sensed(spec: SimulationSpec, **sensing: object) -> Recording:
+def sensed(spec: SimulationSpec, **sensing: Any) -> Recording:
     """The recording of a spec, with other sensors or faults of them."""
     with patch.object(rig_simulator, "run_pushes", lambda _: iter(_batches(spec))):
-        return rig_simulator.simulate(replace(spec, **sensing))  # type: ignore[arg-type]
+        return rig_simulator.simulate(replace(spec, **sensing))
 
 
 def outcomes_of(spec: SimulationSpec) -> PushTable:
