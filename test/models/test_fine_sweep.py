@@ -23,7 +23,7 @@ import pytest
 
 from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, KindRateOf, KindRates, swept_finely
 from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP
-from push_predictor.models.mechanics.scalar import mechanics as scalar
+from push_predictor.models.mechanics.scalar import sweep as scalar
 from push_predictor.types import Array, IntArray
 
 ACCURACY, LENGTH, TRAVEL = 1e-4, 0.03, 0.02
@@ -50,7 +50,7 @@ def reached(speed: Speed, kind: Speed) -> tuple[float, float]:
         return float(rate[0, 0]), 0.0, 0.0, float(gap[0]), float(nearing[0]), float(contact[0])
 
     pose = swept_finely(together, np.full(2, TRAVEL), np.full(2, LENGTH), ACCURACY)
-    return float(pose[0, 0]), scalar._swept_finely(alone, TRAVEL, LENGTH, ACCURACY)[0]
+    return float(pose[0, 0]), scalar.swept_finely(alone, TRAVEL, LENGTH, ACCURACY)[0]
 
 
 def one_kind(x: Array, done: Array) -> Array:

@@ -25,7 +25,7 @@ from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.nearest import contact_on
 from push_predictor.geometry.shapes import shape_outline, transformed
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.fitted import NO_CHANGES, FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.contact_solution import RESTS
@@ -78,10 +78,14 @@ def computed_as_arrays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     plain = FittedMechanics.displacement
 
     def counted(
-        self: FittedMechanics, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
+        self: FittedMechanics,
+        inputs: Array,
+        duration: Array,
+        covariates: Mapping[str, Array] | None = None,
+        changes: Mapping[str, Array] = NO_CHANGES,
     ) -> Array:
         calls.append(len(inputs))
-        return plain(self, inputs, duration, covariates)
+        return plain(self, inputs, duration, covariates, changes)
 
     monkeypatch.setattr(FittedMechanics, "displacement", counted)
     return calls
