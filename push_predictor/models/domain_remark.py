@@ -59,7 +59,7 @@ def _outside_covariates(model: PushModel, push: Push, row: int) -> list[str]:
     return [
         _outside(f"covariate {name}", float(alone.covariates[name][0]), str(known))
         for name, known in model.covariate_ranges.items()
-        if not known.contains(alone.covariates[name])[0]
+        if not known.contains_one(float(alone.covariates[name][0]))
     ]
 
 

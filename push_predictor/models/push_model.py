@@ -170,6 +170,9 @@ class PushModel:
 
     def in_covariate_ranges(self, covariates: Mapping[str, Array], n: int) -> BoolArray:
         """The same for n pushes with all covariates that the effects need."""
+        if n == 1:  # in plain numbers, several times as fast
+            alone = {name: float(covariates[name][0]) for name in self.covariate_ranges}
+            return np.array([all(known.contains_one(alone[name]) for name, known in self.covariate_ranges.items())])
         seen = np.ones(n, dtype=np.bool_)
         for name, known in self.covariate_ranges.items():
             seen &= known.contains(covariates[name])

@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.types import Array, BoolArray
+
+Numbers: TypeAlias = "float | Array"
 
 HEADINGS = ("slider_heading", "push_heading")  # they wrap around
 WHOLE_TURN = np.radians(30.0)  # headings with no wider gap between them cover the whole turn
@@ -38,10 +41,17 @@ class CovariateRange:
 
     def contains(self, values: Array) -> BoolArray:
         """Which of the values (n,) lie in the range."""
+        return np.asarray(self._within(values))
+
+    def contains_one(self, value: float) -> bool:
+        """Whether a value lies in the range."""
+        return bool(self._within(value))
+
+    def _within(self, values: Numbers) -> bool | BoolArray:
         margin = MARGIN * max(abs(self.low), abs(self.high))
         if self.heading:
             values = self.low - margin + (values - self.low + margin) % TURN
-        return np.asarray((values >= self.low - margin) & (values <= self.high + margin))
+        return (values >= self.low - margin) & (values <= self.high + margin)
 
     def __str__(self) -> str:
         return f"{self.low:.3g} to {self.high:.3g}"

@@ -23,10 +23,11 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import Mechanics, joint
+from push_predictor.models.effects.single_exact import SingleExact
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
+from push_predictor.models.mechanics.scalar.mechanics import ScalarMechanics, scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.tails import Tails
@@ -98,11 +99,17 @@ class ExtendedPredictor:
 
     def completed(self, push: Push) -> Push:
         """See Predictor."""
+        if not self._of_inputs:
+            return push
         given = dict(zip(INPUTS, push.inputs.T, strict=True))
-        if SIDE in self.covariates:
+        if SIDE in self._of_inputs:
             given[SIDE] = self.physics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
-        own = {name: column for name, column in given.items() if name in self.covariates}
-        return replace(push, covariates={**push.covariates, **own}) if own else push
+        own = {name: given[name] for name in self._of_inputs}
+        return replace(push, covariates={**push.covariates, **own})
+
+    @cached_property
+    def _of_inputs(self) -> tuple[str, ...]:
+        return tuple(name for name in self.covariates if name in GIVEN_BY_INPUTS)
 
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
@@ -121,7 +128,10 @@ class ExtendedPredictor:
 
     def shift(self, push: Push) -> Shift:
         """See Predictor."""
-        uncertainty, push = np.zeros((len(push.inputs), 3, 3)), self.completed(push)
+        push = self.completed(push)
+        if len(push.inputs) == 1 and self._single is not None and (alone := self._single.shift(push)) is not None:
+            return Shift(*alone)
+        uncertainty = np.zeros((len(push.inputs), 3, 3))
         together = joint(Mechanics(self.physics, self.mechanics), self.effects, push)
         shift, designs = together.shift, together.designs
         for effect, design in zip(self.effects, designs, strict=True):
@@ -130,6 +140,13 @@ class ExtendedPredictor:
             shared = designs[i] @ covariance @ designs[j].transpose(0, 2, 1)
             uncertainty = uncertainty + shared + shared.transpose(0, 2, 1)
         return Shift(shift, uncertainty)
+
+    @cached_property
+    def _single(self) -> SingleExact | None:
+        """The effects of single pushes in plain numbers; None where they, or the mechanics, have no such form."""
+        if not isinstance(self.of_effects, ScalarMechanics) or not all(effect.exact for effect in self.effects):
+            return None
+        return SingleExact(self.effects, self.cross, self.of_effects)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""

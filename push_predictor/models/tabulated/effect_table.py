@@ -28,11 +28,11 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.effects.coefficients import Coefficients, changed_names, coefficients_of
 from push_predictor.models.effects.effect import responses_of
 from push_predictor.models.effects.exact import (
     Changes,
     displaced,
-    quantities_of,
     slopes_of,
     sums_of,
     within_limits,
@@ -72,8 +72,7 @@ class EffectSource:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters that change."""
-        effects = self.predictor.effects
-        return tuple(dict.fromkeys(name for k in self.exact for name in quantities_of(effects[k])))
+        return changed_names(self.predictor.effects)
 
     @cached_property
     def spreads(self) -> Array:
@@ -139,44 +138,6 @@ class EffectSource:
         slider = heading - np.arctan2(normal[:, 1], normal[:, 0])
         headings = {"slider_heading": slider, "push_heading": heading + inputs[:, 2]}
         return Push(inputs, np.full(len(inputs), self.duration), headings)
-
-
-@dataclass(frozen=True, eq=False)
-class Coefficients:
-    """All coefficients (m,) of a model's effects, with their covariance (m, m), in the order of the effects.
-
-    parameter (m,): the parameter of a table that each acts on. linear (m,): whether the shift is linear in it, so that
-    it must be added to a table's.
-    """
-
-    values: Array
-    covariance: Array
-    parameter: IntArray
-    linear: BoolArray
-
-
-def coefficients_of(source: EffectSource) -> Coefficients:
-    """The coefficients of a source's effects."""
-    effects = source.predictor.effects
-    starts = np.cumsum([0, *(len(effect.coefficients) for effect in effects)])
-    parts = [slice(*ends) for ends in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True)]
-    covariance = np.zeros((starts[-1], starts[-1]))
-    for part, effect in zip(parts, effects, strict=True):
-        covariance[part, part] = effect.covariance
-    for (i, j), shared in source.predictor.cross.items():
-        covariance[parts[i], parts[j]], covariance[parts[j], parts[i]] = shared, shared.T
-    parameter, used = [], len(source.names)
-    for effect in effects:
-        columns = effect.basis.values({name: np.zeros(1) for name in effect.basis.drivers}, 1).shape[1]
-        count = len(effect.coefficients) // columns
-        own = (
-            [source.names.index(name) for name in quantities_of(effect)] if effect.exact else range(used, used + count)
-        )
-        used += 0 if effect.exact else count
-        parameter.append(np.repeat(own, columns))
-    linear = np.concatenate([np.full(len(effect.coefficients), not effect.exact) for effect in effects])
-    values = np.concatenate([effect.coefficients for effect in effects])
-    return Coefficients(values, covariance, np.concatenate(parameter), linear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +221,7 @@ class EffectTable:
     @cached_property
     def coefficients(self) -> Coefficients:
         """The coefficients of the effects."""
-        return coefficients_of(self.source)
+        return coefficients_of(self.source.predictor.effects, self.source.predictor.cross)
 
     def _columns(self, push: Push) -> Array:
         """The basis columns (n, m) that go with the coefficients."""

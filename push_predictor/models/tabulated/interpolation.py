@@ -103,15 +103,15 @@ class TensorSpline:
     def at(self, point: Sequence[float], box: int) -> Array:
         """Values (K,) at one point, in plain numbers: an array of one row costs several times as much."""
         index: list[Any] = [box]
-        weights = []
+        weights: list[float] = []
         for x, (low, per_unit, last) in zip(point, self._sides, strict=True):
             place = (x - low) * per_unit
             cell = min(int(place), last)
             index.append(slice(cell, cell + 4))
-            weights.append(_weights(place - cell))
-        values = self.coefficients[tuple(index)]
-        for weight in weights:
-            values = np.dot(weight, values.reshape(4, -1))
+            weights += _weights(place - cell)
+        values, of_sides = self.coefficients[tuple(index)], np.array(weights)
+        for start in range(0, len(weights), 4):
+            values = of_sides[start : start + 4].dot(values.reshape(4, -1))
         return np.asarray(values)
 
     def __call__(self, points: Array, box: IntArray | int) -> Array:

@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import acos, atan2, inf, pi
 
 import numpy as np
 
-from push_predictor.models.effects.exact import quantities_of
+from push_predictor.models.effects.plain_effects import Columns, PlainEffects
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Shift
 from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
@@ -35,8 +35,12 @@ class SingleEffects:
     def __init__(self, table: EffectTable) -> None:
         source, known = table.source, table.coefficients
         self._table = table
-        self._effects = [_PlainEffect(table, k) for k in range(len(source.predictor.effects))]
-        self._spreads, self._centre = source.spreads.tolist(), table.change.centre.tolist()
+        effects, spreads = source.predictor.effects, source.spreads.tolist()
+        self._effects = PlainEffects(effects, source.names, spreads)
+        stepped = [effect.basis.name in STEPPED for effect in effects]
+        self._stepped = [k for k, steps in enumerate(stepped) if steps]
+        self._flowing = [k for k, steps in enumerate(stepped) if not steps]
+        self._centre = table.change.centre.tolist()
         self._levels, self._directions = table.change.levels.tolist(), table.change.directions.tolist()
         self._ends = list(zip(table.change.low.tolist(), table.change.high.tolist(), strict=True))
         self._linear = known.values * known.linear if known.linear.any() else None
@@ -49,37 +53,34 @@ class SingleEffects:
 
     def shift(self, push: Push) -> Shift | None:
         """The shift at one push (n = 1), see EffectTable.shift; None where the table does not contain the push."""
-        velocity, contact, angle = push.inputs[0].tolist()
-        covariates = {name: float(column[0]) for name, column in push.covariates.items()}
-        table = self._table
+        (velocity, contact, angle), table = push.inputs[0].tolist(), self._table
         ratio = float(push.duration[0]) / table.source.duration
         speed = velocity * ratio
         (least, most), (low, high) = table.angles, table.speeds
         inside = least - MARGIN <= angle <= most + MARGIN and low - MARGIN * high <= speed <= high * (1.0 + MARGIN)
         if not inside or not (table.any_duration or abs(ratio - 1.0) <= MARGIN):
             return None
+        given = {name: float(column[0]) for name, column in push.covariates.items()}
         side, edge, place = self._located(contact)
         point = [place, min(max(angle, least), most)]
         if table.by_speed:
             point.append(min(max(speed, low), high))
         if table.by_heading:
-            heading = self._heading(contact, side, angle, covariates)
+            heading = self._heading(contact, side, angle, given)
             if heading is None:
                 return None
             point.append(heading)
-        columns = [effect.columns(covariates) for effect in self._effects]
+        columns = self._effects.columns(given)
         level = self._changed(columns, point)
         if level is None:
             return None
-        box = edge * len(self._levels) + level
-        slopes = speed * table.slopes.at(point, box)
-        known = table.coefficients
-        tiled = [value for effect, own in zip(self._effects, columns, strict=True) for value in own * effect.count]
-        design = slopes.reshape(-1, 3)[known.parameter] * np.array(tiled)[:, None]
+        box, known = edge * len(self._levels) + level, table.coefficients
+        slopes = table.slopes.at(point, box).reshape(-1, 3)
+        design = slopes[known.parameter] * (speed * self._effects.design(columns))
         mean = speed * table.moved.at(point, box)
         if self._linear is not None:
             mean = mean + self._linear @ design
-        return Shift(mean[None], (design.T @ known.covariance @ design)[None])
+        return Shift(mean[None], design.T.dot(known.covariance).dot(design)[None])
 
     def _located(self, contact: float) -> tuple[int, int, float]:
         """The edge of a contact, its number among those that differ, and the place on it; see PlaceAxis."""
@@ -104,11 +105,10 @@ class SingleEffects:
             return None
         return _turned(heading)
 
-    def _changed(self, columns: Sequence[Sequence[float]], point: list[float]) -> int | None:
+    def _changed(self, columns: Columns, point: list[float]) -> int | None:
         """The level of the changes, with their places appended to the point; None where they are not in the table."""
-        stepped, away = [0.0] * len(self._spreads), [-centre for centre in self._centre]
-        for effect, own in zip(self._effects, columns, strict=True):
-            effect.add(stepped if effect.stepped else away, own, self._spreads)
+        flowing = self._effects.changes(columns, self._flowing)
+        away = [change - centre for change, centre in zip(flowing, self._centre, strict=True)]
         for direction, (low, high) in zip(self._directions, self._ends, strict=True):
             place = sum(a * d for a, d in zip(away, direction, strict=True))
             away = [a - place * d for a, d in zip(away, direction, strict=True)]
@@ -117,33 +117,11 @@ class SingleEffects:
             point.append(min(max(place, low), high))
         if not all(abs(a) <= SAME for a in away):
             return None
+        stepped = self._effects.changes(columns, self._stepped)
         for level, known in enumerate(self._levels):
             if all(abs(change - other) <= SAME for change, other in zip(stepped, known, strict=True)):
                 return level
         return None
-
-
-class _PlainEffect:
-    """One effect: its basis, and how it changes the parameters."""
-
-    def __init__(self, table: EffectTable, number: int) -> None:
-        effect = table.source.predictor.effects[number]
-        self._basis = effect.basis
-        self.stepped = effect.basis.name in STEPPED
-        width = len(effect.basis.values_one(dict.fromkeys(effect.basis.drivers, 0.0)))
-        self.count = len(effect.coefficients) // width
-        rows = effect.coefficients.reshape(self.count, width).tolist()
-        names = quantities_of(effect) if effect.exact else ()
-        self._rows = [(table.source.names.index(name), row) for name, row in zip(names, rows, strict=False)]
-
-    def columns(self, covariates: Mapping[str, float]) -> list[float]:
-        """The columns of the basis."""
-        return self._basis.values_one(covariates)
-
-    def add(self, changes: list[float], columns: Sequence[float], spreads: Sequence[float]) -> None:
-        """Add the effect's changes of parameters, in units of spreads, to those of others."""
-        for number, row in self._rows:
-            changes[number] += sum(c * x for c, x in zip(row, columns, strict=True)) / spreads[number]
 
 
 def _turned(angle: float) -> float:

@@ -98,27 +98,26 @@ class TabulatedModel:
 
         Of an extended model the base is tabulated. Its effects are computed and added, unless they have a table.
         """
-        found, tails = self._predicted(inputs, duration, covariates), self.model.predictor.tails
+        found, tails = self._predicted(Push(inputs, duration, covariates or {})), self.model.predictor.tails
         if found.tails is tails:
             return found
         return Prediction(found.mean, found.covariance, found.process_covariance, found.in_domain, tails)
 
-    def _predicted(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
+    def _predicted(self, push: Push) -> Prediction:
         if self.effects is None:
-            return self._computed(inputs, duration, covariates)
-        push = self.model.predictor.completed(Push(inputs, duration, covariates or {}))
-        if len(inputs) == 1:
+            return self._computed(push)
+        push = self.model.predictor.completed(push)
+        if len(push.inputs) == 1:
             alone = self._single_effects.shift(push)
-            return self._computed(inputs, duration, covariates) if alone is None else self._shifted(push, alone)
+            return self._computed(push) if alone is None else self._shifted(push, alone)
         located = self.effects.located(push)
         if located.inside.all():
             return self._shifted(push, self.effects.shift(push, located))
         if not located.inside.any():
-            return self._computed(inputs, duration, covariates)
+            return self._computed(push)
         chosen, other = (_taken(push, rows) for rows in (located.inside, ~located.inside))
-        exact = self._computed(other.inputs, other.duration, other.covariates)
         table = self._shifted(chosen, self.effects.shift(chosen, self.effects.located(chosen)))
-        return _merged(located.inside, table, exact)
+        return _merged(located.inside, table, self._computed(other))
 
     def _shifted(self, push: Push, shift: Shift) -> Prediction:
         """Predictions from what the base adds to a table of effects, and the shift in that table; push: completed."""
@@ -130,24 +129,23 @@ class TabulatedModel:
             rest.in_domain & self.model.in_covariate_ranges(push.covariates, len(push.inputs)),
         )
 
-    def _computed(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
-        if self.domain is None:
-            return self._exactly(Push(inputs, duration, covariates or {}))
-        push, predictor = Push(inputs, duration, covariates or {}), self._exact.predictor
-        prediction = self._of_base(self._learnt(self.domain, inputs, duration), push)
+    def _computed(self, push: Push) -> Prediction:
+        """Predictions with the effects computed."""
+        base, predictor = self._base(push), self._exact.predictor
         if not predictor.effects:
-            return prediction
-        moments = predictor.with_effects(_moments(prediction), push)
-        return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
-
-    def _exactly(self, push: Push) -> Prediction:
-        """Predictions of the model itself. Where its base is mechanics, the domain of one push is found in numbers."""
-        if len(push.inputs) > 1 or not isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
-            return self._exact.predict_rows(push.inputs, push.duration, push.covariates)
-        inside = self._in_domain(push.inputs)
+            return base
+        moments, inside = predictor.with_effects(_moments(base), push), base.in_domain
         if self.model.covariate_ranges:  # an array of one True would take a tenth of the time
             inside = inside & self.model.covariates_seen(push)
-        return Prediction(*self._exact.predictor.moments(push), inside)
+        return Prediction(*moments, inside)
+
+    def _base(self, push: Push) -> Prediction:
+        """Predictions of the base. Where it is mechanics, the domain of one push is found in numbers."""
+        if self.domain is not None:
+            return self._of_base(self._learnt(self.domain, push.inputs, push.duration), push)
+        if len(push.inputs) == 1 and isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
+            return Prediction(*self._exact.predictor.base.moments(push), self._in_domain(push.inputs))
+        return self._exact.base.predict_rows(push.inputs, push.duration, push.covariates)
 
     def predict_one(self, push: PushRequest) -> Prediction:
         """The same for one push (n = 1)."""
