@@ -31,13 +31,13 @@ def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
 
     The text begins with OUT_OF_DOMAIN, and names what is outside for the first push that is.
     """
+    count = len(in_domain)
+    if count == 1:  # in plain numbers: a server adds it to single predictions
+        return "" if in_domain[0] else f"{OUT_OF_DOMAIN}: {_reason(model, push, 0)}"
     if in_domain.all():
         return ""
-    first, count = int(in_domain.argmin()), len(in_domain)
+    first, outside = int(in_domain.argmin()), int(np.count_nonzero(~in_domain))
     reason = _reason(model, push, first)
-    if count == 1:
-        return f"{OUT_OF_DOMAIN}: {reason}"
-    outside = int(np.count_nonzero(~in_domain))
     return f"{OUT_OF_DOMAIN}: {outside} of {count} pushes, first push {first}: {reason}"
 
 

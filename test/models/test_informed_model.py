@@ -34,7 +34,6 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import PushRequest
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
@@ -158,7 +157,7 @@ def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_f
             found, expected = (m.predict_rows(rows.inputs, rows.duration) for m in (table, model))
             assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 1e-3
             np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
-        one = table.predict_one(PushRequest(*few.inputs[0], 0.2))
+        one = table.predict_rows(few.inputs[:1], np.full(1, 0.2))
         np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
 
 

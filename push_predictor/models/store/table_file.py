@@ -50,7 +50,7 @@ from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, comp
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
-FORMAT_VERSION = 3  # also to be raised when a table's values change their meaning
+FORMAT_VERSION = 4  # also to be raised when a table's values change their meaning
 RECORD = "record"
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
 
@@ -60,8 +60,7 @@ def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
     arrays: dict[str, Array] = {}
     record = {"format_version": FORMAT_VERSION, "model": digest, **_base_record(tabulated, arrays)}
     if tabulated.effects is not None:
-        record["moved"] = _spline_record(tabulated.effects.moved, "moved", arrays)
-        record["slopes"] = _spline_record(tabulated.effects.slopes, "slopes", arrays)
+        record["effects"] = _spline_record(tabulated.effects.spline, "effects", arrays)
     if tabulated.effects_how:
         record["effects_how"] = tabulated.effects_how
     if "how" not in record and "effects_how" not in record:
@@ -83,10 +82,9 @@ def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | N
         if tabulated is None or not model.predictor.effects:
             return tabulated
         how = str(record["effects_how"])
-        if "moved" not in record:
+        if "effects" not in record:
             return with_effects(tabulated, None, how)
-        splines = (_spline(record[name], arrays[name]) for name in ("moved", "slopes"))
-        effects = effect_table_from(tabulated.model, *splines)
+        effects = effect_table_from(tabulated.model, _spline(record["effects"], arrays["effects"]))
         return None if effects is None else with_effects(tabulated, effects, how)
     except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None

@@ -154,8 +154,8 @@ class Located:
 class EffectTable:
     """A table of effects.
 
-    moved, slopes: shift and its derivatives, per speed, over place, angle, and, where they matter, speed, heading and
-    changes; the derivatives need fewer knots. angles: range, rad.
+    spline: the shift (3) and its derivatives (3 p) by p parameters, per speed, over place, angle, and, where they
+    matter, speed, heading and changes. angles: range, rad.
     speeds: range at the duration of the source, m/s; one speed where they are equal. any_duration: whether another
     duration does the same as another speed.
     """
@@ -168,13 +168,7 @@ class EffectTable:
     by_speed: bool
     by_heading: bool
     any_duration: bool
-    moved: TensorSpline
-    slopes: TensorSpline
-
-    @property
-    def knots(self) -> int:
-        """Number of knots of both splines."""
-        return self.moved.knots + self.slopes.knots
+    spline: TensorSpline
 
     def located(self, push: Push) -> Located:
         """Where n pushes, with all covariates that the effects need, lie in the table."""
@@ -211,9 +205,9 @@ class EffectTable:
     def shift(self, push: Push, located: Located) -> Shift:
         """The shift by all effects at pushes inside, with the displacement of the base's mechanics if anchored."""
         known, speed = self.coefficients, located.speed[:, None]
-        by_parameter = (self.slopes(located.points, located.box) * speed).reshape(len(speed), -1, 3)
+        values = (self.spline(located.points, located.box) * speed).reshape(len(speed), -1, 3)
+        mean, by_parameter = values[:, 0], values[:, 1:]
         design = by_parameter[:, known.parameter] * self._columns(push)[:, :, None]
-        mean = self.moved(located.points, located.box) * speed
         if known.linear.any():
             mean = mean + np.einsum("nmk,m->nk", design, known.values * known.linear)
         return Shift(mean, design.transpose(0, 2, 1) @ known.covariance @ design)

@@ -57,7 +57,7 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
             how += "; a table would need too many knots"
             continue
         of_mean, of_covariance = table_errors(model, table)
-        found = f"table of {table.knots} knots, means to {of_mean:.2g} standard deviations"
+        found = f"table of {table.spline.knots} knots, means to {of_mean:.2g} standard deviations"
         found += f", covariances to {100.0 * of_covariance:.2g} %"
         if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE:
             return table, found
@@ -65,14 +65,14 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     return None, f"exact{how}"
 
 
-def effect_table_from(model: PushModel, moved: TensorSpline, slopes: TensorSpline) -> EffectTable | None:
-    """A table of splines that were built before; None unless it agrees with the model. Raises ValueError or IndexError
-    if they do not fit the model.
+def effect_table_from(model: PushModel, spline: TensorSpline) -> EffectTable | None:
+    """A table of a spline that was built before; None unless it agrees with the model. Raises ValueError or IndexError
+    if it does not fit the model.
     """
     builder = _builder(model)
     if isinstance(builder, str):
         return None
-    table = builder.with_splines(moved, slopes)
+    table = builder.with_spline(spline)
     of_mean, of_covariance = table_errors(model, table, RECHECKED, 0.5)
     return table if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE else None
 
@@ -175,21 +175,27 @@ class _Builder:
         return rng.uniform(low, high, (PROBES, 3)), heading, self.change.changes(level, places)
 
     def table(self, work: int) -> EffectTable | None:
-        """The finest table for this work; None if it would be too coarse to try."""
+        """The finest table for this work; None if it would be too coarse to try.
+
+        The derivatives take more integrations, and are computed at fewer knots.
+        """
         parameters = max(len(self.source.names), 1)
-        moved, slopes = self._factor(work, 1), self._factor(work, 2 * parameters)
-        if slopes < COARSEST:
+        fine, coarse = self._factor(work, 1), self._factor(work, 2 * parameters)
+        if coarse < COARSEST:
             return None
-        return self.with_splines(
-            self._spline(self._axes(moved), self._moved), self._spline(self._axes(slopes), self.source.slopes)
-        )
+        axes = self._axes(fine)
+        moved = TensorSpline.through(axes, self._at_knots(axes, self._moved))
+        slopes = TensorSpline.through(axes, self._at_knots(self._axes(coarse), self.source.slopes))
+        together = np.concatenate([moved.coefficients, slopes.coefficients], axis=-1)
+        return self.with_spline(TensorSpline(axes, together.astype(np.float32)))
 
-    def with_splines(self, moved: TensorSpline, slopes: TensorSpline) -> EffectTable:
-        """The table with these splines."""
+    def with_spline(self, spline: TensorSpline) -> EffectTable:
+        """The table with this spline."""
         axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
-        return EffectTable(self.source, *axes, moved, slopes)
+        return EffectTable(self.source, *axes, spline)
 
-    def _spline(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> TensorSpline:
+    def _at_knots(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> Array:
+        """The values (boxes, cells_1 + 1, ..., cells_D + 1, K), per speed, at the knots of these axes."""
         boxes = self.place.edges * len(self.change.levels)
         knots = [np.linspace(axis.low, axis.high, axis.cells + 1) for axis in axes]
         grid = np.stack(np.meshgrid(np.arange(float(boxes)), *knots, indexing="ij"), axis=-1)
@@ -201,7 +207,7 @@ class _Builder:
         places = np.column_stack(columns) if columns else np.empty((len(box), 0))
         changes = self.change.changes(box % len(self.change.levels), places)
         found = values(np.column_stack([speed, contact, angle]), heading, changes) / speed[:, None]
-        return TensorSpline.through(axes, found.reshape(*grid.shape[:-1], -1))
+        return np.asarray(found.reshape(*grid.shape[:-1], -1))
 
     def _moved(self, inputs: Array, heading: Array, changes: Array) -> Array:
         """Shift (n, 3) at knots; its part without changes is computed once for those that differ in changes alone."""

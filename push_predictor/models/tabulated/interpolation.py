@@ -90,9 +90,13 @@ class TensorSpline:
 
     @classmethod
     def through(cls, axes: Sequence[Axis], values: Array) -> TensorSpline:
-        """The splines through values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots."""
+        """The splines through values (boxes, k_1 + 1, ..., k_D + 1, K) at the knots of splines with k cells an axis: as
+        many as these axes have, or fewer.
+        """
         for d, axis in enumerate(axes):
-            values = along(d + 1, _knots_to_coefficients(axis.cells), values)
+            cells = values.shape[d + 1] - 1
+            same = cells == axis.cells
+            values = along(d + 1, _knots_to_coefficients(cells) if same else axis.coarse_to_coefficients(cells), values)
         return cls(axes, values)
 
     @property

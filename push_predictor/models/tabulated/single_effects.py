@@ -41,8 +41,9 @@ class SingleEffects:
         self._stepped = [k for k, steps in enumerate(stepped) if steps]
         self._flowing = [k for k, steps in enumerate(stepped) if not steps]
         self._centre = table.change.centre.tolist()
-        self._levels, self._directions = table.change.levels.tolist(), table.change.directions.tolist()
-        self._ends = list(zip(table.change.low.tolist(), table.change.high.tolist(), strict=True))
+        self._levels, change = table.change.levels.tolist(), table.change
+        self._sides = list(zip(change.directions.tolist(), change.low.tolist(), change.high.tolist(), strict=True))
+        self._rows = 1 + known.parameter  # of the spline's values, after the shift
         self._linear = known.values * known.linear if known.linear.any() else None
         outline, self._edges = table.place.outline, table.place.edges
         starts = outline.edge_starts
@@ -75,9 +76,8 @@ class SingleEffects:
         if level is None:
             return None
         box, known = edge * len(self._levels) + level, table.coefficients
-        slopes = table.slopes.at(point, box).reshape(-1, 3)
-        design = slopes[known.parameter] * (speed * self._effects.design(columns))
-        mean = speed * table.moved.at(point, box)
+        values = (speed * table.spline.at(point, box)).reshape(-1, 3)
+        mean, design = values[0], values[self._rows] * self._effects.design(columns)
         if self._linear is not None:
             mean = mean + self._linear @ design
         return Shift(mean[None], design.T.dot(known.covariance).dot(design)[None])
@@ -109,13 +109,13 @@ class SingleEffects:
         """The level of the changes, with their places appended to the point; None where they are not in the table."""
         flowing = self._effects.changes(columns, self._flowing)
         away = [change - centre for change, centre in zip(flowing, self._centre, strict=True)]
-        for direction, (low, high) in zip(self._directions, self._ends, strict=True):
-            place = sum(a * d for a, d in zip(away, direction, strict=True))
-            away = [a - place * d for a, d in zip(away, direction, strict=True)]
+        for direction, low, high in self._sides:
+            place = sum([a * d for a, d in zip(away, direction, strict=True)])
             if not low - SAME <= place <= high + SAME:
                 return None
+            away = [a - place * d for a, d in zip(away, direction, strict=True)]
             point.append(min(max(place, low), high))
-        if not all(abs(a) <= SAME for a in away):
+        if away and not max(map(abs, away)) <= SAME:
             return None
         stepped = self._effects.changes(columns, self._stepped)
         for level, known in enumerate(self._levels):

@@ -45,7 +45,6 @@ from push_predictor.models.predictors import (
     Shift,
 )
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import PushRequest
 from push_predictor.models.tabulated.effect_table import EffectTable
 from push_predictor.models.tabulated.effect_table_build import build_effect_table
 from push_predictor.models.tabulated.prediction_table import OnGrid, TooFineError, on_grid
@@ -62,6 +61,7 @@ from push_predictor.models.tabulated.tabulated_domain import (
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
+MECHANICS = (AnalyticalPredictor, MechanicsPredictor)
 ONLY_LEARNT = "exact: only learnt models have a table"
 REFINEMENTS = (0.8, 1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
@@ -143,13 +143,9 @@ class TabulatedModel:
         """Predictions of the base. Where it is mechanics, the domain of one push is found in numbers."""
         if self.domain is not None:
             return self._of_base(self._learnt(self.domain, push.inputs, push.duration), push)
-        if len(push.inputs) == 1 and isinstance(self.model.predictor.base, AnalyticalPredictor | MechanicsPredictor):
+        if len(push.inputs) == 1 and isinstance(self.model.predictor.base, MECHANICS):
             return Prediction(*self._exact.predictor.base.moments(push), self._in_domain(push.inputs))
         return self._exact.base.predict_rows(push.inputs, push.duration, push.covariates)
-
-    def predict_one(self, push: PushRequest) -> Prediction:
-        """The same for one push (n = 1)."""
-        return self.predict_rows(*push.arrays)
 
     def free_matrices(self) -> None:
         """Free the matrices of the model, 50 MB for a VHGP of 1000 rows, if it predicts from a table."""
@@ -194,7 +190,7 @@ class TabulatedModel:
     def _added(self, push: Push) -> Prediction:
         """What the base adds to a table of effects: all but the displacement of its mechanics."""
         predictor, n = self.model.predictor.base, len(push.inputs)
-        if isinstance(predictor, AnalyticalPredictor | MechanicsPredictor):
+        if isinstance(predictor, MECHANICS):
             covariance = predictor.covariance[None].repeat(n, axis=0)
             return Prediction(np.zeros((n, 3)), covariance, covariance, self._in_domain(push.inputs))
         if self.domain is None:

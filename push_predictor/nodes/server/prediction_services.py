@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -56,13 +57,14 @@ def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) ->
     tabulated = registry.get(request.model)
     push = with_own_window(tabulated.model, asked)
     check_request(tabulated.model, push)
-    prediction = tabulated.predict_one(push)
+    arrays = push.arrays
+    prediction = tabulated.predict_rows(*arrays)
     _check_finite(tabulated, prediction, 0)
     if residual is not None:
         prediction = _given_residual(tabulated.model, push, prediction, residual)
     fill_response(response, prediction)
     if not response.in_domain:
-        response.message = domain_remark(tabulated.model, Push(*push.arrays), prediction.in_domain)
+        response.message = domain_remark(tabulated.model, Push(*arrays), prediction.in_domain)
 
 
 def handle_predict_push_batch(
@@ -117,13 +119,21 @@ def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
 
 def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:
     """Raise PredictionError for the first push without a finite prediction; start: index of the chunk's first push."""
+    if len(prediction) == 1:  # in plain numbers, a fifth of the time
+        numbers = prediction.mean[0].tolist() + prediction.covariance[0].ravel().tolist()
+        bad = None if isfinite(sum(numbers)) else 0
+    else:
+        bad = _first_not_finite(prediction)
+    if bad is not None:
+        raise PredictionError(
+            f"push {start + bad}: {tabulated.model.name} has no finite prediction: the velocity or a covariate is too "
+            "far from the training data"
+        )
+
+
+def _first_not_finite(prediction: Prediction) -> int | None:
     if prediction.in_domain.all():
-        return  # a model is finite between the pushes that it was trained on
+        return None  # a model is finite between the pushes that it was trained on
     # A sum is finite only if all of its terms are.
     finite = np.isfinite(prediction.mean.sum(axis=1) + prediction.covariance.sum(axis=(1, 2)))
-    if not finite.all():
-        index = start + int(np.argmin(finite))
-        raise PredictionError(
-            f"push {index}: {tabulated.model.name} has no finite prediction: the velocity or a covariate is too far "
-            "from the training data"
-        )
+    return None if finite.all() else int(np.argmin(finite))

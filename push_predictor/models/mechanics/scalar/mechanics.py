@@ -57,7 +57,8 @@ class ScalarMechanics(FittedMechanics):
         changes: Mapping[str, Array] = NO_CHANGES,
     ) -> Array:
         """See FittedMechanics."""
-        given, pushes = covariates or {}, np.column_stack([inputs, duration]).tolist()
+        given = covariates or {}
+        pushes = [(*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)]
         plain = 0 < len(pushes) <= FEW and all(isfinite(sum(push)) for push in pushes)
         if not plain or not self.is_plain(tuple(changes), given):
             return super().displacement(inputs, duration, covariates, changes)
