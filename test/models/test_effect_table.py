@@ -340,7 +340,7 @@ def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: py
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.3)
     found = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
     monkeypatch.setattr(effect_table_build, "WORK", (3_000,))
-    assert found.effects is not None and found.effects.knots > 15_000
+    assert found.effects is not None and found.effects.spline.knots > 15_000
     monkeypatch.setattr(effect_table_build, "COARSEST", 9.0)
     assert "too many knots" in with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).how
 
