@@ -246,6 +246,21 @@ def test_headings_of_slider_and_push_that_disagree_are_computed() -> None:
     assert_equal(single(table, differ), single(computed, differ))
 
 
+def test_changes_that_did_not_occur_together_are_computed() -> None:
+    """In training both effects follow each other: their changes lie on a line, and a push beside it is no row of it."""
+    warm = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
+    model = extended("analytical", effect("contact_friction", DRIFT, 0.5), effect("pressure_spread", warm, 0.5))
+    rows = model.training
+    together = (rows.covariates["elapsed_time"] - 500.0) / 300.0
+    computed = tabulate(replace(model, training=with_covariate(rows, "topic:/warmth", together)))
+    table = with_effect_table(computed)
+    assert table.effects is not None and len(table.effects.change.directions) == 1, table.how
+    known = inside(6)
+    apart = with_covariate(known, "topic:/warmth", 0.5 + (known.covariates["elapsed_time"] - 500.0) / 300.0)
+    assert_equal(predicted(table, apart), predicted(computed, apart))
+    assert_equal(single(table, apart), single(computed, apart))
+
+
 def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
     table = with_effect_table(tabulate(extended("about nothing", effect("contact_friction", LATER, 0.0))))
     assert table.effects is not None

@@ -121,6 +121,17 @@ def test_rim_exponent_has_the_same_effect(exponent: float) -> None:
     assert_same(FittedMechanics(SUPPORTS["patch"], {"rim_exponent": exponent}), seed=2)
 
 
+@pytest.mark.parametrize(("name", "most"), [("rim_exponent", 0.8), ("pressure_spread", 0.3)])
+def test_changes_of_the_pressure_count_push_by_push(name: str, most: float) -> None:
+    fitted, (inputs, duration, covariates) = FittedMechanics(SUPPORTS["patch"], {"contact_friction": 0.25}), pushes(8)
+    changes = {name: np.linspace(0.0, most, 8)}
+    together = fitted.displacement(inputs, duration, covariates, changes)
+    alone = scalar_mechanics(fitted).displacement(inputs, duration, covariates, changes)
+    assert alone * IN_METRES == pytest.approx(together * IN_METRES, rel=2e-5, abs=2e-7)
+    unchanged = fitted.displacement(inputs, duration, covariates)
+    assert np.abs((alone - unchanged) * IN_METRES)[-1].max() > 1e-5
+
+
 def test_all_parameters_together_have_the_same_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {p.name: p.textbook + p.spread for p in PARAMETERS if p.name != "inertia"}
     assert_same(FittedMechanics(SUPPORTS["ellipse"], values), n=6, seed=3)

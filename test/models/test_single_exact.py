@@ -92,7 +92,7 @@ CASES = {
     "of an input": (effect("contact_friction", BY_SPEED, 0.3),),
     "two on one parameter": (effect("contact_friction", ALWAYS), effect("contact_friction", DRIFT, 0.3)),
     "two": (effect("centre_of_friction", ALWAYS), effect("contact_friction", DRIFT, 0.3)),
-    "beyond what a rig can have": (effect("contact_friction", DRIFT, 40.0),),
+    "beyond what a rig can have": (effect("centre_of_friction", DRIFT, 4.0),),
 }
 
 
@@ -134,9 +134,13 @@ def test_the_heading_of_the_slider_counts_more_than_that_of_the_push() -> None:
         np.testing.assert_allclose(predictor.with_scalar_mechanics().shift(given).mean, expected, rtol=1e-4, atol=1e-8)
 
 
-@pytest.mark.parametrize("what", ["linear in its coefficients", "inertia", "a speed that is not finite", "two pushes"])
+@pytest.mark.parametrize(
+    "what",
+    ["linear in its coefficients", "inertia", "inertia of an effect", "a speed that is not finite", "two pushes"],
+)
 def test_other_pushes_are_computed_as_arrays(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    acting = effect("contact_friction", ALWAYS, exact=what != "linear in its coefficients")
+    name = "inertia" if what == "inertia of an effect" else "contact_friction"
+    acting = effect(name, ALWAYS, exact=what != "linear in its coefficients")
     of_effects = replace(FITTED, values={"inertia": 0.1}) if what == "inertia" else None
     predictor, push = extended(acting, of_effects=of_effects), pushes(2)
     if what != "two pushes":
