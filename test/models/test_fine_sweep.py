@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, KindRateOf, KindRates, swept_finely
-from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP
+from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, swept
 from push_predictor.models.mechanics.scalar import sweep as scalar
 from push_predictor.types import Array, IntArray
 
@@ -113,3 +113,28 @@ def test_the_difference_is_that_of_a_method_of_third_order() -> None:
         (1 / 8, 3 / 8, 3 / 8, 1 / 8),
     )
     assert weights @ stages @ places == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_rates_that_are_not_numbers_end_a_sweep_with_none() -> None:
+    calls = 0
+
+    def together(rows: IntArray, pose: Array, done: Array) -> KindRates:
+        nonlocal calls
+        calls += 1
+        assert calls < 200
+        nothing = np.full(len(rows), np.nan)
+        return np.full((len(rows), 3), np.nan), np.zeros(len(rows)), nothing, nothing
+
+    def coarsely(rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
+        return together(rows, pose, done)[:3]
+
+    def alone(x: float, y: float, heading: float, done: float) -> scalar.Rates:
+        together(np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.zeros(1))
+        return np.nan, np.nan, np.nan, 0.0, np.nan, np.nan
+
+    travel, length = np.full(2, TRAVEL), np.full(2, LENGTH)
+    assert np.isnan(swept_finely(together, travel, length, ACCURACY)).all()
+    assert np.isnan(swept(coarsely, travel, length, 1e-3)).all()
+    assert np.isnan(scalar.swept(alone, TRAVEL, LENGTH, 1e-3)).all()
+    assert np.isnan(scalar.swept_finely(alone, TRAVEL, LENGTH, ACCURACY)).all()

@@ -34,6 +34,7 @@ from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.supports import on_supports
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
 from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
@@ -78,6 +79,27 @@ def test_range_of_a_needed_covariate_bounds_the_domain() -> None:
     model = mechanics_model({"grain_x": 0.3}, push_heading=np.linspace(0.0, 0.5, 24))
     found = model.predict(Pushes(0.02, 0.3, 0.2, covariates={"push_heading": [0.2, 2.0]}))
     assert found.in_domain.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("values", "covariates"),
+    [
+        ({"grain_x": 0.3}, {"push_heading": np.linspace(0.0, 0.5, 24)}),
+        ({"contact_friction": 0.2}, {"recording": np.zeros(24)}),
+    ],
+    ids=["push_heading", "recording"],
+)
+def test_a_served_push_has_the_domain_of_the_model_alone_and_among_others(
+    values: dict[str, float], covariates: dict[str, Array]
+) -> None:
+    model = mechanics_model(values, **covariates)
+    (name,) = covariates
+    inputs, duration, given = np.tile([0.02, 0.3, 0.2], (2, 1)), np.full(2, 0.2), np.array([0.0, 1.0])
+    for served in (model, tabulate(model)):
+        assert served.predict_rows(inputs, duration, {name: given}).in_domain.tolist() == [True, False]
+        for k, inside in enumerate((True, False)):
+            alone = served.predict_rows(inputs[:1], duration[:1], {name: given[k : k + 1]})
+            assert alone.in_domain.tolist() == [inside]
 
 
 def test_support_of_the_recording_is_used_and_saved(by_recording: PushModel, tmp_path: Path) -> None:

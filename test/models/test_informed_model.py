@@ -30,9 +30,10 @@ from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import best_held_out, held_out_score
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, MechanicsMean, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
@@ -159,6 +160,23 @@ def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_f
             np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
         one = table.predict_rows(few.inputs[:1], np.full(1, 0.2))
         np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
+
+
+def test_covariates_of_the_mechanics_bound_the_domain_of_the_table_too() -> None:
+    table = pushes(40, 1)
+    heading = np.linspace(0.0, 0.5, len(table))
+    mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.15, "grain_x": 0.3})
+    options = TrainingOptions(about=MechanicsMean(mechanics, 0.004))
+    model = train_model(replace(table, covariates={"push_heading": heading}), RIG, "gp", name="m", options=options)
+    served, given = tabulate(model), np.array([0.2, 2.0])
+    assert served.tabulated, served.how
+    for predicts in (model, served):
+        both = predicts.predict_rows(table.inputs[:2], table.duration[:2], {"push_heading": given})
+        assert both.in_domain.tolist() == [True, False]
+        for k in range(2):
+            rows = slice(k, k + 1)
+            one = predicts.predict_rows(table.inputs[rows], table.duration[rows], {"push_heading": given[rows]})
+            assert one.in_domain.tolist() == [k == 0]
 
 
 def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel, tmp_path: Path) -> None:

@@ -21,9 +21,10 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.effects.coefficients import Coefficients, coefficients_of
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import Mechanics, joint
-from push_predictor.models.effects.single_exact import SingleExact
+from push_predictor.models.effects.scalar_shift import ScalarShift
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -128,25 +129,25 @@ class ExtendedPredictor:
 
     def shift(self, push: Push) -> Shift:
         """See Predictor."""
+        if not self.effects:
+            return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
         if len(push.inputs) == 1 and self._single is not None and (alone := self._single.shift(push)) is not None:
             return Shift(*alone)
-        uncertainty = np.zeros((len(push.inputs), 3, 3))
         together = joint(Mechanics(self.physics, self.mechanics), self.effects, push)
-        shift, designs = together.shift, together.designs
-        for effect, design in zip(self.effects, designs, strict=True):
-            uncertainty = uncertainty + design @ effect.covariance @ design.transpose(0, 2, 1)
-        for (i, j), covariance in self.cross.items():
-            shared = designs[i] @ covariance @ designs[j].transpose(0, 2, 1)
-            uncertainty = uncertainty + shared + shared.transpose(0, 2, 1)
-        return Shift(shift, uncertainty)
+        design = np.concatenate(together.designs, axis=2)
+        return Shift(together.shift, design @ self._coefficients.covariance @ design.transpose(0, 2, 1))
 
     @cached_property
-    def _single(self) -> SingleExact | None:
+    def _coefficients(self) -> Coefficients:
+        return coefficients_of(self.effects, self.cross)
+
+    @cached_property
+    def _single(self) -> ScalarShift | None:
         """The effects of single pushes in plain numbers; None where they, or the mechanics, have no such form."""
         if not isinstance(self.of_effects, ScalarMechanics) or not all(effect.exact for effect in self.effects):
             return None
-        return SingleExact(self.effects, self.cross, self.of_effects)
+        return ScalarShift(self.effects, self.cross, self.of_effects)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""

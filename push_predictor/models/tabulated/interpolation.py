@@ -94,9 +94,7 @@ class TensorSpline:
         many as these axes have, or fewer.
         """
         for d, axis in enumerate(axes):
-            cells = values.shape[d + 1] - 1
-            same = cells == axis.cells
-            values = along(d + 1, _knots_to_coefficients(cells) if same else axis.coarse_to_coefficients(cells), values)
+            values = along(d + 1, axis.coarse_to_coefficients(values.shape[d + 1] - 1), values)
         return cls(axes, values)
 
     @property

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from math import acos, atan2, inf, pi
+from math import acos, atan2, inf, isfinite, pi
 
 import numpy as np
 
-from push_predictor.models.effects.plain_effects import Columns, PlainEffects
+from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Shift
 from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
@@ -36,7 +36,7 @@ class SingleEffects:
         source, known = table.source, table.coefficients
         self._table = table
         effects, spreads = source.predictor.effects, source.spreads.tolist()
-        self._effects = PlainEffects(effects, source.names, spreads)
+        self._effects = ScalarEffects(effects, source.names, spreads)
         stepped = [effect.basis.name in STEPPED for effect in effects]
         self._stepped = [k for k, steps in enumerate(stepped) if steps]
         self._flowing = [k for k, steps in enumerate(stepped) if not steps]
@@ -62,6 +62,8 @@ class SingleEffects:
         if not inside or not (table.any_duration or abs(ratio - 1.0) <= MARGIN):
             return None
         given = {name: float(column[0]) for name, column in push.covariates.items()}
+        if not isfinite(sum(given.values())):
+            return None
         side, edge, place = self._located(contact)
         point = [place, min(max(angle, least), most)]
         if table.by_speed:

@@ -132,15 +132,13 @@ class TabulatedModel:
     def _computed(self, push: Push) -> Prediction:
         """Predictions with the effects computed."""
         base, predictor = self._base(push), self._exact.predictor
-        if not predictor.effects:
+        if not predictor.effects and not self.model.covariate_ranges:
             return base
-        moments, inside = predictor.with_effects(_moments(base), push), base.in_domain
-        if self.model.covariate_ranges:  # an array of one True would take a tenth of the time
-            inside = inside & self.model.covariates_seen(push)
-        return Prediction(*moments, inside)
+        inside = base.in_domain & self.model.covariates_seen(push)
+        return Prediction(*predictor.with_effects(_moments(base), push), inside)
 
     def _base(self, push: Push) -> Prediction:
-        """Predictions of the base. Where it is mechanics, the domain of one push is found in numbers."""
+        """Predictions of the base; covariates are not looked at. The domain of one push is found in numbers."""
         if self.domain is not None:
             return self._of_base(self._learnt(self.domain, push.inputs, push.duration), push)
         if len(push.inputs) == 1 and isinstance(self.model.predictor.base, MECHANICS):

@@ -119,12 +119,7 @@ def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
 
 def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:
     """Raise PredictionError for the first push without a finite prediction; start: index of the chunk's first push."""
-    if len(prediction) == 1:  # in plain numbers, a fifth of the time
-        numbers = prediction.mean[0].tolist() + prediction.covariance[0].ravel().tolist()
-        bad = None if isfinite(sum(numbers)) else 0
-    else:
-        bad = _first_not_finite(prediction)
-    if bad is not None:
+    if (bad := _first_not_finite(prediction)) is not None:
         raise PredictionError(
             f"push {start + bad}: {tabulated.model.name} has no finite prediction: the velocity or a covariate is too "
             "far from the training data"
@@ -132,8 +127,14 @@ def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int)
 
 
 def _first_not_finite(prediction: Prediction) -> int | None:
-    if prediction.in_domain.all():
-        return None  # a model is finite between the pushes that it was trained on
+    """The first push without a finite prediction; none is in the domain, where a model is finite."""
     # A sum is finite only if all of its terms are.
+    if len(prediction) == 1:  # in plain numbers, a fifth of the time
+        if prediction.in_domain[0]:
+            return None
+        numbers = prediction.mean[0].tolist() + prediction.covariance[0].ravel().tolist()
+        return None if isfinite(sum(numbers)) else 0
+    if prediction.in_domain.all():
+        return None
     finite = np.isfinite(prediction.mean.sum(axis=1) + prediction.covariance.sum(axis=(1, 2)))
     return None if finite.all() else int(np.argmin(finite))

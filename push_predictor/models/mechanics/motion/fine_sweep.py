@@ -65,7 +65,8 @@ def swept_finely(rate_of: KindRateOf, travel: Array, length: Array, accuracy: fl
             middle = stepped.pose[rows.size :], at_half, half, _taken(ended, slice(rows.size, None))
             fine, after_fine = _stepped(rate_of, _Begin(rows[in_halves], *middle))
             after[in_halves] = fine.pose
-            agree[in_halves] = size_of(after - coarse, length[rows])[in_halves] <= allowed[in_halves]
+            apart_by = size_of(after - coarse, length[rows])[in_halves]
+            agree[in_halves] = ~(apart_by > allowed[in_halves])  # what is not a number ends, too
             for part, values in zip(last, after_fine, strict=True):
                 part[in_halves] = values
             # Both are wrong alike where only their last stages have seen a corner: the disc enters the slider.

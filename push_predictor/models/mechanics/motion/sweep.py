@@ -61,7 +61,7 @@ def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Arr
         error = wide * (-5.0 * first + 6.0 * k2 + 8.0 * k3 - 9.0 * last) / 72.0
         allowed = accuracy * (size_of(motion, length[rows]) + OF_TRAVEL * travel[rows])
         ratio = size_of(error, length[rows]) / allowed
-        agree = (ratio <= 1.0) | (h <= shortest)
+        agree = ~(ratio > 1.0) | (h <= shortest)  # what is not a number ends, too
         pose[rows] = np.where(agree[:, None], before + motion, before)
         done[rows] = np.where(agree, at + h, at)
         factor = np.clip(0.9 * np.maximum(ratio, 1e-3) ** (-1.0 / 3.0), 0.2, 4.0)

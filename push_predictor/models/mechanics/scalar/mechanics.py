@@ -24,7 +24,6 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from types import MappingProxyType
 
 import numpy as np
 
@@ -38,7 +37,6 @@ from push_predictor.types import Array
 
 MOST_SURFACES = 64  # that are kept prepared
 FEW = 200  # pushes: as fast as an array of them
-UNCHANGED: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +56,23 @@ class ScalarMechanics(FittedMechanics):
     ) -> Array:
         """See FittedMechanics."""
         given = covariates or {}
-        pushes = [(*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)]
-        plain = 0 < len(pushes) <= FEW and all(isfinite(sum(push)) for push in pushes)
+        pushes: list[tuple[float, float, float, float]] = [
+            (*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)
+        ]
+        columns = {name: column.tolist() for name, column in changes.items()}
+        plain = 0 < len(pushes) <= FEW and all(isfinite(sum(numbers)) for numbers in (*pushes, *columns.values()))
         if not plain or not self.is_plain(tuple(changes), given):
             return super().displacement(inputs, duration, covariates, changes)
         heading = given["push_heading"].tolist() if "push_heading" in given else [0.0] * len(pushes)
         recording = given[RECORDING].tolist() if RECORDING in given else [-1] * len(pushes)
-        columns = {name: column.tolist() for name, column in changes.items()}
         moved = [
-            self.moved(*push, heading[k], recording[k], {name: column[k] for name, column in columns.items()})
-            for k, push in enumerate(pushes)
+            self.moved(*numbers, heading[k], recording[k], {name: column[k] for name, column in columns.items()})
+            for k, numbers in enumerate(pushes)
         ]
         return np.array(moved)
 
     def is_plain(self, changed: Sequence[str], given: Container[str]) -> bool:
-        """Whether pushes are computed in plain numbers that change these parameters and bring these covariates."""
+        """Whether pushes with these changed parameters and these covariates are computed in plain numbers."""
         if "inertia" in changed or self.value("inertia"):
             return False
         needs = [need for name in changed for need in BY_NAME[name].needs]
@@ -86,7 +86,7 @@ class ScalarMechanics(FittedMechanics):
         duration: float,
         heading: float = 0.0,
         recording: float = -1,
-        changes: Mapping[str, float] = UNCHANGED,
+        changes: Mapping[str, float] | None = None,
     ) -> Three:
         """Displacement of one push, without checks.
 

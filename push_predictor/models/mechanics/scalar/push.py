@@ -37,7 +37,7 @@ from push_predictor.models.mechanics.scalar.surface import (
     root_of_stretch,
 )
 from push_predictor.models.mechanics.scalar.sweep import Rate, Rates, swept, swept_finely
-from push_predictor.models.mechanics.scalar.values import Measurement, ScalarValues, Two
+from push_predictor.models.mechanics.scalar.values import RecordingErrors, ScalarValues, Two
 
 if TYPE_CHECKING:
     from push_predictor.models.mechanics.scalar.mechanics import ScalarMechanics
@@ -64,8 +64,8 @@ class ScalarPush:
         self.radius = radius = model.mechanics.pusher_radius
         self.recorded = _turned(nx, ny, angle)  # direction of the path, as it was recorded
         self.tip, self.origin = (x - radius * nx, y - radius * ny), NONE
-        if values.wrong is not None:
-            self._correct(values.wrong, velocity)
+        if values.errors is not None:
+            self._correct(values.errors, velocity)
         self.ahead = _turned(*self.recorded, values.push_rotation)
         self.speed = velocity * (1.0 + values.travel_share)
         self.travel = self.speed * duration
@@ -79,12 +79,12 @@ class ScalarPush:
         self.twist = self._loaded(0.0) if world.grain == world.slope == NONE else None
         self.ellipsoid = self.twist is not None and is_ellipsoid(self.twist)
 
-    def _correct(self, wrong: Measurement, velocity: float) -> None:
+    def _correct(self, errors: RecordingErrors, velocity: float) -> None:
         """From what was recorded to where tip and slider truly are."""
-        (rx, ry), (x, y), turned = self.recorded, self.tip, wrong.rotation
-        (shift_x, shift_y), across = wrong.outline, wrong.across
-        along = wrong.along + velocity * wrong.clock_delay
-        self.radius += wrong.radius
+        (rx, ry), (x, y), turned = self.recorded, self.tip, errors.rotation
+        (shift_x, shift_y), across = errors.outline, errors.across
+        along = errors.along + velocity * errors.clock_delay
+        self.radius += errors.radius
         x, y = x + along * rx - across * ry, y + along * ry + across * rx
         at_x, at_y, nx, ny, _ = self.model.nearest(*_turned(x - shift_x, y - shift_y, -turned))
         self.tip = at_x + nx * self.radius, at_y + ny * self.radius

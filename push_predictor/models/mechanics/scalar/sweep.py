@@ -60,7 +60,7 @@ def swept(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
         ew = part * (-5.0 * aw + 6.0 * bw + 8.0 * cw - 9.0 * last[2]) * length
         allowed = accuracy * (sqrt(mx * mx + my * my + (mw * length) ** 2) + OF_TRAVEL * travel)
         ratio = sqrt(ex * ex + ey * ey + ew * ew) / allowed
-        if ratio <= 1.0 or h <= shortest:
+        if not ratio > 1.0 or h <= shortest:  # what is not a number ends, too
             x, y, heading, done, first = x + mx, y + my, heading + mw, done + h, last
         factor = min(max(0.9 * max(ratio, 1e-3) ** (-1.0 / 3.0), 0.2), 4.0)
         step = min(max(h * factor, shortest), LONGEST_STEP)

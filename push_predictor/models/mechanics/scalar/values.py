@@ -26,7 +26,7 @@ Two: TypeAlias = tuple[float, float]
 TEXTBOOK_FRICTION = BY_NAME["contact_friction"].textbook
 
 
-class Measurement(NamedTuple):
+class RecordingErrors(NamedTuple):
     """By how much a recording is wrong: see parameters, part measurement."""
 
     along: float
@@ -35,6 +35,9 @@ class Measurement(NamedTuple):
     outline: Two
     rotation: float
     radius: float
+
+
+NO_ERRORS = RecordingErrors(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, 0.0)
 
 
 class Friction(NamedTuple):
@@ -57,9 +60,9 @@ class World(NamedTuple):
 
 
 class ScalarValues(NamedTuple):
-    """All values. wrong: None for a recording without errors. same_friction: whether it stays the same along a push."""
+    """All values. errors: None for a recording without. same_friction: whether it stays the same along a push."""
 
-    wrong: Measurement | None
+    errors: RecordingErrors | None
     push_rotation: float
     travel_share: float
     friction: Friction
@@ -72,7 +75,7 @@ class ScalarValues(NamedTuple):
 def scalar_values(values: Mapping[str, float]) -> ScalarValues:
     """The values by name, sorted; a name that is missing has its textbook value."""
     value = values.get
-    wrong = Measurement(
+    errors = RecordingErrors(
         value("tip_offset_along", 0.0),
         value("clock_delay", 0.0),
         value("tip_offset_across", 0.0),
@@ -83,7 +86,7 @@ def scalar_values(values: Mapping[str, float]) -> ScalarValues:
     changes = value("friction_by_angle", 0.0), value("friction_by_speed", 0.0), value("friction_by_load", 0.0)
     friction = value("contact_friction", TEXTBOOK_FRICTION), value("friction_difference", 0.0)
     return ScalarValues(
-        None if wrong == EXACT else wrong,
+        None if errors == NO_ERRORS else errors,
         value("push_rotation", 0.0),
         value("travel_share", 0.0),
         Friction(*friction, *changes),
@@ -97,6 +100,3 @@ def scalar_values(values: Mapping[str, float]) -> ScalarValues:
             (value("gradient_x", 0.0), value("gradient_y", 0.0)),
         ),
     )
-
-
-EXACT = Measurement(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, 0.0)

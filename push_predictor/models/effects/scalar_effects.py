@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from push_predictor.models.effects.driver_basis import columns_of
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import quantities_of
 from push_predictor.types import Array
@@ -27,7 +28,7 @@ from push_predictor.types import Array
 Columns = list[list[float]]  # of each effect: the values of its basis at one push
 
 
-class PlainEffects:
+class ScalarEffects:
     """Some effects at single pushes. names (q): of the parameters that they change; units (q,): of these changes."""
 
     def __init__(self, effects: Sequence[Effect], names: Sequence[str], units: Sequence[float]) -> None:
@@ -35,7 +36,7 @@ class PlainEffects:
         self._none = [0.0] * len(names)
         self._counts, self._rows = [], []
         for effect, basis in zip(effects, self._bases, strict=True):
-            width = len(basis.values_one(dict.fromkeys(basis.drivers, 0.0)))
+            width = columns_of(basis)
             self._counts.append(len(effect.coefficients) // width)
             rows = effect.coefficients.reshape(-1, width).tolist()
             changed = [names.index(name) for name in (quantities_of(effect) if effect.exact else ())]

@@ -25,62 +25,66 @@ import numpy as np
 from push_predictor.models.effects.coefficients import changed_names, coefficients_of
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import DIFFERENCE, LARGEST
-from push_predictor.models.effects.plain_effects import Columns, PlainEffects
+from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
 from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.scalar.mechanics import ScalarMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.types import Array
 
-# Velocity, contact, angle, duration, heading and recording of a push.
-Where: TypeAlias = tuple[float, float, float, float, float, float]
+# Velocity, contact, angle, duration, heading and recording.
+PushNumbers: TypeAlias = tuple[float, float, float, float, float, float]
 
 
-class SingleExact:
+class ScalarShift:
     """Shifts of single pushes by effects that all are exact; cross: see Predictor."""
 
     def __init__(
         self, effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array], mechanics: ScalarMechanics
     ) -> None:
         self._names, self._mechanics = changed_names(effects), mechanics
-        self._effects = PlainEffects(effects, self._names, [1.0] * len(self._names))
+        self._effects = ScalarEffects(effects, self._names, [1.0] * len(self._names))
         self._all = range(len(effects))
-        self._limits = [(DIFFERENCE * BY_NAME[name].spread, LARGEST[name]) for name in self._names]
+        self._steps_and_limits = [(DIFFERENCE * BY_NAME[name].spread, LARGEST[name]) for name in self._names]
         self._coefficients = coefficients_of(effects, cross)
-        self._in_world = any(BY_NAME[name].needs for name in (*self._names, *mechanics.values))
+        self._needs_heading = any(BY_NAME[name].needs for name in (*self._names, *mechanics.values))
 
     def shift(self, push: Push) -> tuple[Array, Array] | None:
-        """Shift (1, 3) of the mean of one push and its covariance (1, 3, 3); None where plain numbers do not do.
+        """Shift (1, 3) of the mean of one push and its covariance (1, 3, 3); None where arrays are needed.
 
         Raises KeyError if a covariate of a basis is missing.
         """
         velocity, contact, angle = push.inputs[0].tolist()
         given, duration = {name: float(column[0]) for name, column in push.covariates.items()}, float(push.duration[0])
-        columns = self._effects.columns(given)
-        if self._in_world and "slider_heading" in given:
+        if not isfinite(velocity + contact + angle + duration + sum(given.values())):
+            return None
+        if self._needs_heading and "slider_heading" in given:
             _, _, normal_x, normal_y = self._mechanics.contact_at(contact)
             given["push_heading"] = given["slider_heading"] + atan2(normal_y, normal_x) + angle
-        where = velocity, contact, angle, duration, given.get("push_heading", 0.0), given.get(RECORDING, -1.0)
-        if not isfinite(sum(where)) or not self._mechanics.is_plain(self._names, given):
+        numbers = velocity, contact, angle, duration, given.get("push_heading", 0.0), given.get(RECORDING, -1.0)
+        if not self._mechanics.is_plain(self._names, given):
             return None
+        columns = self._effects.columns(given)
         changes = self._changes(columns)
-        moved = np.array([self._moved(where, changes)]) - self._moved(where, [])
-        design = self._slopes(where, changes)[self._coefficients.parameter] * self._effects.design(columns)
+        if not isfinite(sum(changes)):
+            return None
+        moved = np.array([self._moved(numbers, changes)]) - self._moved(numbers, [])
+        design = self._slopes(numbers, changes)[self._coefficients.parameter] * self._effects.design(columns)
         return moved, design.T.dot(self._coefficients.covariance).dot(design)[None]
 
     def _changes(self, columns: Columns) -> list[float]:
         """The changes of the parameters, at most the largest that a rig can have."""
         wanted = self._effects.changes(columns, self._all)
-        return [min(max(change, -most), most) for change, (_, most) in zip(wanted, self._limits, strict=True)]
+        return [min(max(change, -most), most) for change, (_, most) in zip(wanted, self._steps_and_limits, strict=True)]
 
-    def _slopes(self, where: Where, changes: list[float]) -> Array:
+    def _slopes(self, push: PushNumbers, changes: list[float]) -> Array:
         """Derivatives (q, 3) of the displacement by each of the parameters that change; see exact.slopes_of."""
         slopes = []
-        for k, (step, most) in enumerate(self._limits):
+        for k, (step, most) in enumerate(self._steps_and_limits):
             low, high = max(changes[k] - step, -most), min(changes[k] + step, most)
-            ends = [self._moved(where, [*changes[:k], end, *changes[k + 1 :]]) for end in (low, high)]
+            ends = [self._moved(push, [*changes[:k], end, *changes[k + 1 :]]) for end in (low, high)]
             slopes.append([(after - before) / (high - low) for before, after in zip(*ends, strict=True)])
         return np.array(slopes)
 
-    def _moved(self, where: Where, changes: Sequence[float]) -> tuple[float, float, float]:
-        return self._mechanics.moved(*where, dict(zip(self._names, changes, strict=False)))
+    def _moved(self, push: PushNumbers, changes: Sequence[float]) -> tuple[float, float, float]:
+        return self._mechanics.moved(*push, dict(zip(self._names, changes, strict=False)))

@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 from synthetic import square_rig
 
-from push_predictor.models.effects import single_exact
-from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects import scalar_shift
+from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -44,7 +44,7 @@ BY_SPEED = DriverBasis("linear", ("velocity",), (0.03,), (0.01,))
 
 def effect(mechanism: str, basis: DriverBasis, size: float = 1.0, exact: bool = True) -> Effect:
     """Of alternating signs, known to 10 %, with correlated coefficients; size: in usual spreads of the parameters."""
-    width = len(basis.values_one(dict.fromkeys(basis.drivers, 0.0)))
+    width = columns_of(basis)
     spreads = np.repeat([BY_NAME[name].spread for name in mechanism_named(mechanism).quantities], width)
     signs = np.where(np.arange(len(spreads)) % 2, -1.0, 1.0)
     covariance = 0.01 * np.outer(spreads, spreads) * (0.6 * np.eye(len(spreads)) + 0.4)
@@ -124,20 +124,31 @@ def test_the_covariance_that_effects_share_counts(monkeypatch: pytest.MonkeyPatc
     np.testing.assert_allclose(alone, together, rtol=2e-4, atol=1e-13)
 
 
-def test_the_heading_of_the_slider_counts_more_than_that_of_the_push() -> None:
+def test_the_heading_of_the_slider_takes_precedence(monkeypatch: pytest.MonkeyPatch) -> None:
     predictor = extended(*CASES["in the world"])
     push = one(pushes(), 0)
     both = Push(push.inputs, push.duration, {**push.covariates, "push_heading": np.array([1.0])})
     alone = {"push_heading": np.array([1.0])}
-    for given in (both, Push(push.inputs, push.duration, alone)):
-        expected = predictor.shift(given).mean
-        np.testing.assert_allclose(predictor.with_scalar_mechanics().shift(given).mean, expected, rtol=1e-4, atol=1e-8)
+    cases = both, Push(push.inputs, push.duration, alone)
+    expected = [predictor.shift(given).mean for given in cases]
+    scalar = in_plain_numbers(predictor, monkeypatch)
+    for given, mean in zip(cases, expected, strict=True):
+        np.testing.assert_allclose(scalar.shift(given).mean, mean, rtol=1e-4, atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    "what",
-    ["linear in its coefficients", "inertia", "inertia of an effect", "a speed that is not finite", "two pushes"],
+OTHERS = (
+    "linear in its coefficients",
+    "inertia",
+    "inertia of an effect",
+    "a speed that is not finite",
+    "a heading that is not finite",
+    "changes that overflow",
+    "two pushes",
 )
+
+
+@pytest.mark.filterwarnings("ignore:(overflow|invalid value)")
+@pytest.mark.parametrize("what", OTHERS)
 def test_other_pushes_are_computed_as_arrays(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     name = "inertia" if what == "inertia of an effect" else "contact_friction"
     acting = effect(name, ALWAYS, exact=what != "linear in its coefficients")
@@ -147,12 +158,25 @@ def test_other_pushes_are_computed_as_arrays(what: str, monkeypatch: pytest.Monk
         push = one(push, 0)
     if what == "a speed that is not finite":
         push.inputs[0, 0] = np.nan
-    found = []
-    shift = single_exact.SingleExact.shift
-    monkeypatch.setattr(single_exact.SingleExact, "shift", lambda self, push: found.append(shift(self, push)))
+    if what == "a heading that is not finite":
+        predictor = extended(*CASES["periodic, two parameters"])
+        push.covariates["slider_heading"][0] = np.inf
+    if what == "changes that overflow":  # infinite terms of different signs
+        predictor = extended(effect("centre_of_friction", MAP))
+        push.covariates["warmth"][0] = push.covariates["elapsed_time"][0] = 1e200
+    found: list[object] = []
+    shift = scalar_shift.ScalarShift.shift
+
+    def recorded(self: scalar_shift.ScalarShift, push: Push) -> tuple[Array, Array] | None:
+        found.append(shift(self, push))
+        return shift(self, push)
+
+    monkeypatch.setattr(scalar_shift.ScalarShift, "shift", recorded)
     alone, expected = predictor.with_scalar_mechanics().shift(push), predictor.shift(push)
-    assert not any(found)
+    assert found == ([] if what in ("linear in its coefficients", "two pushes") else [None])
     np.testing.assert_allclose(alone.mean, expected.mean, rtol=1e-4, atol=1e-8)
+    if what == "changes that overflow":
+        assert not np.isfinite(alone.mean).any()
 
 
 def test_a_covariate_that_is_missing_is_named() -> None:
