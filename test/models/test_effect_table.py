@@ -262,6 +262,14 @@ def test_changes_that_did_not_occur_together_are_computed() -> None:
         assert_equal(single(table, apart, row), single(computed, apart, row))
 
 
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_an_infinite_heading_has_no_finite_prediction() -> None:
+    for model in both("about nothing", "periodic"):
+        rows = inside(2)
+        found = single(model, with_covariate(rows, "slider_heading", np.full(len(rows), np.inf)))
+        assert np.isnan(found.covariance).any() and not found.in_domain[0]
+
+
 def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
     table = with_effect_table(tabulate(extended("about nothing", effect("contact_friction", LATER, 0.0))))
     assert table.effects is not None
