@@ -16,13 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import atan2, isfinite
 from typing import TypeAlias
 
 import numpy as np
 
-from push_predictor.models.effects.coefficients import changed_names, coefficients_of
+from push_predictor.models.effects.coefficients import Coefficients, changed_names
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import DIFFERENCE, LARGEST
 from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
@@ -37,16 +37,14 @@ PushNumbers: TypeAlias = tuple[float, float, float, float, float, float]
 
 
 class ScalarShift:
-    """Shifts of single pushes by effects that all are exact; cross: see Predictor."""
+    """Shifts of single pushes by effects that all are exact. coefficients: theirs."""
 
-    def __init__(
-        self, effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array], mechanics: ScalarMechanics
-    ) -> None:
+    def __init__(self, effects: Sequence[Effect], coefficients: Coefficients, mechanics: ScalarMechanics) -> None:
         self._names, self._mechanics = changed_names(effects), mechanics
         self._effects = ScalarEffects(effects, self._names, [1.0] * len(self._names))
         self._all = range(len(effects))
         self._steps_and_limits = [(DIFFERENCE * BY_NAME[name].spread, LARGEST[name]) for name in self._names]
-        self._coefficients = coefficients_of(effects, cross)
+        self._coefficients = coefficients
         self._needs_heading = any(BY_NAME[name].needs for name in (*self._names, *mechanics.values))
 
     def shift(self, push: Push) -> tuple[Array, Array] | None:

@@ -136,10 +136,11 @@ class ExtendedPredictor:
             return Shift(*alone)
         together = joint(Mechanics(self.physics, self.mechanics), self.effects, push)
         design = np.concatenate(together.designs, axis=2)
-        return Shift(together.shift, design @ self._coefficients.covariance @ design.transpose(0, 2, 1))
+        return Shift(together.shift, design @ self.coefficients.covariance @ design.transpose(0, 2, 1))
 
     @cached_property
-    def _coefficients(self) -> Coefficients:
+    def coefficients(self) -> Coefficients:
+        """All coefficients of the effects; there must be one."""
         return coefficients_of(self.effects, self.cross)
 
     @cached_property
@@ -147,7 +148,7 @@ class ExtendedPredictor:
         """The effects of single pushes in plain numbers; None where they, or the mechanics, have no such form."""
         if not isinstance(self.of_effects, ScalarMechanics) or not all(effect.exact for effect in self.effects):
             return None
-        return ScalarShift(self.effects, self.cross, self.of_effects)
+        return ScalarShift(self.effects, self.coefficients, self.of_effects)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""

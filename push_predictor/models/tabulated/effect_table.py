@@ -28,7 +28,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.coefficients import Coefficients, changed_names, coefficients_of
+from push_predictor.models.effects.coefficients import changed_names
 from push_predictor.models.effects.effect import responses_of
 from push_predictor.models.effects.exact import (
     Changes,
@@ -63,11 +63,6 @@ class EffectSource:
 
     predictor: ExtendedPredictor
     duration: float
-
-    @cached_property
-    def exact(self) -> list[int]:
-        """Which effects change parameters of the mechanics."""
-        return [k for k, effect in enumerate(self.predictor.effects) if effect.exact]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -115,7 +110,7 @@ class EffectSource:
 
     def changes(self, push: Push) -> tuple[Array, Array]:
         """Changes (n, q) of the parameters by stepped and by other effects at n pushes, in units of spreads."""
-        n, effects = len(push.inputs), [self.predictor.effects[k] for k in self.exact]
+        n, effects = len(push.inputs), [effect for effect in self.predictor.effects if effect.exact]
         parts = [
             [effect for effect in effects if (effect.basis.name in STEPPED) is stepped] for stepped in (True, False)
         ]
@@ -204,18 +199,13 @@ class EffectTable:
 
     def shift(self, push: Push, located: Located) -> Shift:
         """The shift by all effects at pushes inside, with the displacement of the base's mechanics if anchored."""
-        known, speed = self.coefficients, located.speed[:, None]
+        known, speed = self.source.predictor.coefficients, located.speed[:, None]
         values = (self.spline(located.points, located.box) * speed).reshape(len(speed), -1, 3)
         mean, by_parameter = values[:, 0], values[:, 1:]
         design = by_parameter[:, known.parameter] * self._columns(push)[:, :, None]
         if known.linear.any():
             mean = mean + np.einsum("nmk,m->nk", design, known.values * known.linear)
         return Shift(mean, design.transpose(0, 2, 1) @ known.covariance @ design)
-
-    @cached_property
-    def coefficients(self) -> Coefficients:
-        """The coefficients of the effects."""
-        return coefficients_of(self.source.predictor.effects, self.source.predictor.cross)
 
     def _columns(self, push: Push) -> Array:
         """The basis columns (n, m) that go with the coefficients."""

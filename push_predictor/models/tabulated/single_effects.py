@@ -33,7 +33,7 @@ class SingleEffects:
     """The mean and the covariance that a table's effects give one push; the same as EffectTable.shift, to rounding."""
 
     def __init__(self, table: EffectTable) -> None:
-        source, known = table.source, table.coefficients
+        source, known = table.source, table.source.predictor.coefficients
         self._table = table
         effects, spreads = source.predictor.effects, source.spreads.tolist()
         self._effects = ScalarEffects(effects, source.names, spreads)
@@ -77,7 +77,7 @@ class SingleEffects:
         level = self._changed(columns, point)
         if level is None:
             return None
-        box, known = edge * len(self._levels) + level, table.coefficients
+        box, known = edge * len(self._levels) + level, table.source.predictor.coefficients
         values = (speed * table.spline.at(point, box)).reshape(-1, 3)
         mean, design = values[0], values[self._rows] * self._effects.design(columns)
         if self._linear is not None:

@@ -55,12 +55,14 @@ class ScalarMechanics(FittedMechanics):
         changes: Mapping[str, Array] = NO_CHANGES,
     ) -> Array:
         """See FittedMechanics."""
+        if not 0 < len(inputs) <= FEW:
+            return super().displacement(inputs, duration, covariates, changes)
         given = covariates or {}
         pushes: list[tuple[float, float, float, float]] = [
             (*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)
         ]
         columns = {name: column.tolist() for name, column in changes.items()}
-        plain = 0 < len(pushes) <= FEW and all(isfinite(sum(numbers)) for numbers in (*pushes, *columns.values()))
+        plain = all(isfinite(sum(numbers)) for numbers in (*pushes, *columns.values()))
         if not plain or not self.is_plain(tuple(changes), given):
             return super().displacement(inputs, duration, covariates, changes)
         heading = given["push_heading"].tolist() if "push_heading" in given else [0.0] * len(pushes)
