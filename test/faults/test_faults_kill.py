@@ -21,6 +21,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from validator_bench import (
     beginning,
     finish,
     hosting_replay,
+    hosting_validator,
     replaying,
 )
 
@@ -54,6 +56,7 @@ from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 TIMEOUT = 0.5  # s
+in_a_process = partial(node_process, "push_validator")
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +80,9 @@ def server(domain: int, model: Path) -> Any:
     return node_process("predict_server", domain=domain, params={"models": [str(model)]})
 
 
-def validator(domain: int, model: Path, output: Path) -> Any:
+def validator(domain: int, model: Path, output: Path, start: Any = hosting_validator) -> Any:
     params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "request_timeout": TIMEOUT}
-    return node_process("push_validator", domain=domain, params={**params, "last_answers": 120.0})
+    return start(domain=domain, params={**params, "last_answers": 120.0})
 
 
 def kill(process: NodeProcess) -> None:
@@ -111,7 +114,7 @@ class Planning(threading.Thread):
                 begun = time.monotonic()
                 mean = client.predict(self._inputs).mean
                 self.answers.append((time.monotonic() - begun, mean))
-                self._ending.wait(0.02)  # a planner that asks without a pause would keep a processor busy
+                self._ending.wait(0.05)  # a planner that asks without a pause would keep a processor busy
 
     def stop(self) -> None:
         self._ending.set()
@@ -198,7 +201,7 @@ def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
     expected = {(w.push_id, w.index): (w, mean) for w, mean in zip(windows, comparison.mean, strict=True)}
     with ros_context(domain) as node, server(domain, model):
         received = residuals_received(node)
-        with validator(domain, model, tmp_path) as process:
+        with validator(domain, model, tmp_path, in_a_process) as process:
             Status(node).wait_for_server()
             with replaying(domain, rate=2.0) as replay:
                 assert wait_until(lambda: len(received) >= 20, 60.0)
@@ -218,7 +221,7 @@ def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
         assert f"rows        {len(left)}" in capsys.readouterr().out
 
         # The next validator finds the files; its replay, which has nothing to write, is killed.
-        with validator(domain, model, tmp_path) as process:
+        with validator(domain, model, tmp_path, in_a_process) as process:
             status, before = Status(node), len(received)
             status.wait_for_server()
             with replaying(domain, rate=2.0) as replay:

@@ -123,7 +123,7 @@ def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours(tmp_pa
 
 def test_a_window_and_its_answer_take_forty_bytes_of_memory():
     """A day of pushing without a break, 432 000 windows, then takes less than 18 MB."""
-    windows = made_up_windows(3000)
+    windows = made_up_windows(1500)
     model = train_model(windows_to_table(windows[:40]), square_rig(), "analytical", name="analytical")
     prediction = predict(model, windows[0])
     live = LiveValidation({"analytical": model})
@@ -134,7 +134,7 @@ def test_a_window_and_its_answer_take_forty_bytes_of_memory():
     taken = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     assert taken / len(windows) < 40.0
-    assert len(live.windows) == 3000 and live.windows[2999].push_id == windows[2999].push_id
+    assert len(live.windows) == 1500 and live.windows[1499].push_id == windows[1499].push_id
     assert np.array_equal(live.windows[1234].displacement, windows[1234].displacement)
 
 

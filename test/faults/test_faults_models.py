@@ -42,7 +42,7 @@ from push_predictor.models.train import train_model
 
 pytestmark = pytest.mark.slow
 
-COPIES = 60  # of each kind; `python -m benchmarks.models.damaged_models` tries as many as asked for
+COPIES = 40  # of each kind; `python -m benchmarks.models.damaged_models` tries as many as asked for
 MEMORY = 30 << 20  # bytes that reading a forged file may take
 
 

@@ -141,7 +141,7 @@ def doubled(value: Any) -> Any:
     return {name: np.full(2, number) for name, number in value.items()} if isinstance(value, dict) else value
 
 
-def answered(server: Server, count: int = 100) -> tuple[list[float], float]:
+def answered(server: Server, count: int = 20) -> tuple[list[float], float]:
     """The mean predicted for a good push, and the median response time (s)."""
     taken, mean = [], []
     for _ in range(count):
@@ -267,17 +267,23 @@ def test_push_without_a_finite_prediction_is_refused(
 # --- parameters ---------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def plain_node(domain: int, given: dict[str, Any] | None = None) -> Iterator[Node]:
+@pytest.fixture(scope="module")
+def context() -> Iterator[Context]:
     context = Context()
-    context.init(args=[], domain_id=domain)
+    context.init(args=[], domain_id=harness.free_domain())
+    yield context
+    context.try_shutdown()
+
+
+@contextmanager
+def plain_node(context: Context, given: dict[str, Any] | None = None) -> Iterator[Node]:
     overrides = [Parameter(name, value=value) for name, value in (given or {}).items()]
-    node = Node("parameters", context=context, parameter_overrides=overrides, start_parameter_services=False)
+    silent = {"start_parameter_services": False, "enable_rosout": False}
+    node = Node("parameters", context=context, parameter_overrides=overrides, **silent)
     try:
         yield node
     finally:
         node.destroy_node()
-        context.try_shutdown()
 
 
 def wrong_values(param: Param) -> list[Any]:
@@ -294,19 +300,18 @@ def wrong_values(param: Param) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_rejects_parameters_out_of_range_at_start(name: str) -> None:
-    domain = harness.free_domain()
+def test_rejects_parameters_out_of_range_at_start(name: str, context: Context) -> None:
     cases = [(param, value) for param in TABLES[name] for value in wrong_values(param)]
     for param, value in cases:
-        with plain_node(domain, {param.name: value}) as node, pytest.raises(RequestError) as caught:
+        with plain_node(context, {param.name: value}) as node, pytest.raises(RequestError) as caught:
             declare(node, TABLES[name])
         assert str(caught.value) == f"{param.name}: {value!r} is not accepted, give {param.accepted}"
     assert len(cases) > 10
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_rejects_parameters_out_of_range_when_set(name: str) -> None:
-    with plain_node(harness.free_domain()) as node:
+def test_rejects_parameters_out_of_range_when_set(name: str, context: Context) -> None:
+    with plain_node(context) as node:
         declare(node, TABLES[name])
         for param in TABLES[name]:
             before = node.get_parameter(param.name).value

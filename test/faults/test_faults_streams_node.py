@@ -24,14 +24,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
-from hosted_nodes import hosted_node
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from replay_bags import stamped
 from ros_harness import free_domain, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from synthetic import START, Push, rows, square_pushes, square_rig, translating_push, wrench_rows
-from validator_bench import Status
+from validator_bench import Status, hosting_validator
 
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
@@ -165,7 +164,7 @@ def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> N
     params = {"model": model, "rig": rig, "output": out, "report": False, "diagnostics_period": 0.2}
     with (
         ros_context(domain) as node,
-        hosted_node("push_validator", domain=domain, params={**params, "use_sim_time": True}) as process,
+        hosting_validator(domain=domain, params={**params, "use_sim_time": True}) as process,
     ):
         status, sensors = Status(node), Sensors(node)
         status.wait_for_first()

@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from hosted_nodes import hosted_node
 from mistakes import force_turned
 from ros_harness import free_domain, ros_context
-from validator_bench import HEXAGON, Status, beginning, replaying
+from validator_bench import HEXAGON, Status, beginning
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -43,10 +43,11 @@ def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> 
     save_model(model, tmp_path / "analytical.pushmodel")
     domain = free_domain()
     params = {"model": tmp_path / "analytical.pushmodel", "diagnostics_period": 0.2, "strict": True}
-    with ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params) as validator:
+    with ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params):
         received, played = Status(node), Status(node, "push_replay")
         received.wait_for_first()
-        with replaying(domain, recording=tmp_path / "wrong") as replay:
+        played_wrong = {"recording": tmp_path / "wrong", "play.rate": 10.0, "wait_for_subscribers": 60.0}
+        with hosted_node("push_replay", domain=domain, params=played_wrong) as replay:
             for status in (received, played):
                 status.wait_for_message("change the sign", 120.0)
             assert (received.values["data check"], played.values["data_check"]) == ("wrench_sign", "wrench_sign")
@@ -54,5 +55,6 @@ def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> 
             assert played.identity == ("/push_replay: replay", "wrong")
             assert (received.all[-1][0], played.all[-1][0]) == (DiagnosticStatus.ERROR, DiagnosticStatus.WARN)
             told = [line for line in replay.text().splitlines() if "change the sign" in line]
-            assert len([line for line in told if "finished: published" not in line]) == 1, "the end repeats it"
-        assert validator.text().count("change the sign") >= 1
+            of_replay = [line for line in told if "[push_replay]" in line and "finished: published" not in line]
+            assert len(of_replay) == 1, "the end repeats it"
+        assert any("[push_validator]" in line for line in told)

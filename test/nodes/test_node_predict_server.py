@@ -90,7 +90,7 @@ def server(folder):
 
 def test_serves_a_model_that_was_trained_on_no_push(tmp_path):
     model = train_model(empty_table(), replace(square_rig(), support_points=CORNERS), "prior", name="prior")
-    few_draws = replace(model.predictor, draws=model.predictor.draws[:4])  # for a table in little time
+    few_draws = replace(model.predictor, draws=model.predictor.draws[:2])  # for a table in little time
     save_model(replace(model, predictor=few_draws), tmp_path / "prior.model")
     with hosted_server_of([tmp_path / "prior.model"]) as running:
         assert "windows=0; covariates=-; duration=any" in running.list().descriptions[0]

@@ -24,10 +24,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from coarse import coarse_simulator
 from diagnostic_msgs.msg import DiagnosticStatus
+from hosted_nodes import hosted_node
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_harness import acquaint, free_domain, node_process, reserved_domain, ros_context, wait_until
+from ros_harness import acquaint, free_domain, reserved_domain, ros_context, wait_until
 from synthetic import square_rig
 from validator_bench import WRITTEN, Status, beginning, hosting_replay
 
@@ -68,7 +70,8 @@ def record(path: Path, pushes: int, seed: int, changes: Changes = PLAIN) -> Path
     plan = random_pushes(pushes, [0.05], 0.05, np.random.default_rng([seed, 0]))
     few = Sensors(rate=40.0, wrench_rate=40.0)  # samples, which the nodes receive one by one
     spec = SimulationSpec("rect1", "abs", plan, seed=seed, name=path.name, changes=changes, sensors=few)
-    write_recording(path, simulate(spec))
+    with coarse_simulator(3.0):
+        write_recording(path, simulate(spec))
     return path
 
 
@@ -115,8 +118,8 @@ def outcomes(bench: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
     with (
         reserved_domain() as domain,
         ros_context(domain) as node,
-        node_process("predict_server", domain=domain, params={"models": [str(bench["model"])]}),
-        node_process("push_validator", domain=domain, params=params) as process,
+        hosted_node("predict_server", domain=domain, params={"models": [str(bench["model"])]}),
+        hosted_node("push_validator", domain=domain, params=params) as process,
     ):
         status = Status(node)
         node.create_subscription(PushAlarm, "push_alarm", alarms.append, 10)

@@ -26,16 +26,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hosted_nodes import hosted_node
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from replay_bags import WRENCH, stamped, write_bag
-from ros_harness import free_domain, node_process, ros_context, wait_until
+from ros_harness import free_domain, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float32, Float64, Float64MultiArray, String
-from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay
+from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator
 
 from msg_adapters.residual_schema import RESIDUAL_TYPE
 from push_predictor.errors import RequestError
@@ -126,8 +127,8 @@ class Watched:
         params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "scalar_topics": ASKED}
         with (
             ros_context(domain) as node,
-            node_process("predict_server", domain=domain, params={"models": [str(model)]}),
-            node_process("push_validator", domain=domain, params=params) as process,
+            hosted_node("predict_server", domain=domain, params={"models": [str(model)]}),
+            hosting_validator(domain=domain, params=params) as process,
         ):
             status = Status(node)
             status.wait_for_first()

@@ -110,7 +110,7 @@ def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any]
 
 def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(folder: Path) -> None:
     domain = harness.free_domain()
-    running = harness.node_process("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
+    running = hosted_node("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
     with running, harness.ros_context(domain) as node:
         suggest = node.create_client(SuggestPushes, "suggest_pushes")
         change = node.create_client(ChangeState, "push_predictor/change_state")

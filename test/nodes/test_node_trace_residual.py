@@ -85,7 +85,7 @@ def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
     while not goal.ended:
         assert server.push().success
         answered += 1
-        time.sleep(0.02)
+        time.sleep(0.05)
     status, result = goal.end()
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True), result.message
     assert answered > 20  # after the trace, only one or two would be answered

@@ -16,10 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from time import monotonic, sleep
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
 from repository import REPOSITORY
 
+from push_predictor.online import check_process
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.online.sample_check import FIRST, MOST, SampleCheck
 from push_predictor.online.stream_sync import Samples
@@ -80,11 +82,24 @@ def checked(recording: Recording) -> CheckProcess:
     return samples.check
 
 
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Check at once, in this process: the start of another takes most of the time."""
+
+    def start(target: Callable[..., None], arguments: Sequence[object], name: str) -> object:
+        target(*arguments)
+        return SimpleNamespace(terminate=lambda: None, join=lambda: None)
+
+    monkeypatch.setattr(check_process, "start_child", start)
+    monkeypatch.setattr(check_process.os, "nice", lambda more: None)
+
+
 def test_sound_samples_are_sound(hexagon: Recording) -> None:
     check = checked(hexagon)
     assert (check.result, check.problems, check.failed) == ("sound", [], False)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_warning_is_an_error_only_if_strict(hexagon: Recording) -> None:
     check, strict = checked(force_turned(hexagon, np.pi)), SampleCheck(rig_of(hexagon), True).check
     assert check.result == "wrench_sign"
@@ -93,6 +108,7 @@ def test_a_warning_is_an_error_only_if_strict(hexagon: Recording) -> None:
     assert not check.failed and strict.failed
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_refused_samples_are_an_error(hexagon: Recording) -> None:
     assert checked(scaled(hexagon, "slider", 1e3)).failed
 
@@ -134,6 +150,7 @@ def test_a_clock_that_is_set_back_begins_again(hexagon: Recording, monkeypatch: 
     assert len(started.recordings[0].slider) == len(hexagon.slider)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -> None:
     """And is reported as not checked, with the reason, without them."""
     bag = laboratory(short_recording(2.0)).mcap(tmp_path / "lab", rig_of(short_recording(2.0)))

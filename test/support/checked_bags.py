@@ -18,19 +18,16 @@ from __future__ import annotations
 
 from functools import cache
 
-from lab_bags import short_recording
-from repository import REPOSITORY
+from lab_bags import short_recording, whole_recording
 
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 
 
-@cache
 def bag(name: str) -> Recording:
-    return read_recording(REPOSITORY / "bags" / name)
+    return whole_recording(name)
 
 
 @cache

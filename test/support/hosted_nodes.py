@@ -28,9 +28,12 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from rclpy import utilities
+from rclpy.context import Context
 from ros_harness import START_TIMEOUT, keep_tables, node_arguments, wait_until
 
 from push_predictor.nodes.predict_server import PredictServer, start_server
+from push_predictor.nodes.push_recorder import PushRecorder
 from push_predictor.nodes.push_replay import PushReplay
 from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.runtime import Stop, _Life
@@ -40,9 +43,11 @@ from push_predictor.resources import share_path
 PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}
 NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
     "predict_server": (lambda stop: PredictServer(), start_server, {}),
+    "push_recorder": (PushRecorder, None, {}),
     "push_replay": (PushReplay, None, PROFILES),
     "push_validator": (PushValidator, None, {}),
 }
+_LOGS: list[Path] = []  # of the nodes hosted now; one that is hosted meanwhile logs where the other does
 
 
 class HostedNode:
@@ -51,11 +56,18 @@ class HostedNode:
     def __init__(self, life: _Life, stop: Stop, log: Path) -> None:
         self._life, self._stop, self._log = life, stop, log
         self._status: int | None = None
+        self._begin, self._context = log.stat().st_size, Context()
         self.pid = os.getpid()
+        with _default(self._context):
+            life.begin()
+            wait_until(lambda: life._spinning.is_set() or not life._thread.is_alive(), 10.0 * START_TIMEOUT)
 
     def text(self) -> str:
-        """Everything logged so far."""
-        return self._log.read_text(errors="replace")
+        """Everything logged since its start, also by nodes that are hosted meanwhile.
+
+        Of a fixture: until its end only, as pytest redirects the log of each test.
+        """
+        return self._log.read_bytes()[self._begin :].decode(errors="replace")
 
     def wait_for_text(self, text: str, timeout: float = START_TIMEOUT) -> str:
         """Wait until it has logged `text`; returns everything logged. Raises AssertionError otherwise."""
@@ -66,7 +78,8 @@ class HostedNode:
         """End the node as by its own request; returns the status that its process would have."""
         if self._status is None:
             self._stop.request()
-            self._status = self._life.end()
+            with _default(self._context):
+                self._status = self._life.end()
         return self._status
 
 
@@ -78,16 +91,14 @@ def hosted_node(
     namespace: str | None = None,
     params: Mapping[str, Any] | None = None,
 ) -> Iterator[HostedNode]:
-    """As `node_process`, one at a time. Leaving ends the node, and raises what made it fail."""
+    """As `node_process`. Leaving ends the node, and raises what made it fail. It is ready when the block begins."""
     make_node, start, environment = NODES[executable]
     if executable == "predict_server":
         keep_tables(params)
     environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **environment}
     stop, arguments = Stop(), ["--ros-args", *node_arguments(*ros_args, namespace=namespace, params=params)]
     with _stderr_in_file() as log, patch.dict(os.environ, environment):
-        life = _Life(executable, make_node, stop, arguments, start)
-        life.begin()
-        node = HostedNode(life, stop, log)
+        node = HostedNode(_Life(executable, make_node, stop, arguments, start), stop, log)
         try:
             yield node
         finally:
@@ -95,14 +106,26 @@ def hosted_node(
 
 
 @contextmanager
+def _default(context: Context) -> Iterator[None]:
+    """Make this rclpy's default context, which a process with one node uses and several nodes must not share."""
+    with patch.object(utilities, "g_default_context", context):
+        yield
+
+
+@contextmanager
 def _stderr_in_file() -> Iterator[Path]:
-    """Redirect the file descriptor, which ROS writes its log to."""
+    """Redirect the file descriptor, which ROS writes its log to, unless it is redirected."""
+    if _LOGS and os.path.samestat(os.fstat(2), _LOGS[-1].stat()):
+        yield _LOGS[-1]
+        return
     before = os.dup(2)
     with tempfile.NamedTemporaryFile(prefix="hosted_node_") as output:
         os.dup2(output.fileno(), 2)
+        _LOGS.append(Path(output.name))
         try:
-            yield Path(output.name)
+            yield _LOGS[-1]
         finally:
+            _LOGS.pop()
             os.dup2(before, 2)
             os.close(before)
             os.write(2, Path(output.name).read_bytes())  # for pytest's report of a failure

@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +41,15 @@ LABORATORY = Topics("/vicon/block/block", "/tf:tool0", "/netft")
 BASE = [0.4, -0.3, 0.1, 0.0, 0.0, 0.0, 1.0]  # the robot's base in the world
 
 
+@cache
+def whole_recording(name: str) -> Recording:
+    """A recording in bags/, read once."""
+    return read_recording(REPOSITORY / "bags" / name)
+
+
 def short_recording(seconds: float = SECONDS, after: float = 0.0) -> Recording:
     """Some seconds of the recording bags/square_abs_test, without scalars."""
-    whole = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    whole = whole_recording("square_abs_test")
     begin = int(whole.slider.stamp[0]) + round(after * 1e9)
     end = begin + round(seconds * 1e9)
 
@@ -188,18 +195,27 @@ def pose_values(row: Any, at: str, names: tuple[str, str]) -> dict[str, object]:
 
 def zeros(types: Any, kind: str) -> Any:
     """A message with zero in every field."""
-    values: dict[str, object] = {}
-    for name, (node, description) in types.get_msgdef(kind).fields:
-        if node.name == "NAME":
-            values[name] = zeros(types, description)
-        elif node.name == "BASE":
-            values[name] = {"string": "", "bool": False}.get(description[0], 0.0 if "float" in description[0] else 0)
-        elif node.name == "ARRAY":
-            values[name] = np.zeros(description[1], description[0][1][0])
-        else:
-            inner = description[0]
-            values[name] = [] if inner[0].name == "NAME" or inner[1][0] == "string" else np.zeros(0, inner[1][0])
-    return types.types[kind](**values)
+    made, fields = _makers(types, kind)
+    return made(**{name: make() for name, make in fields})
+
+
+@cache
+def _makers(types: Any, kind: str) -> tuple[Any, list[tuple[str, Callable[[], object]]]]:
+    """The class of a type and what makes the zero of each field: thousands of messages are made of few types."""
+    fields = [(name, _zero(types, node.name, given)) for name, (node, given) in types.get_msgdef(kind).fields]
+    return types.types[kind], fields
+
+
+def _zero(types: Any, node: str, description: Any) -> Callable[[], object]:
+    if node == "NAME":
+        return partial(zeros, types, description)
+    if node == "BASE":
+        plain = {"string": "", "bool": False}.get(description[0], 0.0 if "float" in description[0] else 0)
+        return lambda: plain
+    if node == "ARRAY":
+        return partial(np.zeros, description[1], description[0][1][0])
+    inner = description[0]
+    return list if inner[0].name == "NAME" or inner[1][0] == "string" else partial(np.zeros, 0, inner[1][0])
 
 
 def assign(message: Any, path: str, value: object) -> None:

@@ -44,6 +44,7 @@ from repository import REPOSITORY
 from push_predictor.models.store.model_registry import ModelRegistry
 
 START_TIMEOUT = 60.0
+COARSE_NODE = REPOSITORY / "test" / "support" / "coarse_node.py"
 PATIENCE = 10.0  # s after which a call is repeated; ~/finish answers within 5 s
 _HELD: deque[tuple[int, IO[str]]] = deque()
 _RESERVED: set[int] = set()
@@ -114,13 +115,16 @@ def node_process(
     domain: int,
     namespace: str | None = None,
     params: Mapping[str, Any] | None = None,
+    coarse: bool = False,
 ) -> Iterator[NodeProcess]:
     """Run `python -m push_predictor.nodes.EXECUTABLE --ros-args ...`; leaving stops it (SIGINT, then kill).
 
     ros_args follow --ros-args as they are, such as "-r", "slider/pose:=/vicon/pose". params: name to value.
+    coarse: with pictures that take a quarter of the time, and no tables of effects (coarse_node.py).
     """
     arguments = node_arguments(*ros_args, namespace=namespace, params=params)
-    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *arguments]
+    started = [str(COARSE_NODE), executable] if coarse else ["-m", f"push_predictor.nodes.{executable}"]
+    command = [sys.executable, *started, "--ros-args", *arguments]
     if executable == "predict_server":
         keep_tables(params)
     with tempfile.TemporaryDirectory(prefix="push_node_") as folder:

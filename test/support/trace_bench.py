@@ -20,6 +20,7 @@ import contextlib
 import os
 import signal
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +129,7 @@ class Goal:
 
 
 @contextlib.contextmanager
-def server_of(model: Path, start: Any = harness.node_process, **params: Any) -> Iterator[Server]:
+def server_of(model: Path, start: Any = partial(harness.node_process, coarse=True), **params: Any) -> Iterator[Server]:
     """A running server; start: `hosted_node` for one in this process."""
     params = {"models": [str(model)], **params}
     with (

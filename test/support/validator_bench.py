@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -36,6 +37,8 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import push_replay
+from push_predictor.online import sample_check
+from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import taken
 from push_predictor.recordings.write import write_recording
@@ -65,6 +68,17 @@ def hosting_replay(
     params = _of_replay(recording, rate, more)
     unchecked = patch.object(push_replay, "LARGEST_CHECKED", 0)
     with unchecked, hosted_node("push_replay", *ros_args, domain=domain, params=params) as node:
+        yield node
+
+
+@contextmanager
+def hosting_validator(*ros_args: str, **where: Any) -> Iterator[HostedNode]:
+    """push_validator in this process, without the processes of its alarm and its check of the samples.
+
+    Each takes a second of processor time. where: as `hosted_node` has it.
+    """
+    alone = patch.object(AlarmProcess, "prepare"), patch.object(sample_check, "FIRST", sys.maxsize)
+    with alone[0], alone[1], hosted_node("push_validator", *ros_args, **where) as node:
         yield node
 
 

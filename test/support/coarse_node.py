@@ -1,0 +1,36 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`python coarse_node.py EXECUTABLE --ros-args ...` runs a node whose reports have coarse pictures, without tables.
+
+So it is in the processes that it starts: multiprocessing runs this file in each of them, but for its end.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+from push_predictor.models.tabulated import effect_table_build
+from push_predictor.nodes.entry import install_handlers
+from push_predictor.reporting import canvas
+
+canvas.DPI = 40
+canvas.LAYOUTS = 0  # axes and labels are not fitted to each other
+canvas.STYLE |= dict.fromkeys(("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"), False)
+effect_table_build.WORK = ()  # a table takes two seconds; without one an extended model predicts exactly
+
+if __name__ == "__main__":
+    install_handlers()
+    sys.exit(import_module(f"push_predictor.nodes.{sys.argv.pop(1)}").main())
