@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from typing import Any
 import numpy as np
 import pytest
 import threadpoolctl
+from coarse import coarse_sweeps
 from lab_bags import short_recording
 from repository import BAGS, REPOSITORY
 
@@ -52,6 +54,13 @@ from push_predictor.recordings.write import write_recording
 
 TRAINING = BAGS / "square_abs_test"
 FEW = BAGS / "hexagon_delrin"  # 53 windows
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of displacements are far below the noise of the pushes."""
+    with coarse_sweeps():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -16,20 +16,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from coarse import coarse_sweeps
 from drifting_models import extended, grain, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.design.features import DIFFERENCE, NEGLIGIBLE, features_of
 from push_predictor.errors import RequestError
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.predictors import (
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    MechanicsMean,
+    MechanicsPredictor,
+)
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
@@ -40,8 +50,29 @@ pytestmark = pytest.mark.slow
 TABLE = noisy_pushes(36)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of displacements are far below the noise of the pushes."""
+    with coarse_sweeps():
+        yield
+
+
 def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:
     return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**options))
+
+
+@cache
+def learnt(kind: str) -> PushModel:
+    """Trained once for all tests."""
+    return trained(kind)
+
+
+def fitted() -> FittedMechanics:
+    """Mechanics with two parameters that are not quite certain."""
+    rig = square_rig()
+    values = {"contact_friction": 0.25, "centre_x": 0.003}
+    covariance = np.diag([2e-3, 1e-6])
+    return FittedMechanics(PushMechanics(rig.outline, rig.pusher_radius), values, covariance)
 
 
 def some(count: int = 40, seed: int = 3) -> Push:
@@ -57,7 +88,7 @@ def squares(values: Array) -> Array:
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_a_learnt_model_has_the_variance_of_its_functions(kind: str) -> None:
-    model, push = trained(kind), some()
+    model, push = learnt(kind), some()
     found = features_of(model, push)
     moments = model.predictor.moments(push)
     of_function = moments.covariance - moments.process_covariance
@@ -68,20 +99,20 @@ def test_a_learnt_model_has_the_variance_of_its_functions(kind: str) -> None:
 
 
 def test_noise_is_that_of_the_process() -> None:
-    model, push = trained("vhgp"), some()
+    model, push = learnt("vhgp"), some()
     process = model.predict_rows(push.inputs, push.duration).process_covariance
     np.testing.assert_allclose(features_of(model, push).noise_sd ** 2, np.diagonal(process, axis1=1, axis2=2))
 
 
 def test_the_outputs_of_functions_have_weights_of_their_own() -> None:
-    values = features_of(trained("gp"), some()).values
+    values = features_of(learnt("gp"), some()).values
     assert np.all(np.count_nonzero(np.any(values != 0.0, axis=0), axis=0) == 1)
 
 
 def test_pushes_far_apart_share_little_and_equal_pushes_all() -> None:
     push = some()
     same = Push(np.concatenate([push.inputs, push.inputs]), np.full(80, 0.2), {})
-    values = features_of(trained("gp"), same).values[:, 0]
+    values = features_of(learnt("gp"), same).values[:, 0]
     covariance = values @ values.T
     np.testing.assert_allclose(covariance[:40, :40], covariance[:40, 40:], atol=2 * NEGLIGIBLE)
 
@@ -105,17 +136,15 @@ def test_a_prior_model_has_about_the_variance_of_its_draws() -> None:
 
 
 def test_features_of_the_mechanics_are_derivatives_by_the_parameters() -> None:
-    model, push = trained("analytical", fit=True), some(10)
-    fitted = model.predictor.mechanics
-    assert len(fitted.values) > 1
-    for k, name in enumerate(fitted.values):
-        one = np.zeros_like(fitted.covariance)
+    model, push, mechanics = trained("analytical"), some(10), fitted()
+    for k, name in enumerate(mechanics.values):
+        one = np.zeros_like(mechanics.covariance)
         one[k, k] = 1e-4
-        alone = replace(fitted, covariance=one)
-        found = features_of(replace(model, predictor=replace(model.predictor, fitted=alone)), push)
-        ends = within(name, fitted.values[name])
-        changes = [{name: np.full(10, end - fitted.values[name])} for end in ends]
-        low, high = (fitted.displacement(push.inputs, push.duration, {}, change) for change in changes)
+        alone = replace(mechanics, covariance=one)
+        found = features_of(replace(model, predictor=MechanicsPredictor(alone, model.predictor.covariance)), push)
+        ends = within(name, mechanics.values[name])
+        changes = [{name: np.full(10, end - mechanics.values[name])} for end in ends]
+        low, high = (mechanics.displacement(push.inputs, push.duration, {}, change) for change in changes)
         slope = 0.01 * (high - low) / (ends[1] - ends[0]) / found.noise_sd
         along = found.values[:, :, np.argmax(np.abs(found.values).sum(axis=(0, 1)))]
         np.testing.assert_allclose(np.abs(along), np.abs(slope), atol=1e-3 * np.abs(slope).max())
@@ -128,7 +157,7 @@ def within(name: str, value: float) -> tuple[float, float]:
 
 
 def test_residuals_and_mechanics_add_up() -> None:
-    model, push = trained("gp", mean="mechanics"), some()
+    model, push = trained("gp", about=MechanicsMean(fitted(), 0.004)), some()
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.mean is not None
     mean = model.predictor.mean
     certain = replace(mean, fitted=replace(mean.fitted, covariance=0.0 * mean.fitted.covariance))

@@ -23,7 +23,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from coarse import coarse_mechanics
+from coarse import coarse_sweeps
 from scipy.stats import binom
 from synthetic import square_rig
 
@@ -181,7 +181,7 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
 @pytest.fixture(scope="module", autouse=True)
 def coarse_integration() -> Iterator[None]:
     """Errors of 0.1 % are far below the noise of the pushes."""
-    with coarse_mechanics():
+    with coarse_sweeps():
         yield
 
 

@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse import coarse_effects
 from drifting_models import pushes
 from synthetic import square_rig
 
@@ -50,6 +52,13 @@ LATER = DriverBasis("step", ("elapsed_time",), place=500.0)
 AROUND = DriverBasis("periodic", ("slider_heading",))
 MAP = DriverBasis("map", ("topic:/warmth", "elapsed_time"), (0.0, 500.0), (1.0, 300.0))
 OUTCOME = np.array([0.02, 0.02, 0.5])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of a few percent of the noise, in the tables as in the models that they are compared with."""
+    with coarse_effects():
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -87,7 +96,7 @@ CASES = {
 @cache
 def base(kind: str) -> PushModel:
     """About nothing, about mechanics with a shifted centre, these mechanics alone, or the analytical model."""
-    rows = pushes(40)
+    rows = pushes(15 if kind == "about mechanics" else 40)
     mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
     fitted = FittedMechanics(mechanics, {"contact_friction": 0.25, "centre_x": 0.003})
     if kind in ("analytical", "fitted"):

@@ -26,7 +26,9 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from coarse import coarse_effects
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, physics, pushes, slippery
+from hosted_nodes import hosted_node
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -73,6 +75,18 @@ def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: 
     return extend(base, evidence, [candidate(evidence, *term) for term in terms])
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small_tables() -> Iterator[None]:
+    """Tables of prior models and of effects are refused after some knots, and not built for seconds.
+
+    Displacements are accurate to a few percent of the noise.
+    """
+    with pytest.MonkeyPatch.context() as patch, coarse_effects():
+        patch.setattr(tabulated_prior, "MOST_KNOTS", 10)
+        patch.setattr(effect_table_build, "WORK", (3_000,))
+        yield
+
+
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
     models = {
@@ -93,13 +107,6 @@ def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
 
 
 # --- predictions -------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(autouse=True)
-def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables of prior models and of effects are refused after some knots, and not built for seconds."""
-    monkeypatch.setattr(tabulated_prior, "MOST_KNOTS", 10)
-    monkeypatch.setattr(effect_table_build, "WORK", (3_000,))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -221,7 +228,7 @@ def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, P
 
 @pytest.mark.parametrize(
     ("kind", "answer"),
-    [(kind, lambda model: model) for kind in KINDS] + [(kind, tabulate) for kind in KINDS if kind != "prior"],
+    [(kind, lambda model: model) for kind in KINDS if kind != "gp"] + [("gp", tabulate), ("analytical", tabulate)],
 )
 def test_covariate_outside_training_range_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
     model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
@@ -321,17 +328,22 @@ def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushMod
 # --- files ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_extended_model_survives_saving(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
-    generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
-    trained = with_effects(
-        bases[kind], pushes(6, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN]
-    )
-    predictor = trained.predictor
+@pytest.fixture(scope="module")
+def estimated(bases: dict[str, PushModel]) -> ExtendedPredictor:
+    """Two effects that were estimated together."""
+    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+    predictor = with_effects(bases["analytical"], pushes(6, 2, slippery(0.2)), terms).predictor
     assert isinstance(predictor, ExtendedPredictor)
-    model = replace(
-        trained, predictor=replace(predictor, effects=(*predictor.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
-    )
+    return predictor
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_extended_model_survives_saving(
+    bases: dict[str, PushModel], estimated: ExtendedPredictor, kind: str, tmp_path: Path
+) -> None:
+    generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
+    effects = replace(estimated, effects=(*estimated.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
+    model = replace(bases[kind], predictor=effects.with_base(bases[kind].predictor))
     save_model(model, tmp_path / "m")
     loaded, table = load_model(tmp_path / "m"), pushes(10, 3)
     assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
@@ -576,7 +588,7 @@ def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
     )
     params = {"models": [str(model_file)]}
     with contextlib.ExitStack() as stack:
-        stack.enter_context(harness.node_process("predict_server", domain=domain, params=params))
+        stack.enter_context(hosted_node("predict_server", domain=domain, params=params))
         node = stack.enter_context(harness.ros_context(domain))
         clients = {name: node.create_client(kind, name) for name, kind in kinds.items()}
         yield lambda name, request: harness.call(clients[name], request)

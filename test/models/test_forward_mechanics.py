@@ -108,8 +108,7 @@ def test_displacement_depends_on_the_travel_and_not_on_the_speed(kind: str) -> N
     assert fast == pytest.approx(slow, abs=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["patch", "three"])
-@pytest.mark.parametrize("travel", [0.004, 0.02])
+@pytest.mark.parametrize(("kind", "travel"), [("patch", 0.004), ("three", 0.02)])
 def test_finer_integration_changes_little(kind: str, travel: float) -> None:
     (inputs, duration), model = pushes(60, travel=travel), mechanics("rect1", kind)
     usual, half, fine = (

@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse import coarse_sweeps
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -46,6 +48,13 @@ pytestmark = pytest.mark.slow
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
 NOISE = np.array([2e-4, 2e-4, 5e-3])  # m, m, rad on a path of 4 mm
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of displacements are far below the noise of the pushes."""
+    with coarse_sweeps():
+        yield
 
 
 def pushes(n: int, seed: int, speeds: tuple[float, float] = (0.02, 0.02)) -> PushTable:
@@ -83,7 +92,10 @@ def informed() -> PushModel:
 def with_function() -> PushModel:
     """A GP of 40 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
     table = pushes(40, 1)
-    return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])), "gp")
+    outcomes = table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])
+    mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), TRUE, 1e-6 * np.eye(3))
+    options = TrainingOptions(about=MechanicsMean(mechanics, 0.004))
+    return train_model(replace(table, outcomes=outcomes), RIG, "gp", name="m", options=options)
 
 
 def test_few_pushes_teach_more_with_mechanics_than_without(informed: PushModel) -> None:

@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse import coarse_sweeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from likelihoods import bound_and_gradient, log_marginal_likelihood
@@ -57,6 +58,13 @@ pytestmark = pytest.mark.slow
 
 CHOICES = [KernelChoice(family, nugget) for family, nugget in product(FAMILIES, (False, True))]
 KERNEL = Matern52(np.array([0.3, -0.4, 1.0]), 0.2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of displacements are far below the noise of the pushes."""
+    with coarse_sweeps():
+        yield
 
 
 def normal(*shape: int, seed: int = 0) -> Array:

@@ -102,9 +102,9 @@ EACH = {p.name: 0.3 * p.high for p in PARAMETERS if p.name not in ("inertia", "r
 @cache
 def under_each_parameter() -> dict[str, Array]:
     """Displacements (n, 3) of the same pushes as arrays, under each parameter alone; all rows at once."""
-    inputs, duration, covariates = pushes(12, 1)
-    rows = np.tile(np.arange(12), len(EACH))
-    own = np.repeat(np.arange(len(EACH)), 12)
+    inputs, duration, covariates = pushes(6, 1)
+    rows = np.tile(np.arange(6), len(EACH))
+    own = np.repeat(np.arange(len(EACH)), 6)
     values = {name: np.where(own == k, value, BY_NAME[name].textbook) for k, (name, value) in enumerate(EACH.items())}
     given = inputs[rows], duration[rows], {name: column[rows] for name, column in covariates.items()}
     return dict(zip(EACH, np.split(SUPPORTS["three"].displacement(values, *given), len(EACH)), strict=True))
@@ -112,7 +112,7 @@ def under_each_parameter() -> dict[str, Array]:
 
 @pytest.mark.parametrize("name", EACH)
 def test_every_parameter_has_the_same_effect(name: str) -> None:
-    alone = one_by_one(scalar_mechanics(FittedMechanics(SUPPORTS["three"], {name: EACH[name]})), *pushes(12, 1))
+    alone = one_by_one(scalar_mechanics(FittedMechanics(SUPPORTS["three"], {name: EACH[name]})), *pushes(6, 1))
     assert alone * IN_METRES == pytest.approx(under_each_parameter()[name] * IN_METRES, rel=2e-5, abs=2e-7)
 
 

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from coarse import coarse_sweeps
 from repository import REPOSITORY
 from synthetic import noisy_pushes, square_rig
 
@@ -49,6 +50,13 @@ from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import empty_table
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_integration() -> Iterator[None]:
+    """Errors of displacements are far below the noise of the pushes."""
+    with coarse_sweeps():
+        yield
 
 
 @pytest.fixture
@@ -126,6 +134,7 @@ def rewrite(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]]
         np.savez(stream, **arrays)
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_a_kept_table_predicts_as_the_one_computed(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +208,7 @@ def test_completion_does_not_undo_what_was_loaded_meanwhile(
     assert registry.get("small").model.kind == "analytical" and registry.names == ["small", "other"]
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_training_writes_the_table_next_to_the_model(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -215,6 +225,7 @@ def test_a_device_gets_no_table_next_to_it(model: PushModel, tmp_path: Path) -> 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_a_validation_uses_the_table_of_the_server(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -342,6 +353,7 @@ def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatc
     assert {path.name for path in folder.iterdir()} == {f"{digest}.1.tables", f"{digest}.3.tables"}
 
 
+@pytest.mark.usefixtures("computed_once")
 def test_a_folder_that_takes_no_files_is_no_error(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(file / "tables"))
     assert load_served(file).tabulated

@@ -135,7 +135,9 @@ SLOW = PushPlan(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip2", pytest.param("hex", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "shape", ["rect1", *(pytest.param(shape, marks=pytest.mark.long) for shape in ("ellip2", "hex"))]
+)
 def test_slow_push_minimises_dissipation(shape: str) -> None:
     twice = at_speeds(SLOW, 0.005, 0.005)
     physics = even_physics(slider_named(shape), len(twice), np.repeat([20.0, 0.0], len(SLOW)))

