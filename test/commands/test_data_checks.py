@@ -35,8 +35,8 @@ from push_predictor.recordings.write import write_recording
 
 SOUND = REPOSITORY / "bags" / "circle_pu"
 SMALL = REPOSITORY / "bags" / "hexagon_delrin"
-REFUSED = ("both in mm", "stamps in ms", "no orientation")  # test_checks makes every mistake; these are of each kind
-WARNED = ("turned", "clocks apart", "wrench of the wrong sign")
+REFUSED = ("both in mm", "no orientation")  # test_checks makes every mistake; these are of each kind
+WARNED = ("turned", "wrench of the wrong sign")
 
 
 def lines_of(capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -21,12 +21,13 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from coarse import coarse_simulator
 from ros_harness import REPOSITORY, free_domain, node_environment
 
 from push_predictor.cli import main
@@ -45,6 +46,13 @@ from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.write import write_recording
 
 OF_ROS = ["rclpy", "messages", "interfaces", "middleware", "shared memory", "security", "loop-back call"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarsely() -> Iterator[None]:
+    """The recording that stands for one of the user's is simulated less finely."""
+    with coarse_simulator(4.0):
+        yield
 
 
 def with_module(folder: Path, name: str, code: str) -> str:

@@ -41,7 +41,7 @@ def simulated(monkeypatch):
     return specs
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [3])
 @pytest.mark.slow
 def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simulated, seed):
     places = make_hidden(tmp_path, seed)

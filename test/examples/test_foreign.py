@@ -94,7 +94,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 def _make(folder: Path) -> tuple[Path, Path]:
     data, truth = folder / "data", folder / "truth"
-    options = f"make --out {data} --truth {truth} --seed 2 --count 1 --training 5 --later 4"
+    options = f"make --out {data} --truth {truth} --seed 2 --count 1 --training 3 --later 3"
     assert command.main(options.split()) == 0
     return data, truth
 

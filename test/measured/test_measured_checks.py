@@ -75,7 +75,7 @@ def test_sound_recordings_are_neither_refused_nor_warned_about(recordings: dict[
         assert {finding.name for finding in found} <= {"outline_unchecked"}, name
 
 
-@pytest.mark.parametrize("name", ALTERED)
+@pytest.mark.parametrize("name", [ALTERED[0], pytest.param(ALTERED[1], marks=pytest.mark.long)])
 @pytest.mark.parametrize("mistake", CAUGHT)
 def test_mistakes_are_caught(recordings: dict[str, Recording], name: str, mistake: str) -> None:
     alter, finding, severity = MISTAKES[mistake]

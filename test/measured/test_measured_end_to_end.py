@@ -29,10 +29,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hosted_nodes import hosted_node
 from mit_square_fits import Scores, fit_scaled, load_square
 from mit_square_fits import split_by_push as expected_split_by_push
-from ros_harness import free_domain, node_process, wait_until
+from ros_harness import free_domain, wait_until
 from synthetic import Push, pose_stream, stamps, translating_push
+from validator_bench import hosting_replay, hosting_validator
 
 from benchmarks.measured.scores import pooled, total
 from benchmarks.measured.tables import leave_one_run_out, mean_speed, travelled
@@ -164,18 +166,17 @@ def served(
     models = {f"{slider}_{kind}": train_model(table, rig, kind, name=f"{slider}_{kind}") for kind in kinds}
     for name, model in models.items():
         save_model(model, folder / f"{name}.pushmodel")
-    with node_process("predict_server", domain=domain, params={"models": [str(folder)]}) as process:
-        process.wait_for_text("active with the models", 120.0)
+    with hosted_node("predict_server", domain=domain, params={"models": [str(folder)]}) as node:
+        node.wait_for_text("active with the models", 120.0)
         yield domain, models
 
 
 def validated_online(recording: Path, names: list[str], domain: int, out: Path) -> None:
     """Replay a recording to a validator of its own, which leaves its files in `out`."""
     watching = {"model": names[0], "compare": names[1:] or [""], "output": out, "report": False}
-    playing = {"recording": recording, "play.rate": RATE, "wait_for_subscribers": 60.0, "exit_when_finished": True}
     with (
-        node_process("push_validator", domain=domain, params=watching) as validator,
-        node_process("push_replay", domain=domain, params=playing) as replay,
+        hosting_validator(domain=domain, params=watching) as validator,
+        hosting_replay(domain, recording=recording, rate=RATE) as replay,
     ):
         assert wait_until(lambda: "Validation written" in validator.text(), 120.0), validator.text() + replay.text()
         replay.wait_for_text("lost 0")  # it says so after its last message

@@ -30,12 +30,17 @@ from repository import REPOSITORY
 
 ROS = ("rclpy", "rcl_interfaces", "push_predictor_interfaces", "launch", "ament_index_python")
 
-
-ROWS = runpy.run_path(str(REPOSITORY / "docs" / "pictures" / "draw_architecture.py"))["ROWS"]
-PICTURE = [[room for box in row for room in box[0].split(", ")] for row in ROWS[1:]]  # the first row is outside
 PACKAGE = REPOSITORY / "push_predictor"
-LIBRARY = sorted({room for row in PICTURE for room in row if (PACKAGE / room).is_dir()} - {"nodes"})
+ROOMS = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+LIBRARY = sorted(ROOMS - {"nodes"})
 MOST_MODULES = 15
+
+
+@pytest.fixture(scope="module")
+def picture() -> list[list[str]]:
+    """The rooms of each row."""
+    rows = runpy.run_path(str(REPOSITORY / "docs" / "pictures" / "draw_architecture.py"))["ROWS"]
+    return [[room for box in row for room in box[0].split(", ")] for row in rows[1:]]  # the first row is outside
 
 
 @cache
@@ -72,15 +77,14 @@ def test_the_library_imports_no_ros(package: str) -> None:
             assert not name.startswith((*ROS, "msg_adapters")) and "_msgs" not in name, f"{path}: {name}"
 
 
-def test_the_picture_shows_every_room() -> None:
-    shown = {room for row in PICTURE for room in row}
-    assert shown == {path.parent.name for path in PACKAGE.glob("*/__init__.py")} | {"api", "msg_adapters"}
+def test_the_picture_shows_every_room(picture: list[list[str]]) -> None:
+    assert {room for row in picture for room in row} == ROOMS | {"api", "msg_adapters"}
 
 
-def test_imports_point_down_or_right_in_the_picture() -> None:
-    for height, row in enumerate(PICTURE):
+def test_imports_point_down_or_right_in_the_picture(picture: list[list[str]]) -> None:
+    for height, row in enumerate(picture):
         for place, room in enumerate(row):
-            forbidden = [*(above for rows in PICTURE[:height] for above in rows), *row[:place]]
+            forbidden = [*(above for rows in picture[:height] for above in rows), *row[:place]]
             for path in files_of(room):
                 names = imports_of(path)
                 assert not [other for other in forbidden if imports_room(names, other)], path

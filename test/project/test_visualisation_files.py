@@ -36,7 +36,8 @@ from rclpy.qos import (
     ReliabilityPolicy,
     qos_check_compatible,
 )
-from ros_harness import REPOSITORY, free_domain, node_process, ros_context, wait_until
+from ros_harness import REPOSITORY, free_domain, ros_context, wait_until
+from validator_bench import hosting_replay, hosting_validator
 from visualization_msgs.msg import Marker
 
 from docs.pictures.draw_rviz import as_fields, translated
@@ -63,8 +64,8 @@ def published() -> dict[str, list[Any]]:
     domain = free_domain()
     with (
         ros_context(domain) as node,
-        node_process("push_replay", domain=domain, params={"recording": RECORDING, "play.start_paused": True}),
-        node_process("push_validator", domain=domain),
+        hosting_replay(domain, recording=RECORDING, **{"play.start_paused": True}),
+        hosting_validator(domain=domain),
     ):
         of_replay = {"/slider/pose", "/pusher/pose", "/pusher/wrench", "/replay_status"}
         of_validator = {"/push_residual", "/push_markers", "/push_alarm"}

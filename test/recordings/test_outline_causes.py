@@ -65,8 +65,8 @@ TURN, SHIFT, BOTH = (np.radians(3.0), NOWHERE), (0.0, (0.0012, 0.0)), (np.radian
 @pytest.mark.parametrize(
     ("name", "yaw", "shift"),
     [
-        *((name, *TURN) for name in (ROUND, OVAL, HEXAGON)),
-        *((name, *SHIFT) for name in (ROUND, OVAL, HEXAGON, ONE_SIDE)),
+        *((name, *TURN) for name in (ROUND, OVAL)),
+        *((name, *SHIFT) for name in (ROUND, HEXAGON, ONE_SIDE)),
         (HEXAGON, *BOTH),
     ],
 )
@@ -138,8 +138,9 @@ def test_mirrored_or_exchanged_axes_are_named(name: str, mistake: str) -> None:
 # --- tip radius and size ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [name for name in BAGS if name != ONE_SIDE])
-@pytest.mark.parametrize("more", [0.0011, -0.0011])
+@pytest.mark.parametrize(
+    ("name", "more"), [(ROUND, -0.0011), (OVAL, 0.0011), (OVAL, -0.0011), (HEXAGON, 0.0011), (SQUARE, -0.0011)]
+)
 def test_a_wrong_tip_radius_is_found_with_both_readings(name: str, more: float) -> None:
     rig = rig_of(name)
     altered = replace(rig, pusher_radius=rig.pusher_radius + more)
@@ -151,12 +152,8 @@ def test_a_wrong_tip_radius_is_found_with_both_readings(name: str, more: float) 
     rival = f"correct the tip radius by {-1e3 * more:.1f} mm: these contacts do not separate the two"
     assert ("These contacts" if name == OVAL else rival) in finding.advice
     assert f"{1e3 * radius.value:.2f} mm (sd" in finding.sentence
-
-
-def test_a_wrong_tip_of_an_ellipse_may_also_be_its_sizes() -> None:
-    rig = rig_of(OVAL)
-    (finding,) = check_recording(bag(OVAL), replace(rig, pusher_radius=rig.pusher_radius + 0.0011))
-    assert "or, if it is right, the sizes: 128.6 x 102.7 mm" in finding.advice
+    if (name, more) == (OVAL, 0.0011):
+        assert "or, if it is right, the sizes: 128.6 x 102.7 mm" in finding.advice
 
 
 @pytest.mark.parametrize("name", [ROUND, OVAL, HEXAGON])
@@ -198,7 +195,7 @@ def test_a_wrong_size_and_a_wrong_tip_are_corrected_together() -> None:
 # --- shape -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("more", [0.002, -0.002, 0.0013])
+@pytest.mark.parametrize("more", [-0.002, 0.0013])
 def test_a_wrong_axis_of_an_ellipse_is_a_wrong_shape_with_both_sizes(more: float) -> None:
     a, b = rig_of(OVAL).outline.semi_axes or NOWHERE
     altered = replace(rig_of(OVAL), outline=ellipse(a + more, b))
@@ -207,7 +204,7 @@ def test_a_wrong_axis_of_an_ellipse_is_a_wrong_shape_with_both_sizes(more: float
     lengths = [finding.values[name].value for name in ("length_x", "length_y")]
     assert lengths == pytest.approx([2.0 * a, 2.0 * b], abs=1.5e-4)
     assert "130.8 x 105.0 mm" in finding.sentence
-    if more == 0.002:
+    if more == 0.0013:
         with pytest.raises(RecordingError, match=r"no rig can be estimated \(outline_shape\): The outline's shape is"):
             estimate_rig(bag(OVAL), altered)
 
@@ -224,7 +221,7 @@ def with_vertex_off(name: str, vertex: int, more: float = 0.003) -> Rig:
     return replace(rig_of(name), outline=Outline(vertices))
 
 
-@pytest.mark.parametrize(("name", "vertex"), [*((HEXAGON, vertex) for vertex in range(5)), (SQUARE, 0)])
+@pytest.mark.parametrize(("name", "vertex"), [(HEXAGON, 0), (HEXAGON, 2), (HEXAGON, 4), (SQUARE, 0)])
 def test_a_wrong_vertex_is_a_wrong_shape_and_no_turn(name: str, vertex: int) -> None:
     """The sixth vertex of the hexagon was pushed nowhere near."""
     findings = found(bag(name), with_vertex_off(name, vertex))

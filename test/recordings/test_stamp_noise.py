@@ -279,7 +279,7 @@ def scored(sd: float, kind: str = "gaussian") -> tuple[PushTable, Comparison, di
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["gaussian", "delay"])
+@pytest.mark.parametrize("kind", ["gaussian", pytest.param("delay", marks=pytest.mark.long)])
 def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percent(kind: str) -> None:
     clean, (table, _, found) = scored(0.0)[2], scored(2.0, kind)
     assert len(table.pushes) == len(scored(0.0)[0].pushes) > 55 and abs(len(table) - len(scored(0.0)[0])) < 8

@@ -100,6 +100,7 @@ def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(
     assert count < 7
 
 
+@pytest.mark.usefixtures("a_library_of_three")
 def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushModel) -> None:
     found = searched(deployed, pushes(60, 2, slippery(0.1)), ["elapsed_time", "slider_x"], alpha=0.004)
     assert found.terms[0].best.label == ("contact_friction", "elapsed_time")

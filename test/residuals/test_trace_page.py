@@ -189,6 +189,22 @@ def test_many_rivals_are_counted_not_listed() -> None:
     assert action.startswith("Use the extended model, and vary elapsed time and 3 rivals independently")
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("measurement", "The lateness of the slider's stamps is 12.0 ms (95 % CI 10.5 to 13.5, p = 0.002)."),
+        ("variance", "The noise of dy is "),
+        ("driver_only", "The slider moves differently than predicted, depending on elapsed time; no known mechanism"),
+        ("map", "Contact friction changes with the position on the table"),
+    ],
+)
+def test_page_and_terminal_state_the_verdict(pages: Callable[[str], str], name: str, words: str) -> None:
+    page, lines = pages(name), " ".join(summary_lines(trace_of(name)))
+    assert words in unescape(re.sub(r"<[^>]+>", " ", page))
+    assert words in lines and lines.isascii()
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page), "the page is not self-contained"
+
+
 # --- what no reader should see ---------------------------------------------------------------------------------------
 
 

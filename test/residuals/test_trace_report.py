@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -26,7 +25,7 @@ from typing import Any
 import made_up_traces as made_up
 import numpy as np
 import pytest
-from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, planted, slippery, without_motion_effect
+from made_up_traces import DRIFT, EXPERIMENT, GRAIN, made_up_trace, planted, slippery, without_motion_effect
 
 from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -109,39 +108,16 @@ def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effect
     assert comparisons_of(nothing)[-1].model == "refit"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("trace", "words"),
-    [
-        (
-            lambda: without_motion_effect("measurement", "clock_offset", "model_inputs", LATE),
-            "The lateness of the slider's stamps is 12.0 ms (95 % CI 10.5 to 13.5, p = 0.002).",
-        ),
-        (
-            lambda: without_motion_effect(
-                "wrench_only", "surface_friction", "elapsed_time", Sized("change", 0.2, 0.1, 0.3, "1")
-            ),
-            "The force needed to push the slider changes with elapsed time; the motion does not",
-        ),
-        (lambda: without_motion_effect("variance", "", "elapsed_time", None), "The noise of dy is "),
-        (
-            lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
-            "The slider moves differently than predicted, depending on elapsed time; no known mechanism fits",
-        ),
-        (
-            lambda: made_up_trace(planted(*GRAIN, 0.06, 0.03)),
-            "Direction-dependent friction of the table differs from the model",
-        ),
-        (
-            lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
-            "Contact friction changes with the position on the table",
-        ),
-    ],
-)
-def test_every_verdict_has_its_page(tmp_path: Path, trace: Callable[[], Trace], words: str) -> None:
-    found = trace()
-    assert words in written(tmp_path, found)
-    assert words in " ".join(summary_lines(found)) and " ".join(summary_lines(found)).isascii()
+def test_page_and_terminal_state_the_verdict(tmp_path: Path) -> None:
+    """Of the other verdicts: see test_trace_page."""
+    force = without_motion_effect("wrench_only", "surface_friction", "elapsed_time", FIFTH)
+    grain = made_up_trace(planted(*GRAIN, 0.06, 0.03))
+    for trace, words in (
+        (force, "The force needed to push the slider changes with elapsed time; the motion does not"),
+        (grain, "Direction-dependent friction of the table differs from the model"),
+    ):
+        assert words in written(tmp_path, trace)
+        assert words in " ".join(summary_lines(trace)) and " ".join(summary_lines(trace)).isascii()
 
 
 def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path) -> None:

@@ -65,11 +65,11 @@ def spec(seed: int, pushes: int) -> SimulationSpec:
 
 
 @cache
-def learnt(mean: MeanChoice = "zero", pushes: int = 60) -> PushModel:
+def learnt(mean: MeanChoice = "zero", pushes: int = 60, rows: int = 80) -> PushModel:
     recording = simulate(spec(1, pushes))
     assert recording.rig is not None
     table = windows_to_table(find_windows(recording, recording.rig))
-    options = TrainingOptions(n_train=150, mean=mean)
+    options = TrainingOptions(n_train=rows, mean=mean)
     return train_model(table, recording.rig, "gp", name="deployed", options=options)
 
 
@@ -286,7 +286,7 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
-    found = trace(learnt("mechanics", 80), loaded(slippery, Faults(), 60), covariates=["elapsed_time"])
+    found = trace(learnt("mechanics", 80, 150), loaded(slippery, Faults(), 60), covariates=["elapsed_time"])
     (effect,) = found.effects
     assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "session")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1
