@@ -44,7 +44,7 @@ types: $(VENV)/.installed $(VENV)/.tools
 	$(BIN)/mypy
 
 # Four workers on two cores: tests of nodes wait for each other's messages.
-suite: $(VENV)/.installed $(VENV)/.tools
+suite: $(VENV)/.installed $(VENV)/.tools $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(MARKERS)
 
 docs: $(VENV)/.docs
@@ -83,6 +83,11 @@ $(VENV)/.dependencies: $(VENV)/.python setup.py push_predictor_paper/setup.py sc
 $(VENV)/.tools: $(VENV)/.dependencies
 	$(BIN)/pip install -qq --no-compile '.[import,test]'
 	touch $@
+
+# Four workers that import everything at once would each compile it: half a minute of two cores. Once, beside mypy;
+# what is wrong with a test file, the suite says.
+$(VENV)/.compiled: | $(VENV)/.installed $(VENV)/.tools
+	-$(BIN)/python -m pytest --collect-only -qq > $@
 
 $(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) setup.py push_predictor_paper/setup.py
 	$(MAKE) -j 2 $(VENV)/.wheel $(PACKAGES)

@@ -61,14 +61,9 @@ def _on_polygon(outline: Outline) -> Nearest:
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.sqrt(squared)[:, None]
     edges = [tuple(row) for row in np.column_stack([outline.vertices, ends[:, 1], along, squared, normals]).tolist()]
     general = _on_any_polygon(edges)
-    after = np.roll(along, -1, axis=0)
-    if np.any(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0] <= 0.0):
+    if not outline.is_convex:
         return general
-    offsets = np.sum(outline.vertices * normals, axis=1)
-    # The foot on an edge, over its length from the first vertex, is linear in the point.
-    shares = along / squared[:, None]
-    starts = np.sum(outline.vertices * shares, axis=1)
-    lines = [tuple(row) for row in np.column_stack([normals, offsets, shares, starts]).tolist()]
+    lines = [tuple(line) for line in outline.edge_lines.T.tolist()]
     last = lines[0]  # where the disc touches most often touches again
 
     def nearest(x: float, y: float) -> tuple[float, float, float, float, float]:

@@ -189,6 +189,22 @@ class Outline:
         return tuple(column[:, None].copy() for column in (*self.vertices.T, *along.T, squared))
 
     @cached_property
+    def is_convex(self) -> bool:
+        """Whether a polygon turns to the left at each vertex."""
+        along, after = self._edges[0], np.roll(self._edges[0], -1, axis=0)
+        return bool(np.all(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0] > 0.0))
+
+    @cached_property
+    def edge_lines(self) -> Array:
+        """Of the edges (6, V): outward normal x, y and distance of the line from the origin in that direction; x, y and
+        constant of the share of the edge, from its first vertex on, at which a point's foot lies.
+        """
+        along, squared = self._edges
+        shares = along / squared[:, None]
+        of_normal, of_share = ((self.vertices * factors).sum(axis=1) for factors in (self._edge_normals, shares))
+        return np.stack([*self._edge_normals.T, of_normal, *shares.T, of_share])
+
+    @cached_property
     def _shift_per_rise(self) -> Array:
         """Of edges (V, 1), change of x per change of y; of level edges, which no level line crosses, any number."""
         along, rise = self._edges[0].T[..., None]
@@ -214,6 +230,28 @@ class Outline:
         return bool(np.allclose(image, np.roll(self.vertices, -(len(image) // order), axis=0), atol=SAME_LENGTH))
 
     def _project_polygon(self, points: Array) -> Projection:
+        return self._project_convex(points) if self.is_convex else self._project_any(points)
+
+    def _project_convex(self, points: Array) -> Projection:
+        """On the edge whose line a point lies farthest outside; the nearest corner can only be one of its ends."""
+        (x, y), (normal_x, normal_y, offset, *_) = points.T, self.edge_lines[:, :, None]
+        edge = (x * normal_x + y * normal_y - offset).argmax(axis=0)
+        nx, ny, offset, share_x, share_y, first = self.edge_lines.take(edge, axis=1)
+        distance, share = x * nx + y * ny - offset, x * share_x + y * share_y - first
+        away_x, away_y = distance * nx, distance * ny
+        at_vertex = ((share <= 0.0) | (share >= 1.0)) & (distance > 0.0)
+        if at_vertex.any():
+            along_x, along_y = self._edges[0].T.take(edge, axis=1)
+            beyond = np.where(at_vertex, share - np.where(share < 0.5, 0.0, 1.0), 0.0)
+            away_x, away_y = away_x + beyond * along_x, away_y + beyond * along_y
+            distance = np.where(at_vertex, np.sqrt(away_x * away_x + away_y * away_y), distance)
+            divisor = np.where(at_vertex, distance, 1.0)
+            nx, ny = np.where(at_vertex, away_x / divisor, nx), np.where(at_vertex, away_y / divisor, ny)
+        nearest = paired(x - away_x, y - away_y)
+        return Projection(nearest, paired(nx, ny), distance, at_vertex, lambda: self.contact_on_edge(edge, share))
+
+    def _project_any(self, points: Array) -> Projection:
+        """Of any polygon: of the nearest points of its edges, the nearest."""
         # By edge first and by coordinate: arrays of n numbers in a row, where those of two would be slow.
         x0, y0, along_x, along_y, squared = self._edge_columns
         offset_x, offset_y = points[:, 0] - x0, points[:, 1] - y0

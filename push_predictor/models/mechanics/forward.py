@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.geometry.frames import rotate, to_body
+from push_predictor.geometry.frames import paired, rotate
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.models.mechanics.limit_surfaces.direction_dependence import Root, root_of
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
@@ -211,16 +211,19 @@ class Motion:
         return np.asarray(-(share / size)[:, None] * load)
 
     def _quasi_static(self, rows: IntArray, pose: Array, done: Array, inertial: Array | None) -> _Instant:
-        heading, length = pose[:, 2], self.length[rows]
-        tip = self.push.tip[rows] + done[:, None] * self.push.ahead[rows]
-        nearest = self.mechanics.outline.project(to_body(tip, pose))
+        (x, y, heading), length = pose.T, self.length[rows]
+        (tip_x, tip_y), (ahead_x, ahead_y) = self.push.tip[rows].T, self.push.ahead[rows].T
+        cos, sin = np.cos(heading), np.sin(heading)
+        from_x, from_y = tip_x + done * ahead_x - x, tip_y + done * ahead_y - y
+        nearest = self.mechanics.outline.project(paired(cos * from_x + sin * from_y, cos * from_y - sin * from_x))
         centre = self._centre(rows, heading)
-        touch = _touch(nearest, rotate(self.push.ahead[rows], -heading), centre, length)
+        ahead = cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
+        touch = _touch(nearest, ahead, centre, length)
         motion = self._driven(rows, heading, touch, inertial)
         spin = motion.spin / length
         vx, vy = motion.vx + spin * centre[:, 1], motion.vy - spin * centre[:, 0]
-        cos, sin = np.cos(heading), np.sin(heading)
-        rate = np.stack([cos * vx - sin * vy, sin * vx + cos * vy, spin], axis=1)
+        rate = np.empty_like(pose)
+        rate[:, 0], rate[:, 1], rate[:, 2] = cos * vx - sin * vy, sin * vx + cos * vy, spin
         return _Instant((rate, nearest.distance - self.push.radius[rows], touch.along), nearest, touch, motion)
 
     def _kind(self, found: _Instant) -> Array:
@@ -279,8 +282,8 @@ def _of_point(rate: Array, pose: Array, point: Array) -> Array:
     return np.asarray(rate + rate[:, 2:] * np.column_stack([-y, x, np.zeros(len(x))]))
 
 
-def _touch(nearest: Projection, velocity: Array, centre: Array, length: Array) -> Touch:
+def _touch(nearest: Projection, velocity: tuple[Array, Array], centre: Array, length: Array) -> Touch:
     nx, ny = -nearest.normal[:, 0], -nearest.normal[:, 1]
     x, y = (nearest.point[:, 0] - centre[:, 0]) / length, (nearest.point[:, 1] - centre[:, 1]) / length
-    vx, vy = velocity[:, 0], velocity[:, 1]
+    vx, vy = velocity
     return Touch(nx, ny, x * ny - y * nx, x * nx + y * ny, vx * nx + vy * ny, vy * nx - vx * ny)

@@ -95,7 +95,7 @@ class LoadedSurface:
         pull, given = self._stretched_pull[:, chosen], np.sqrt(sum(part * part for part in pusher))
         x, y, m = (part / given for part in pusher)
         dot, square = x * pull[0] + y * pull[1] + m * pull[2], np.sum(pull * pull, axis=0)
-        radius = np.ones(len(x))
+        radius = np.ones(x.shape)
         for _ in range(PULL_ROUNDS):
             share = -dot + np.sqrt(np.maximum(dot * dot + radius * radius - square, SMALLEST_MARGIN))
             load = share * x + pull[0], share * y + pull[1], share * m + pull[2]

@@ -33,8 +33,8 @@ BISECT_EVERY = 6  # steps: next to a flat or an edge of the limit surface, secan
 
 Numbers = TypeVar("Numbers", float, Array)
 Rows: TypeAlias = "IntArray | slice"
-# From some of the contacts (k,) and their load's force (x, y) and moment over length, (k,) each, to a twist (vx, vy, w
-# times length) up to a factor.
+# From some of the contacts (k,) and their load's force (x, y) and moment over length, (k,) or (2, k) each, to a twist
+# (vx, vy, w times length) up to a factor.
 TwistOf: TypeAlias = Callable[[Rows, Array, Array, Array], tuple[Array, Array, Array]]
 
 
@@ -79,20 +79,20 @@ def driven(twist_of: TwistOf, touch: Touch, left_edge: Array, right_edge: Array)
     contact's velocity turns with that of the force: at the edges of the cone it shows whether the contact slips, and
     between them lies the force of a contact that sticks.
     """
-    right = _Edge(np.cos(right_edge), -np.sin(right_edge))
-    left = _Edge(np.cos(left_edge), np.sin(left_edge))
-    at_right, at_left = _under(twist_of, EVERY, touch, right), _under(twist_of, EVERY, touch, left)
-    lag_right, lag_left = at_right.lag(touch), at_left.lag(touch)
+    angles = np.stack([-right_edge, left_edge])  # both edges at once: few contacts take as long as one
+    edges = _Edge(np.cos(angles), np.sin(angles))
+    at_edges = _under(twist_of, EVERY, touch, edges)
+    lag_right, lag_left = at_edges.lag(touch)
     slip = (lag_left > 0.0).astype(np.int64) - (lag_right < 0.0).astype(np.int64)
     share = np.where(slip > 0, 1.0, 0.0)
-    motion = _Motion(*(np.where(slip > 0, a, b) for a, b in zip(at_left, at_right, strict=True)))
+    motion = _Motion(*(np.where(slip > 0, left, right) for right, left in at_edges))
     sticks = np.flatnonzero((slip == 0) & (touch.along > 0.0))
     if sticks.size:
         bracket = _Bracket.of(np.maximum(lag_right, 0.0)[sticks], np.minimum(lag_left, 0.0)[sticks])
-        _stick(twist_of, sticks, touch, (right, left), bracket, share, motion)
+        _stick(twist_of, sticks, touch, edges, bracket, share, motion)
     moves = (touch.along > 0.0) & (motion.toward > 0.0)
     size = np.where(moves, touch.along / np.where(moves, motion.toward, 1.0), 0.0)
-    push, rub = (a + share * (b - a) for a, b in zip(right, left, strict=True))
+    push, rub = (right + share * (left - right) for right, left in edges)
     return Driven(motion.vx * size, motion.vy * size, motion.spin * size, slip * moves, np.arctan2(rub, push))
 
 
@@ -105,7 +105,7 @@ def driven_on_ellipsoid(touch: Touch, friction: Array) -> Driven:
 
 
 class _Edge(NamedTuple):
-    """Force along the normal and along its left, (n,) each."""
+    """Force along the normal and along its left, (n,) each, or (2, n) at the right and the left edge of the cone."""
 
     push: Array
     rub: Array
@@ -178,7 +178,7 @@ def _stick(
     twist_of: TwistOf,
     rows: IntArray,
     touch: Touch,
-    edges: tuple[_Edge, _Edge],
+    edges: _Edge,
     bracket: _Bracket,
     share: Array,
     motion: _Motion,
@@ -188,11 +188,10 @@ def _stick(
     On an ellipsoid the velocity is linear in the force, and the first step is exact. A solved contact stays as it is,
     so that its motion does not depend on the others.
     """
-    right, left = edges
-    change = _Edge(left.push - right.push, left.rub - right.rub)
+    start, change = _Edge(edges.push[0], edges.rub[0]), _Edge(*(left - right for right, left in edges))
     for step in range(1, ROOT_STEPS + 1):
         tried, at = bracket.inside(halve=step % BISECT_EVERY == 0), Touch(*(part[rows] for part in touch))
-        force = _Edge(*(a[rows] + tried * b[rows] for a, b in zip(right, change, strict=True)))
+        force = _Edge(*(a[rows] + tried * b[rows] for a, b in zip(start, change, strict=True)))
         found = _under(twist_of, rows, at, force)
         share[rows] = tried
         for part, new in zip(motion, found, strict=True):
