@@ -34,6 +34,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 SMOOTH_TABLE = 8192  # chords that approximate the arc length of an ellipse: relative error 1e-8
 NEWTON_STEPS = 60  # enough for bisection alone
 PARAMETER_TOLERANCE = 1e-14  # rad
+ROUNDING = 1e-12  # m; a point this near to a corner has the normal of an edge, not the direction of a rounding error
 SAME_LENGTH = 1e-6  # m; tolerance of vertices and their images under a symmetry
 CENTRED = (0.0, 0.0, 0.0)  # pose of axes that are those of the body frame
 
@@ -239,7 +240,7 @@ class Outline:
         nx, ny, offset, share_x, share_y, first = self.edge_lines.take(edge, axis=1)
         distance, share = x * nx + y * ny - offset, x * share_x + y * share_y - first
         away_x, away_y = distance * nx, distance * ny
-        at_vertex = ((share <= 0.0) | (share >= 1.0)) & (distance > 0.0)
+        at_vertex = ((share <= 0.0) | (share >= 1.0)) & (distance > ROUNDING)
         if at_vertex.any():
             along_x, along_y = self._edges[0].T.take(edge, axis=1)
             beyond = np.where(at_vertex, share - np.where(share < 0.5, 0.0, 1.0), 0.0)

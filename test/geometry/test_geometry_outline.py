@@ -152,6 +152,18 @@ def test_normal_at_a_corner_turns_from_one_edge_to_the_next():
     assert found.distance == pytest.approx(0.005)
 
 
+ROUNDED = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.03, 0.08]]))  # a corner is 3e-18 m from the line of an edge
+
+
+@pytest.mark.parametrize("outline", [square(0.09), shape_outline("hex"), ROUNDED], ids=["square", "hex", "rounded"])
+def test_a_corner_itself_is_on_the_outline_with_the_normal_of_one_of_its_edges(outline):
+    found, normals = outline.project(outline.vertices), -outline.inward_normal(outline.edge_starts[:-1] + 1e-3)
+    assert found.point == pytest.approx(outline.vertices)
+    assert found.distance == pytest.approx(0.0, abs=1e-15)
+    for normal, before, after in zip(found.normal, np.roll(normals, 1, axis=0), normals, strict=True):
+        assert min(np.linalg.norm(normal - before), np.linalg.norm(normal - after)) < 1e-9
+
+
 @CONVEX
 @given(st.floats(0.001, 0.02), contacts)
 @settings(max_examples=30, deadline=None)
