@@ -152,7 +152,7 @@ def test_normal_at_a_corner_turns_from_one_edge_to_the_next():
     assert found.distance == pytest.approx(0.005)
 
 
-ROUNDED = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.03, 0.08]]))  # a corner is 3e-18 m from the line of an edge
+ROUNDED = Outline(np.array([[0.016, -0.062], [0.095, -0.079], [-0.01, -0.021]]))  # its last corner lies 3e-17 m outside
 
 
 @pytest.mark.parametrize("outline", [square(0.09), shape_outline("hex"), ROUNDED], ids=["square", "hex", "rounded"])
