@@ -23,17 +23,19 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Collection, Generator, Iterator, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse import coarse_sweeps
+from coarse_pictures import coarse_pictures
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
-from push_predictor.reporting import canvas
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of node processes: two threads cost several times the CPU time
 # The tests start some hundred processes. Without its bytecode on disk each would compile the package again: 0.3 s.
@@ -47,13 +49,13 @@ MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
 NEEDS_ROS = re.compile(
     r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
 )
-LONGEST = {  # files that take seven seconds of processor time or more, or that wait as long: half of the workers' time
-    "test_checks", "test_cli", "test_effect_table", "test_extended_model", "test_further_steps",
-    "test_measured_end_to_end", "test_outline_causes", "test_paper_report", "test_prior_model", "test_residual_search",
-    "test_suggest", "test_table_cache", "test_tabulated_model", "test_trace_verdicts",
-    "test_faults_bags", "test_faults_kill", "test_faults_load", "test_faults_network_security",
+LONGEST = {  # files that take six seconds of processor time or more, or that wait as long: a third of the workers' time
+    "test_alarm", "test_checks", "test_cli", "test_effect_table", "test_extended_model", "test_measured_end_to_end",
+    "test_outline_causes", "test_paper_report", "test_prior_model", "test_residual_search", "test_tabulated_model",
+    "test_trace_verdicts",
+    "test_faults_bags", "test_faults_kill", "test_faults_load", "test_faults_network_security", "test_node_lab_topics",
     "test_node_predict_server", "test_node_push_alarm", "test_node_push_recorder", "test_node_push_replay",
-    "test_node_push_validator", "test_node_scalar_topics", "test_node_trace_residual",
+    "test_node_push_validator", "test_node_trace_residual",
 }  # fmt: skip
 
 
@@ -118,14 +120,16 @@ def _places(needs_ros: Mapping[Path, bool], slow: Collection[Path]) -> dict[Path
 
 
 @pytest.fixture(scope="module", autouse=True)
-def coarse_pictures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Draw few pixels and no ticks, and do not fit axes and labels: that is three quarters of the time of a figure."""
-    with pytest.MonkeyPatch.context() as coarse:
-        if request.module.__name__ not in DRAWN_AS_FOR_READERS:
-            coarse.setattr(canvas, "DPI", 40)
-            coarse.setattr(canvas, "LAYOUTS", 0)
-            for part in ("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"):
-                coarse.setitem(canvas.STYLE, part, False)
+def coarse_figures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Figures in a quarter of the time, but for the files that look at them."""
+    with nullcontext() if request.module.__name__ in DRAWN_AS_FOR_READERS else coarse_pictures():
+        yield
+
+
+@pytest.fixture(scope="module")
+def coarse_integration() -> Iterator[None]:
+    """Displacements to 1 %, for files whose pushes have noise far above such errors."""
+    with coarse_sweeps():
         yield
 
 

@@ -27,6 +27,15 @@ from push_predictor.types import Array
 STRAIGHT = 1e-12  # m^2; a corner whose edges span less counts as straight
 
 
+def is_convex(vertices: Array) -> bool:
+    """Whether a polygon (V, 2) in m turns to the left at each vertex, and once in all."""
+    along = np.roll(vertices, -1, axis=0) - vertices
+    after = np.roll(along, -1, axis=0)
+    turns = along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0]
+    headings = np.arctan2(turns, np.sum(along * after, axis=1))
+    return bool(np.all(turns > STRAIGHT) and np.isclose(headings.sum(), 2.0 * np.pi))
+
+
 @dataclass(frozen=True, eq=False)
 class ConvexPolygon:
     """A convex polygon with vertices (V, 2) in m, counter-clockwise. Raises RequestError."""
@@ -39,11 +48,7 @@ class ConvexPolygon:
             raise RequestError("polygon", vertices.tolist(), "at least three [x, y] in metres")
         if not np.all(np.isfinite(vertices)):
             raise RequestError("polygon", vertices.tolist(), "finite [x, y] in metres")
-        along = np.roll(vertices, -1, axis=0) - vertices
-        after = np.roll(along, -1, axis=0)
-        turns = along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0]
-        headings = np.arctan2(turns, np.sum(along * after, axis=1))
-        if not (np.all(turns > STRAIGHT) and np.isclose(headings.sum(), 2.0 * np.pi)):
+        if not is_convex(vertices):
             raise RequestError("polygon", vertices.tolist(), "the corners of a convex polygon, counter-clockwise")
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)

@@ -58,7 +58,7 @@ def _on_polygon(outline: Outline) -> Nearest:
     ends = np.roll(outline.vertices, -1, axis=0)
     along = ends - outline.vertices
     squared = np.sum(along**2, axis=1)
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.sqrt(squared)[:, None]
+    normals = outline.edge_lines[:2].T
     edges = [tuple(row) for row in np.column_stack([outline.vertices, ends[:, 1], along, squared, normals]).tolist()]
     general = _on_any_polygon(edges)
     if not outline.is_convex:

@@ -28,6 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.errors import RigError
+from push_predictor.geometry.convex import is_convex
 from push_predictor.geometry.frames import paired, rotate, to_body, to_world
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -191,9 +192,8 @@ class Outline:
 
     @cached_property
     def is_convex(self) -> bool:
-        """Whether a polygon turns to the left at each vertex."""
-        along, after = self._edges[0], np.roll(self._edges[0], -1, axis=0)
-        return bool(np.all(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0] > 0.0))
+        """Whether the vertices make a convex polygon without straight corners."""
+        return is_convex(self.vertices)
 
     @cached_property
     def edge_lines(self) -> Array:

@@ -19,7 +19,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,6 @@ from typing import Any
 import numpy as np
 import pytest
 import threadpoolctl
-from coarse import coarse_sweeps
 from lab_bags import short_recording
 from repository import BAGS, REPOSITORY
 
@@ -52,15 +50,10 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 TRAINING = BAGS / "square_abs_test"
 FEW = BAGS / "hexagon_delrin"  # 53 windows
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -16,14 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from drifting_models import extended, grain, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
@@ -45,16 +43,9 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 TABLE = noisy_pushes(36)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:

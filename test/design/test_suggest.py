@@ -21,7 +21,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
@@ -53,14 +52,7 @@ from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 
-pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 
 @pytest.fixture(scope="module", autouse=True)

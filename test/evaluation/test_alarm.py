@@ -17,13 +17,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from scipy.stats import binom
 from synthetic import square_rig
 
@@ -48,6 +46,8 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
+
+pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 SIZE, SHIFT = ScoreKind("size", 0.5, False), ScoreKind("shift", 0.5, True)
 KINDS = (SIZE, SHIFT)
@@ -176,13 +176,6 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
     physics = AnalyticalPush(rig.outline, rig.pusher_radius, contact_friction=friction)
     outcomes = physics.displacement(inputs, duration) + NOISE * noise
     return PushTable(inputs, duration, outcomes, push_id, {"slider_heading": rng.uniform(-3.0, 3.0, n)})
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of 0.1 % are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 @pytest.fixture(autouse=True)

@@ -19,14 +19,12 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from gaussian_comparisons import gaussian_comparison
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -57,14 +55,9 @@ from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting import html
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def rig_of(shape: str) -> Rig:

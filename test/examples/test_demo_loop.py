@@ -41,10 +41,9 @@ def simulated(monkeypatch):
     return specs
 
 
-@pytest.mark.parametrize("seed", [3])
 @pytest.mark.slow
-def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simulated, seed):
-    places = make_hidden(tmp_path, seed)
+def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simulated):
+    places = make_hidden(tmp_path, 3)
     part, whole = read_recording(places.recorded), read_recording(places.whole)
     n = len(part.slider)
     assert 0.5 < n / len(whole.slider) < 0.95

@@ -164,6 +164,14 @@ def test_a_corner_itself_is_on_the_outline_with_the_normal_of_one_of_its_edges(o
         assert min(np.linalg.norm(normal - before), np.linalg.norm(normal - after)) < 1e-9
 
 
+def test_a_star_that_is_wound_twice_is_not_convex():
+    """Though it turns to the left at each vertex."""
+    angles = 0.8 * np.pi * np.arange(5)
+    star = Outline(0.05 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    assert not star.is_convex
+    assert star.project(np.array([[0.06, 0.0]])).distance[0] == pytest.approx(0.01)
+
+
 @CONVEX
 @given(st.floats(0.001, 0.02), contacts)
 @settings(max_examples=30, deadline=None)

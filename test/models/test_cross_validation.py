@@ -16,12 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from drifting_models import extended, pushes, slippery
 from synthetic import noisy_pushes, square_rig
 
@@ -36,16 +34,11 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 BLOCKS = 6
 TO = 1e-2  # nats, to which the noise of the remaining rows is solved for
 FIELDS = ("mean", "variance", "log_noise_mean", "log_noise_variance")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def rows(n: int, seed: int = 0) -> tuple[Array, Array, IntArray]:

@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from synthetic import square_pushes
 
 from push_predictor.api import train
@@ -33,17 +31,10 @@ from push_predictor.recordings.load import different_supports, load_data
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 MIDDLE = CORNERS * [0.25, 0.25, 1.0]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 @pytest.fixture

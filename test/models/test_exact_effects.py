@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from drifting_models import DRIFT, extended, physics, pushes, slippery
 from synthetic import square_rig
 
@@ -44,19 +42,14 @@ from push_predictor.residuals.candidates.coefficients import _Problem, estimated
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.basis_choice import simplest_basis
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 EXACT = [mechanism.name for mechanism in LIBRARY if mechanism.quantities]
 ALWAYS = DriverBasis("constant")
 IN_METRES = np.array([1.0, 1.0, 0.04])  # a turn counts as the path of a point 4 cm from the centre
 
 
 CONTACT, ANGLE = 1, 2  # columns of the inputs
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def made(n: int, seed: int = 0, duration: float = 0.2) -> Push:

@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from synthetic import square_pushes
 
 from push_predictor.errors import ModelFileError, RequestError
@@ -42,17 +40,12 @@ from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 ON_CORNERS = supported_at(
     np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 )
 IN_MIDDLE = supported_at(np.array([[0.01, 0.01, 0.25], [-0.01, 0.01, 0.25], [-0.01, -0.01, 0.25], [0.01, -0.01, 0.25]]))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def mechanics_model(values: dict[str, float], **covariates: Array) -> PushModel:

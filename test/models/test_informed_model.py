@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -43,18 +41,11 @@ from push_predictor.models.train import TrainingOptions, retrain_model, train_mo
 from push_predictor.models.train_learnt import fitted_mean
 from push_predictor.recordings.table import PushTable
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
 NOISE = np.array([2e-4, 2e-4, 5e-3])  # m, m, rad on a path of 4 mm
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def pushes(n: int, seed: int, speeds: tuple[float, float] = (0.02, 0.02)) -> PushTable:

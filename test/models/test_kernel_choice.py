@@ -17,14 +17,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from likelihoods import bound_and_gradient, log_marginal_likelihood
@@ -54,17 +53,10 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 CHOICES = [KernelChoice(family, nugget) for family, nugget in product(FAMILIES, (False, True))]
 KERNEL = Matern52(np.array([0.3, -0.4, 1.0]), 0.2)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def normal(*shape: int, seed: int = 0) -> Array:

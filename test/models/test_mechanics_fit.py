@@ -16,12 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
@@ -32,15 +30,10 @@ from push_predictor.models.mechanics.ladder import Rung, candidates, climb, wort
 from push_predictor.models.mechanics.limit_surface import uniform_support
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 NOISE = np.array([3e-5, 3e-5, 1e-3])
 TRUE = {"contact_friction": 0.15, "centre_y": 0.006}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def ellipsoidal_mechanics() -> PushMechanics:

@@ -92,7 +92,7 @@ def share_explained(difference: np.ndarray, response: np.ndarray) -> tuple[float
 # --- every mechanism on every outline -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("outline", ["ellip1", "tri"])  # zeros on others would fail the comparisons below
+@pytest.mark.parametrize("outline", ["ellip1", "ellip3", "tri"])
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
 def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism, outline: str) -> None:
     response = mechanism.response(physics_of(outline), pushes(30))

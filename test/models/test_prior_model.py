@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from synthetic import square_rig
 
 from push_predictor import api
@@ -53,19 +51,12 @@ from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)
 ON_ELLIPSE = replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))
 TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -20,12 +20,10 @@ import io
 import json
 import pickle
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import noisy_pushes, square_rig, triangle
@@ -40,12 +38,7 @@ from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.table import PushTable
 
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
+pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 
 @pytest.fixture(scope="module")

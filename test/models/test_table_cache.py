@@ -18,14 +18,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from repository import REPOSITORY
 from synthetic import noisy_pushes, square_rig
 
@@ -51,12 +50,7 @@ from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabu
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import empty_table
 
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
+pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 
 @pytest.fixture

@@ -16,14 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -45,15 +43,10 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 SCALE, DEGREES = np.array([0.5, 0.9, 1.6]), np.array([3.0, 4.0, 8.0])
 COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 0.25]])
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 def made_up(pushes: int = 40) -> Tails:

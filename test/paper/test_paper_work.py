@@ -122,9 +122,9 @@ def test_the_watch_sees_the_start_and_every_job_cached_ones_too(pieces, tmp_path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cores", "end"), [(2, signal.SIGINT), (2, signal.SIGKILL)])
-def test_results_before_an_interruption_are_kept(pieces, tmp_path: Path, cores: int, end: signal.Signals) -> None:
-    log, count = tmp_path / "log", 8
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
+def test_results_before_an_interruption_are_kept(pieces, tmp_path: Path, end: signal.Signals) -> None:
+    log, count, cores = tmp_path / "log", 8, 2
     process = started(tmp_path, log, cores, count)
     try:
         wait_for(lambda: len(lines(log)) >= 3)

@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repository import BAGS
@@ -50,17 +48,12 @@ from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.windows.track import Track
 
+pytestmark = pytest.mark.usefixtures("coarse_integration")
+
 RADIUS, SPEED, DURATION = 0.00475, 0.02, 0.2
 TOLD = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
 METRES, ANGLES = st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)
 OUTLINES = {name: shape_outline(name) for name in ("rect1", "hex", "ellip2", "ellip1")} | {"triangle": triangle()}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_integration() -> Iterator[None]:
-    """Errors of displacements are far below the noise of the pushes."""
-    with coarse_sweeps():
-        yield
 
 
 @cache

@@ -85,7 +85,7 @@ def test_an_outline_shifted_by_a_millimetre_is_found(name: str) -> None:
     assert (values["x"].value, values["y"].value) == pytest.approx((-shift[0], -shift[1]), abs=1e-4)
 
 
-@pytest.mark.parametrize(("name", "more"), [*zip(DETAILED, (MILLIMETRE, -MILLIMETRE), strict=True)])
+@pytest.mark.parametrize(("name", "more"), zip(DETAILED, (MILLIMETRE, -MILLIMETRE), strict=True))
 def test_an_outline_too_large_or_too_small_by_a_millimetre_a_side_is_found(name: str, more: float) -> None:
     rig = rig_of(bag(name))
     values = found(bag(name), wrong(rig, more=more))["outline_size"]

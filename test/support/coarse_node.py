@@ -20,15 +20,16 @@ So it is in the processes that it starts: multiprocessing runs this file in each
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from importlib import import_module
+
+from coarse_pictures import coarse_pictures
 
 from push_predictor.models.tabulated import effect_table_build
 from push_predictor.nodes.entry import install_handlers
-from push_predictor.reporting import canvas
 
-canvas.DPI = 40
-canvas.LAYOUTS = 0  # axes and labels are not fitted to each other
-canvas.STYLE |= dict.fromkeys(("xtick.bottom", "xtick.labelbottom", "ytick.left", "ytick.labelleft"), False)
+ALL_THE_TIME = ExitStack()
+ALL_THE_TIME.enter_context(coarse_pictures())
 effect_table_build.WORK = ()  # a table takes two seconds; without one an extended model predicts exactly
 
 if __name__ == "__main__":

@@ -77,8 +77,11 @@ def hosting_validator(*ros_args: str, **where: Any) -> Iterator[HostedNode]:
 
     Each takes a second of processor time. where: as `hosted_node` has it.
     """
-    alone = patch.object(AlarmProcess, "prepare"), patch.object(sample_check, "FIRST", sys.maxsize)
-    with alone[0], alone[1], hosted_node("push_validator", *ros_args, **where) as node:
+    with (
+        patch.object(AlarmProcess, "prepare"),
+        patch.object(sample_check, "FIRST", sys.maxsize),
+        hosted_node("push_validator", *ros_args, **where) as node,
+    ):
         yield node
 
 

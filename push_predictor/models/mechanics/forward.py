@@ -213,7 +213,7 @@ class Motion:
     def _quasi_static(self, rows: IntArray, pose: Array, done: Array, inertial: Array | None) -> _Instant:
         (x, y, heading), length = pose.T, self.length[rows]
         (tip_x, tip_y), (ahead_x, ahead_y) = self.push.tip[rows].T, self.push.ahead[rows].T
-        cos, sin = np.cos(heading), np.sin(heading)
+        cos, sin = np.cos(heading), np.sin(heading)  # once, for three rotations: `rotate` would repeat them
         from_x, from_y = tip_x + done * ahead_x - x, tip_y + done * ahead_y - y
         nearest = self.mechanics.outline.project(paired(cos * from_x + sin * from_y, cos * from_y - sin * from_x))
         centre = self._centre(rows, heading)
