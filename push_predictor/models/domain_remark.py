@@ -54,13 +54,20 @@ def _reason(model: PushModel, push: Push, row: int) -> str:
 
 
 def _outside_covariates(model: PushModel, push: Push, row: int) -> list[str]:
+    completed, found = model.predictor.completed(_alone(push, row)).covariates, []
+    for name, known in model.covariate_ranges.items():
+        value = float(completed[name][0])
+        if not known.contains_one(value):
+            found.append(_outside(f"covariate {name}", value, str(known)))
+    return found
+
+
+def _alone(push: Push, row: int) -> Push:
+    """One of n pushes."""
+    if len(push.inputs) == 1:
+        return push
     given = {name: column[row : row + 1] for name, column in push.covariates.items()}
-    alone = model.predictor.completed(Push(push.inputs[row : row + 1], push.duration[row : row + 1], given))
-    return [
-        _outside(f"covariate {name}", float(alone.covariates[name][0]), str(known))
-        for name, known in model.covariate_ranges.items()
-        if not known.contains_one(float(alone.covariates[name][0]))
-    ]
+    return Push(push.inputs[row : row + 1], push.duration[row : row + 1], given)
 
 
 def _outside(name: str, value: float, accepted: str) -> str:

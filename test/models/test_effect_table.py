@@ -40,6 +40,8 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated import effect_table_build
 from push_predictor.models.tabulated.effect_axes import change_axes
+from push_predictor.models.tabulated.effect_table import EffectTable
+from push_predictor.models.tabulated.effect_table_build import EffectErrors
 from push_predictor.models.tabulated.table_accuracy import relative_error
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 from push_predictor.models.train import TrainingOptions, train_model
@@ -64,7 +66,7 @@ def coarse_integration() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sixth of the usual work; tables that are a little too coarse are used nevertheless."""
-    monkeypatch.setattr(effect_table_build, "WORK", (35_000,))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((35_000, 1.0),))
     monkeypatch.setattr(effect_table_build, "COARSEST", 0.0)
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.5)
     monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 0.3)
@@ -151,7 +153,7 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
 )
 def test_table_is_close_to_the_exact_effects(kind: str, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind == "fitted":  # its noise is small
-        monkeypatch.setattr(effect_table_build, "WORK", (50_000,))
+        monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((50_000, 1.0),))
     assert_close(kind, case)
 
 
@@ -198,11 +200,16 @@ def with_covariate(rows: PushTable, name: str, values: Array) -> PushTable:
     return replace(rows, covariates={**rows.covariates, name: values})
 
 
+def at(rows: PushTable, time: float) -> PushTable:
+    return with_covariate(rows, "elapsed_time", np.full(len(rows), time))
+
+
 OUTSIDE = {
     "angle": lambda rows: with_inputs(rows, 2, 1.1),
     "angle to the right": lambda rows: with_inputs(rows, 2, -1.1),
     "speed": lambda rows: with_inputs(rows, 0, 0.03),
-    "covariate": lambda rows: with_covariate(rows, "elapsed_time", np.full(len(rows), 2000.0)),
+    "covariate": lambda rows: at(rows, 2010.0),
+    "covariate before": lambda rows: at(rows, -10.0),
 }
 
 
@@ -257,15 +264,14 @@ def test_headings_of_slider_and_push_that_disagree_are_computed() -> None:
 
 def test_changes_that_did_not_occur_together_are_computed() -> None:
     """In training both effects follow each other: their changes lie on a line. The table has no push off this line."""
-    warm = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
-    model = extended("analytical", effect("contact_friction", DRIFT, 0.5), effect("pressure_spread", warm, 0.5))
+    warm, damp = (DriverBasis("linear", (f"topic:/{name}",), (0.0,), (1.0,)) for name in ("warmth", "damp"))
+    model = extended("analytical", effect("contact_friction", damp, 0.5), effect("pressure_spread", warm, 0.5))
     rows = model.training
-    together = (rows.covariates["elapsed_time"] - 500.0) / 300.0
-    computed = tabulate(replace(model, training=with_covariate(rows, "topic:/warmth", together)))
+    computed = tabulate(replace(model, training=with_covariate(rows, "topic:/damp", rows.covariates["topic:/warmth"])))
     table = with_effect_table(computed)
     assert table.effects is not None and len(table.effects.change.directions) == 1, table.how
     known = inside(6)
-    apart = with_covariate(known, "topic:/warmth", 0.5 + (known.covariates["elapsed_time"] - 500.0) / 300.0)
+    apart = with_covariate(known, "topic:/damp", 0.5 + known.covariates["topic:/warmth"])
     assert_equal(predicted(table, apart), predicted(computed, apart))
     for row in range(len(apart)):
         assert_equal(single(table, apart, row), single(computed, apart, row))
@@ -288,6 +294,63 @@ def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
     later = rows.covariates["elapsed_time"] >= 500.0
     widened = found.covariance[:, 2, 2] - plain.covariance[:, 2, 2] * 0.81
     assert np.abs(widened[~later]).max() < 1e-12 and np.median(widened[later]) > 1e-7
+
+
+@pytest.mark.parametrize("kind", ["about nothing", "analytical"])
+def test_pushes_of_a_session_that_lasts_on_are_in_the_table_but_not_in_the_domain(kind: str) -> None:
+    computed, table = both(kind, "linear")
+    for time in (1010.0, 1990.0):
+        rows = at(inside(), time)
+        found, exact = predicted(table, rows), predicted(computed, rows)
+        apart = np.abs(found.mean - exact.mean) / exact.std
+        assert 0.0 < np.quantile(apart, 0.95) < 0.2 and not found.in_domain.any()
+        assert np.quantile(relative_error(found.covariance, exact.covariance), 0.95) < 0.1
+        for row in range(0, len(rows), 10):
+            np.testing.assert_allclose(single(table, rows, row).mean[0], found.mean[row], rtol=1e-9, atol=1e-12)
+
+
+def refused_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables of the wider range are taken for inaccurate."""
+    errors = effect_table_build.table_errors
+
+    def later_is_off(model: PushModel, table: EffectTable, later: bool, *rest: float) -> EffectErrors:
+        return EffectErrors(99.0, 99.0) if later else errors(model, table, later, *rest)
+
+    monkeypatch.setattr(effect_table_build, "table_errors", later_is_off)
+
+
+def test_where_a_table_of_later_pushes_is_inaccurate_it_ends_with_the_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused_later(monkeypatch)
+    computed = tabulate(extended("analytical", *CASES["linear"]))
+    table, rows = with_effect_table(computed), inside()
+    assert table.effects is not None and "means to 99" not in table.how
+    assert_equal(predicted(table, at(rows, 1010.0)), predicted(computed, at(rows, 1010.0)))
+    assert np.abs(predicted(table, rows).mean - predicted(computed, rows).mean).max() > 0.0
+
+
+def test_a_finer_table_of_later_pushes_is_preferred_to_a_coarse_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_size(model: PushModel, table: EffectTable, later: bool) -> EffectErrors:
+        return EffectErrors(99.0 if later and table.spline.knots < 10_000 else 0.0, 0.0)
+
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0)))
+    monkeypatch.setattr(effect_table_build, "table_errors", by_size)
+    table = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
+    assert table.effects is not None and table.effects.spline.knots > 10_000
+
+
+def test_a_coarse_table_must_be_accurate_beyond_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = extended("analytical", *CASES["constant"])
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
+    table, _ = effect_table_build.build_effect_table(model)
+    assert table is not None
+    errors = effect_table_build.table_errors(model, table, later=False)
+    for name, error in (("MEAN_TOLERANCE", errors.of_mean), ("COVARIANCE_TOLERANCE", errors.of_covariance)):
+        with monkeypatch.context() as patch:
+            patch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 0.5),))
+            patch.setattr(effect_table_build, name, 1.9 * error)
+            assert effect_table_build.build_effect_table(model)[0] is None
+            patch.setattr(effect_table_build, name, 2.1 * error)
+            assert effect_table_build.build_effect_table(model)[0] is not None
 
 
 def test_covariance_that_effects_share_is_in_the_table() -> None:
@@ -362,17 +425,17 @@ def test_changes_that_take_too_many_values_have_no_table() -> None:
 
 def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 1e-6)
-    monkeypatch.setattr(effect_table_build, "WORK", (5_000,))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
     table = with_effect_table(tabulate(extended("analytical", *CASES["constant"])))
     assert table.effects is None
     assert "effects: exact; a table of" in table.how and "standard deviations" in table.how
 
 
 def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effect_table_build, "WORK", (3_000, 35_000))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0), (35_000, 1.0)))
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.3)
     found = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
-    monkeypatch.setattr(effect_table_build, "WORK", (3_000,))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0),))
     assert found.effects is not None and found.effects.spline.knots > 15_000
     monkeypatch.setattr(effect_table_build, "COARSEST", 9.0)
     assert "too many knots" in with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).how
@@ -392,7 +455,7 @@ def test_model_without_effects_is_left_as_it_is() -> None:
 
 
 def test_registry_tabulates_effects(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effect_table_build, "WORK", (5_000,))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 10.0)
     path = tmp_path / "m.pushmodel"
     extended("about nothing", *CASES["linear"]).save(path)
@@ -406,13 +469,23 @@ def not_again(*_: object) -> TabulatedModel:
     raise AssertionError("a table was computed")
 
 
-@pytest.mark.parametrize(("kind", "accurate"), [("about mechanics", True), ("analytical", True), ("analytical", False)])
+@pytest.mark.parametrize(
+    ("kind", "accurate", "later"),
+    [
+        ("about mechanics", True, True),
+        ("analytical", True, True),
+        ("analytical", True, False),
+        ("analytical", False, True),
+    ],
+)
 def test_tables_of_effects_are_kept_and_checked(
-    kind: str, accurate: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, accurate: bool, later: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """That there is no accurate table is kept too: to find that out takes longest."""
+    if not later:
+        refused_later(monkeypatch)
     monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(tmp_path / "tables"))
-    monkeypatch.setattr(effect_table_build, "WORK", (4_000,))
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((4_000, 1.0),))
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 10.0 if accurate else 0.0)
     monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 10.0)
     model, rows = extended(kind, *CASES["linear"]), inside(5)
@@ -422,8 +495,9 @@ def test_tables_of_effects_are_kept_and_checked(
         patch.setattr(table_cache, "with_effect_table", not_again)
         kept = as_served(model)
     assert kept.how == computed.how
-    one, other = predicted(computed, rows), predicted(kept, rows)
-    assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
+    for given in (rows, at(rows, 1500.0)):
+        one, other = predicted(computed, given), predicted(kept, given)
+        assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 1e-9)
     monkeypatch.setattr(table_cache, "with_effect_table", not_again)
     if accurate:

@@ -83,7 +83,7 @@ def small_tables() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch, coarse_effects():
         patch.setattr(tabulated_prior, "MOST_KNOTS", 10)
-        patch.setattr(effect_table_build, "WORK", (3_000,))
+        patch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0),))
         yield
 
 

@@ -30,7 +30,7 @@ from push_predictor.nodes.entry import install_handlers
 
 ALL_THE_TIME = ExitStack()
 ALL_THE_TIME.enter_context(coarse_pictures())
-effect_table_build.WORK = ()  # a table takes two seconds; without one an extended model predicts exactly
+effect_table_build.ATTEMPTS = ()  # a table takes two seconds; without one an extended model predicts exactly
 
 if __name__ == "__main__":
     install_handlers()

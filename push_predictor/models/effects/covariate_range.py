@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -26,6 +27,7 @@ from push_predictor.types import Array, BoolArray
 Numbers: TypeAlias = "float | Array"
 
 HEADINGS = ("slider_heading", "push_heading")  # they wrap around
+CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
 WHOLE_TURN = np.radians(30.0)  # headings with no wider gap between them cover the whole turn
 MARGIN = 1e-6  # relative: a model file keeps seven digits
 TURN = 2.0 * np.pi
@@ -48,10 +50,16 @@ class CovariateRange:
         return bool(self._within(value))
 
     def _within(self, values: Numbers) -> bool | BoolArray:
-        margin = MARGIN * max(abs(self.low), abs(self.high))
+        least, most = self._ends
         if self.heading:
-            values = self.low - margin + (values - self.low + margin) % TURN
-        return (values >= self.low - margin) & (values <= self.high + margin)
+            values = least + (values - least) % TURN
+        return (values >= least) & (values <= most)
+
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        """The ends, margin included."""
+        margin = MARGIN * max(abs(self.low), abs(self.high))
+        return self.low - margin, self.high + margin
 
     def __str__(self) -> str:
         return f"{self.low:.3g} to {self.high:.3g}"

@@ -21,21 +21,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.effect_axes import ChangeAxes, PlaceAxis, change_axes
+from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
 from push_predictor.models.tabulated.effect_table import EffectSource, EffectTable
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.table_accuracy import relative_error
 from push_predictor.types import Array
 
-CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0}
+CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0, "change, later": 20.0}
 SPEED_CELLS = 3  # displacement per speed is nearly a parabola of the speed
 FEWEST_CELLS, FINEST = 4, 2.0  # cells of an axis; factor on CELLS
 COARSEST = 0.2  # factor on CELLS, below which a table is not tried
-WORK = (200_000, 800_000)  # integrations for a table, some microseconds each; tried in turn
+# Integrations for a table, some microseconds each, and the share of the tolerances that its errors may take: a coarse
+# one saves seconds, and is used where it is accurate beyond doubt. Tried in turn.
+ATTEMPTS = ((50_000, 0.5), (200_000, 1.0), (800_000, 1.0))
 ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
 ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
 PROBES = 64  # random pushes that show which axes matter
@@ -47,21 +50,27 @@ RECHECKED = 10  # the same, when a table is read
 
 
 def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
-    """A table of an extended model's effects, None if there is none, with the reason in words."""
-    builder = _builder(model)
-    if isinstance(builder, str):
-        return None, f"exact: {builder}"
+    """A table of an extended model's effects, None if there is none, with the reason in words.
+
+    If it is accurate there too, it also holds the pushes of a session that lasts on, up to twice as long as that of the
+    training.
+    """
+    if (reason := _untabulated(model)) is not None:
+        return None, f"exact: {reason}"
+    builders = _builders(model)
+    if not builders:
+        return None, "exact: the changes take too many values"
     how = ""
-    for work in WORK:
-        if (table := builder.table(work)) is None:
-            how += "; a table would need too many knots"
-            continue
-        of_mean, of_covariance = table_errors(model, table)
-        found = f"table of {table.spline.knots} knots, means to {of_mean:.2g} standard deviations"
-        found += f", covariances to {100.0 * of_covariance:.2g} %"
-        if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE:
-            return table, found
-        how += f"; a {found}"
+    for work, share in ATTEMPTS:
+        for builder in builders if share == 1.0 else builders[:1]:
+            if (table := builder.table(work)) is None:
+                how += "; a table would need too many knots"
+                continue
+            errors = table_errors(model, table, builder.later)
+            found = f"table of {table.spline.knots} knots, {errors}"
+            if errors.within(share):
+                return table, found
+            how += f"; a {found}"
     return None, f"exact{how}"
 
 
@@ -69,36 +78,89 @@ def effect_table_from(model: PushModel, spline: TensorSpline) -> EffectTable | N
     """A table of a spline that was built before; None unless it agrees with the model. Raises ValueError or IndexError
     if it does not fit the model.
     """
-    builder = _builder(model)
-    if isinstance(builder, str):
-        return None
-    table = builder.with_spline(spline)
-    of_mean, of_covariance = table_errors(model, table, RECHECKED, 0.5)
-    return table if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE else None
+    builders = [] if _untabulated(model) else _builders(model)
+    for builder in builders:
+        if not builder.fits(spline):
+            continue
+        table = builder.with_spline(spline)
+        return table if table_errors(model, table, builder.later, RECHECKED, 0.5).within(1.0) else None
+    return None
 
 
-def _builder(model: PushModel) -> _Builder | str:
-    """The axes of a table; in words, why there can be none."""
+def _untabulated(model: PushModel) -> str | None:
+    """In words, why there can be no table, as far as that does not take its axes."""
+    if RECORDING in model.predictor.needs:
+        return "the mechanics depend on the recording"
+    return None if len(model.training) else "there are no training pushes"
+
+
+def _builders(model: PushModel) -> list[_Builder]:
+    """The axes of tables, those of the widest table first; none where the changes take too many values."""
     predictor, rows = model.predictor, model.training
     assert isinstance(predictor, ExtendedPredictor)
-    if RECORDING in predictor.needs:
-        return "the mechanics depend on the recording"
-    if not len(rows):
-        return "there are no training pushes"
     source = EffectSource(predictor, model.usual_duration)
-    push = predictor.completed(Push(rows.inputs, rows.duration, rows.covariates))
-    change = change_axes(*source.changes(push))
-    return "the changes take too many values" if change is None else _Builder.of(source, push, change)
+    known = Push(rows.inputs, rows.duration, rows.covariates)
+    found = []
+    for later in (True, False) if _grows(predictor) else (False,):
+        push = predictor.completed(_and_later(known) if later else known)
+        if (change := change_axes(*source.changes(push))) is not None:
+            found.append(_Builder.of(source, push, change, later))
+    return found
+
+
+def _grows(predictor: ExtendedPredictor) -> bool:
+    """Whether changes go on while a session lasts on."""
+    flowing = (effect.basis for effect in predictor.effects if effect.exact and effect.basis.name not in STEPPED)
+    return any(driver in CUMULATIVE for basis in flowing for driver in basis.drivers)
+
+
+def _and_later(push: Push) -> Push:
+    """These pushes, and the same at the end of a session that lasts on, twice as long."""
+    later = _later(push)
+    columns = {name: np.append(column, later.covariates[name]) for name, column in push.covariates.items()}
+    return Push(np.tile(push.inputs, (2, 1)), np.tile(push.duration, 2), columns)
+
+
+def _later(push: Push) -> Push:
+    """The same pushes, later by as much as they last."""
+    grown = {
+        name: column + (column.max() - column.min()) if name in CUMULATIVE else column
+        for name, column in push.covariates.items()
+    }
+    return replace(push, covariates=grown)
+
+
+@dataclass(frozen=True)
+class EffectErrors:
+    """Differences of a table and the model: of means, in predicted standard deviations, and of covariances, relative
+    (see table_accuracy.TableAccuracy).
+    """
+
+    of_mean: float
+    of_covariance: float
+
+    def within(self, share: float) -> bool:
+        """Whether they take at most this share of the tolerances."""
+        return self.of_mean <= share * MEAN_TOLERANCE and self.of_covariance <= share * COVARIANCE_TOLERANCE
+
+    def __str__(self) -> str:
+        return f"means to {self.of_mean:.2g} standard deviations, covariances to {100.0 * self.of_covariance:.2g} %"
 
 
 def table_errors(
-    model: PushModel, table: EffectTable, checked: int = CHECKED, share: float = 0.99
-) -> tuple[float, float]:
-    """Differences of a table and the model that a share of the pushes does not exceed.
+    model: PushModel, table: EffectTable, later: bool, checked: int = CHECKED, share: float = 0.99
+) -> EffectErrors:
+    """The differences that a share of the pushes does not exceed.
 
-    Of means, in predicted standard deviations, and of covariances, relative: see tabulated_model.TableAccuracy.
+    later: whether later pushes are compared as well; their share counts by itself.
     """
     push = _checked(model, checked)
+    parts = [push, _later(push)] if later else [push]
+    errors = [_errors(model, table, part, share) for part in parts]
+    return EffectErrors(max(of_mean for of_mean, _ in errors), max(of_covariance for _, of_covariance in errors))
+
+
+def _errors(model: PushModel, table: EffectTable, push: Push, share: float) -> tuple[float, float]:
     exact, expected = model.predictor.moments(push), model.predictor.shift(push)
     found = table.shift(push, table.located(push))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
@@ -126,7 +188,7 @@ def _checked(model: PushModel, count: int) -> Push:
 
 @dataclass(frozen=True, eq=False)
 class _Builder:
-    """Axes of a table."""
+    """Axes of a table; later: whether it also holds later pushes."""
 
     source: EffectSource
     place: PlaceAxis
@@ -135,16 +197,17 @@ class _Builder:
     speeds: tuple[float, float]
     by_heading: bool
     any_duration: bool
+    later: bool
 
     @classmethod
-    def of(cls, source: EffectSource, push: Push, change: ChangeAxes) -> _Builder:
+    def of(cls, source: EffectSource, push: Push, change: ChangeAxes, later: bool) -> _Builder:
         """The axes that pushes need."""
         speed = push.inputs[:, 0] * push.duration / source.duration
         angle = push.inputs[:, 2]
         outline = source.predictor.physics.outline
         whole = PlaceAxis(outline, 1)
         ends = (float(angle.min()), float(angle.max())), (float(speed.min()), float(speed.max()))
-        plain = cls(source, whole, change, *ends, True, True)
+        plain = cls(source, whole, change, *ends, True, True, later)
         inputs, heading, changes = plain._probes()
 
         def values(where: Array, towards: Array = heading, by: EffectSource = source) -> Array:
@@ -189,6 +252,12 @@ class _Builder:
         together = np.concatenate([moved.coefficients, slopes.coefficients], axis=-1)
         return self.with_spline(TensorSpline(axes, together.astype(np.float32)))
 
+    def fits(self, spline: TensorSpline) -> bool:
+        """Whether a spline was made for these ranges of changes."""
+        ends = [[axis.low, axis.high] for axis in spline.axes[-len(self.change.low) :]] if len(self.change.low) else []
+        own = np.column_stack([self.change.low, self.change.high])
+        return len(ends) == len(own) and bool(np.allclose(np.reshape(ends, own.shape), own, rtol=1e-6))
+
     def with_spline(self, spline: TensorSpline) -> EffectTable:
         """The table with this spline."""
         axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
@@ -222,7 +291,7 @@ class _Builder:
     def _factor(self, work: int, each: int) -> float:
         """Factor on CELLS that takes this work, with `each` integrations for a knot."""
         free = [CELLS["place"], CELLS["angle"]] + [CELLS["heading"]] * self.by_heading
-        free += [CELLS["change"]] * len(self.change.low)
+        free += [CELLS[self._change]] * len(self.change.low)
         each *= self.place.edges * len(self.change.levels) * (SPEED_CELLS + 1 if self.by_speed else 1)
         return float(min((work / (each * float(np.prod(free)))) ** (1.0 / len(free)), FINEST))
 
@@ -234,7 +303,11 @@ class _Builder:
         axes += [Axis(*self.speeds, SPEED_CELLS)] * self.by_speed
         axes += [Axis(-np.pi, np.pi, cells("heading"))] * self.by_heading
         ends = zip(self.change.low.tolist(), self.change.high.tolist(), strict=True)
-        return [*axes, *(Axis(low, high, cells("change")) for low, high in ends)]
+        return [*axes, *(Axis(low, high, cells(self._change)) for low, high in ends)]
+
+    @property
+    def _change(self) -> str:
+        return "change, later" if self.later else "change"
 
 
 def _alike(one: Array, other: Array) -> bool:

@@ -79,7 +79,7 @@ class SingleEffects:
             return None
         box, known = edge * len(self._levels) + level, table.source.predictor.coefficients
         values = (speed * table.spline.at(point, box)).reshape(-1, 3)
-        mean, design = values[0], values[self._rows] * self._effects.design(columns)
+        mean, design = values[0], values.take(self._rows, axis=0) * self._effects.design(columns)
         if self._linear is not None:
             mean = mean + self._linear @ design
         return Shift(mean[None], design.T.dot(known.covariance).dot(design)[None])

@@ -121,12 +121,17 @@ class TabulatedModel:
 
     def _shifted(self, push: Push, shift: Shift) -> Prediction:
         """Predictions from what the base adds to a table of effects, and the shift in that table; push: completed."""
+        n = len(push.inputs)
+        seen = self.model.in_covariate_ranges(push.covariates, n)
+        if (noise := self._noise) is not None:
+            process = noise[None].repeat(n, axis=0)
+            return Prediction(shift.mean, process + shift.covariance, process, self._in_domain(push.inputs) & seen)
         rest, factor = self._added(push), self._factor
         return Prediction(
             rest.mean + shift.mean,
             rest.covariance * factor + shift.covariance,
             rest.process_covariance * factor,
-            rest.in_domain & self.model.in_covariate_ranges(push.covariates, len(push.inputs)),
+            rest.in_domain & seen,
         )
 
     def _computed(self, push: Push) -> Prediction:
@@ -172,6 +177,12 @@ class TabulatedModel:
         return np.outer(self.effects.source.predictor.scale, self.effects.source.predictor.scale)
 
     @cached_property
+    def _noise(self) -> Array | None:
+        """The covariance (3, 3) that the mechanics below effects add to all pushes; None for a learnt base."""
+        base = self.model.predictor.base
+        return base.covariance * self._factor if isinstance(base, MECHANICS) else None
+
+    @cached_property
     def _box(self) -> FeatureBox:
         return feature_box(self.model)
 
@@ -186,11 +197,8 @@ class TabulatedModel:
         return SingleEffects(self.effects)
 
     def _added(self, push: Push) -> Prediction:
-        """What the base adds to a table of effects: all but the displacement of its mechanics."""
-        predictor, n = self.model.predictor.base, len(push.inputs)
-        if isinstance(predictor, MECHANICS):
-            covariance = predictor.covariance[None].repeat(n, axis=0)
-            return Prediction(np.zeros((n, 3)), covariance, covariance, self._in_domain(push.inputs))
+        """What a learnt base adds to a table of effects: all but the displacement of its mechanics."""
+        predictor = self.model.predictor.base
         if self.domain is None:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)
         else:

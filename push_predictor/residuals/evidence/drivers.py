@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -31,7 +31,7 @@ OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: o
 SENSOR_ZERO = ("free_force_x", "free_force_y")  # what the window finder subtracted from the force: no cause either
 # They share noise with the residual, or vary along a push: judged against their relation in the training data.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
-TIME, COUNT, DISTANCE = CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
+TIME, COUNT, DISTANCE = CUMULATIVE  # they only grow
 OF_SESSION = (*CUMULATIVE, "recording")  # counted from the start of a session
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
 NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *FOLDED)
