@@ -23,12 +23,13 @@ from typing import Any
 import numpy as np
 
 from push_predictor.errors import RequestError
+from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import CUMULATIVE, LOCAL, SESSION
+from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested

@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.recordings.table import PushTable
@@ -49,15 +49,7 @@ from push_predictor.residuals.channels.contrast import (
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.channels.sensor_zero import zero_shift
-from push_predictor.residuals.evidence.drivers import (
-    CONSTANT,
-    CUMULATIVE,
-    LOCAL,
-    PLACE,
-    SESSION,
-    between_ends,
-    screening_bases,
-)
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.selection.basis_choice import SIMPLEST_FIRST, step_places, step_places_near

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError
+from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection
 from push_predictor.recordings.read import read_recording
@@ -33,7 +34,6 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
-from push_predictor.residuals.evidence.drivers import CUMULATIVE
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 

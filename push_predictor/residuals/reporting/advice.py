@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from push_predictor.residuals.evidence.drivers import CUMULATIVE
+from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.residuals.outcome import FoundEffect
 from push_predictor.residuals.reporting.phrases import covariate_phrase, listed
 

@@ -26,9 +26,9 @@ from itertools import product
 import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
 from push_predictor.recordings.table import INPUTS, PushTable
-from push_predictor.residuals.evidence.drivers import COUNT, CUMULATIVE, DISTANCE, ENDS, TIME
+from push_predictor.residuals.evidence.drivers import COUNT, DISTANCE, ENDS, TIME
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 

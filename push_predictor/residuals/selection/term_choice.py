@@ -23,12 +23,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.candidates.coefficients import exact_fit
-from push_predictor.residuals.evidence.drivers import CUMULATIVE, LOCAL, OF_SESSION, standard_basis
+from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION, standard_basis
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence

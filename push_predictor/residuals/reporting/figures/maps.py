@@ -23,12 +23,12 @@ import numpy as np
 
 from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
 from push_predictor.geometry.outline import Outline
+from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting import chart
 from push_predictor.reporting.chart import Chart
 from push_predictor.reporting.html import number
-from push_predictor.residuals.evidence.drivers import CUMULATIVE
 from push_predictor.residuals.reporting.figures.partial import Strength
 from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, place_of_step
 from push_predictor.residuals.reporting.quantities import count
