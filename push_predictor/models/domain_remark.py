@@ -43,22 +43,22 @@ def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
 
 def _reason(model: PushModel, push: Push, row: int) -> str:
     velocity, contact, angle = push.inputs[row].tolist()
-    limits = model.input_limits
-    outside = []
+    limits, outside = model.input_limits, []
     for name, value, (low, high) in (("velocity", velocity, limits.velocity), ("angle", angle, limits.angle)):
         if not low <= value <= high:
-            outside.append(_outside(name, value, f"{low:.4g} to {high:.4g}"))
+            outside.append(_outside(name, name, value, f"{low:.4g} to {high:.4g}"))
     if model.covariate_ranges:
-        outside += _outside_covariates(model, push, row)
+        outside += _outside_covariates(model, _alone(push, row))
     return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
 
 
-def _outside_covariates(model: PushModel, push: Push, row: int) -> list[str]:
-    completed, found = model.predictor.completed(_alone(push, row)).covariates, []
+def _outside_covariates(model: PushModel, alone: Push) -> list[str]:
+    """What is outside of the covariates of one push."""
+    completed, found = model.predictor.completed(alone).covariates, []
     for name, known in model.covariate_ranges.items():
         value = float(completed[name][0])
         if not known.contains_one(value):
-            found.append(_outside(f"covariate {name}", value, str(known)))
+            found.append(_outside(f"covariate {name}", name, value, str(known)))
     return found
 
 
@@ -70,6 +70,6 @@ def _alone(push: Push, row: int) -> Push:
     return Push(push.inputs[row : row + 1], push.duration[row : row + 1], given)
 
 
-def _outside(name: str, value: float, accepted: str) -> str:
-    unit = f" {UNITS[name.removeprefix('covariate ')]}" if name.removeprefix("covariate ") in UNITS else ""
-    return f"{name} {value:.4g}{unit}, training covers {accepted}{unit}"
+def _outside(title: str, name: str, value: float, accepted: str) -> str:
+    unit = f" {UNITS[name]}" if name in UNITS else ""
+    return f"{title} {value:.4g}{unit}, training covers {accepted}{unit}"
