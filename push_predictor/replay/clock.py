@@ -131,9 +131,11 @@ class PlayerClock:
         return generation == self.generation
 
     def _sleep_to(self, deadline: int) -> None:
-        if (remaining := deadline - self._wall.now() - self._spin) > 0:
-            self._wall.sleep(remaining)
-        while self._spin and self._wall.now() < deadline:
+        remaining = deadline - self._wall.now()
+        spin = min(self._spin, remaining // 2)  # of close messages: other programs need the core too
+        if remaining > spin:
+            self._wall.sleep(remaining - spin)
+        while spin > 0 and self._wall.now() < deadline:
             pass
 
     def _change(self, rate: float | None = None, paused: bool | None = None, recorded: int | None = None) -> None:

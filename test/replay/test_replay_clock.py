@@ -71,6 +71,26 @@ def test_deadlines_are_absolute_so_lateness_does_not_accumulate() -> None:
         wall.time += 300_000  # publishing takes time
 
 
+class TickingClock(FakeClock):
+    """A clock that also advances by 100 ns whenever it is read."""
+
+    def now(self) -> int:
+        self.time += 100
+        return self.time
+
+
+@pytest.mark.parametrize(
+    ("spin", "wait", "slept"),
+    [(60_000, 4_000_000, 3_940_000), (60_000, 80_000, 40_000), (0, 4_000_000, 4_000_000), (60_000, 0, None)],
+)
+def test_end_of_a_sleep_is_waited_for_actively_but_at_most_half_of_it(spin: int, wait: int, slept: int | None) -> None:
+    wall = TickingClock()
+    clock = PlayerClock(wall, spin=spin)
+    assert clock.sleep_until(wait, clock.generation)
+    assert wall.sleeps == ([] if slept is None else [pytest.approx(slept, abs=1000)])
+    assert wall.time == pytest.approx(clock.deadline(wait), abs=1000)
+
+
 def test_paused_clock_stops_and_resumes_at_the_same_time() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)

@@ -54,7 +54,13 @@ PARAMETERS: tuple[Param, ...] = (
     Param("wrench_frame", "", f"axes of the wrench: world, tip or a frame of tf. {SAVED}, or world"),
     Param("world_frame", "", f"frame of the poses, into which tf turns others. {SAVED}, or their own"),
     Param("restamp", False, "add one constant offset to all header stamps so that they start now; requires rate 1"),
-    Param("spin_us", 20, "busy-wait during the last microseconds before a deadline: less lateness, more CPU", 0, 5000),
+    Param(
+        "spin_us",
+        60,
+        "busy-wait during the last microseconds before a deadline, at most half of the wait: less lateness, more CPU",
+        0,
+        5000,
+    ),
     Param(
         "wait_for_subscribers",
         0.0,
