@@ -87,7 +87,10 @@ def test_a_covariate_outside_its_range_is_named_with_its_unit() -> None:
     inputs = table.inputs[:1]
     assert remark(model, inputs, elapsed_time=np.array([500.0])) == ""
     late = remark(model, inputs, elapsed_time=np.array([2000.0]))
-    assert late == "out of domain: covariate elapsed_time 2000 s, training covers 0 to 1e+03 s"
+    assert late == "out of domain: covariate elapsed_time 2000 s, training covers 0 to 1000 s"
+    times = np.array([500.0, 1500.0, 2000.0])
+    of_batch = remark(model, np.repeat(inputs, 3, axis=0), elapsed_time=times)
+    assert of_batch.startswith("out of domain: 2 of 3 pushes, first push 1: covariate elapsed_time 1500 s")
 
 
 def test_a_prior_model_has_limits_of_its_own() -> None:

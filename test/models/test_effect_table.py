@@ -32,6 +32,7 @@ from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
@@ -320,10 +321,16 @@ def refused_later(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_where_a_table_of_later_pushes_is_inaccurate_it_ends_with_the_training(monkeypatch: pytest.MonkeyPatch) -> None:
-    refused_later(monkeypatch)
+    errors = effect_table_build._errors
+
+    def later_are_off(model: PushModel, table: EffectTable, push: Push, share: float) -> tuple[float, float]:
+        late = push.covariates["elapsed_time"].max() > 1000.0
+        return (99.0, 99.0) if late else errors(model, table, push, share)
+
+    monkeypatch.setattr(effect_table_build, "_errors", later_are_off)
     computed = tabulate(extended("analytical", *CASES["linear"]))
     table, rows = with_effect_table(computed), inside()
-    assert table.effects is not None and "means to 99" not in table.how
+    assert table.effects is not None
     assert_equal(predicted(table, at(rows, 1010.0)), predicted(computed, at(rows, 1010.0)))
     assert np.abs(predicted(table, rows).mean - predicted(computed, rows).mean).max() > 0.0
 
@@ -429,6 +436,9 @@ def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyP
     table = with_effect_table(tabulate(extended("analytical", *CASES["constant"])))
     assert table.effects is None
     assert "effects: exact; a table of" in table.how and "standard deviations" in table.how
+    for case, tried in (("linear", 2), ("step", 1), ("periodic", 1)):  # two ranges where an effect grows on
+        how = with_effect_table(tabulate(extended("analytical", *CASES[case]))).how
+        assert how.count("a table of") == tried, how
 
 
 def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,7 +62,7 @@ class CovariateRange:
         return self.low - margin, self.high + margin
 
     def __str__(self) -> str:
-        return f"{self.low:.3g} to {self.high:.3g}"
+        return f"{self.low:.4g} to {self.high:.4g}"
 
 
 def range_of(name: str, values: Array) -> CovariateRange:
