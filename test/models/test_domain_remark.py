@@ -24,6 +24,7 @@ import pytest
 from synthetic import square_pushes, square_rig
 
 from push_predictor.models.domain_remark import domain_remark
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import own_window
@@ -91,6 +92,18 @@ def test_a_covariate_outside_its_range_is_named_with_its_unit() -> None:
     times = np.array([500.0, 1500.0, 2000.0])
     of_batch = remark(model, np.repeat(inputs, 3, axis=0), elapsed_time=times)
     assert of_batch.startswith("out of domain: 2 of 3 pushes, first push 1: covariate elapsed_time 1500 s")
+
+
+def test_an_edge_without_training_pushes_is_named_for_any_push_of_a_batch() -> None:
+    table = drifting_models.pushes(20, 0)
+    half = table.take(np.flatnonzero(table.inputs[:, 1] < 0.5))
+    by_edge = replace(drifting_models.slippery(0.1), basis=DriverBasis("category", ("edge",), levels=(0.0, 1.0)))
+    model = drifting_models.extended(train_model(half, square_rig(), "analytical", name="half"), by_edge)
+    inputs = half.inputs[:2].copy()
+    inputs[1, 1] = 0.8
+    assert (
+        remark(model, inputs) == "out of domain: 1 of 2 pushes, first push 1: covariate edge 3, training covers 0 to 1"
+    )
 
 
 def test_a_prior_model_has_limits_of_its_own() -> None:
