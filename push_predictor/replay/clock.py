@@ -23,6 +23,7 @@ import time
 from typing import Protocol
 
 SECOND = 1_000_000_000
+SHORTEST = 30_000  # ns of active waiting: a shorter sleep ends late, since the wake-up takes as long
 COARSE = 20_000_000  # ns: a longer sleep waits on a condition that a control notifies; the rest is one plain sleep
 
 
@@ -132,7 +133,8 @@ class PlayerClock:
 
     def _sleep_to(self, deadline: int) -> None:
         remaining = deadline - self._wall.now()
-        spin = min(self._spin, remaining // 2)  # of close messages: other programs need the core too
+        # At most half of a short wait: other programs need the core too.
+        spin = min(self._spin, max(remaining // 2, SHORTEST))
         if remaining > spin:
             self._wall.sleep(remaining - spin)
         while spin > 0 and self._wall.now() < deadline:

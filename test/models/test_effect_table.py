@@ -32,7 +32,6 @@ from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
@@ -298,8 +297,9 @@ def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
 
 
 @pytest.mark.parametrize("kind", ["about nothing", "analytical"])
-def test_pushes_of_a_session_that_lasts_on_are_in_the_table_but_not_in_the_domain(kind: str) -> None:
-    computed, table = both(kind, "linear")
+@pytest.mark.parametrize("case", ["linear", "linear in its coefficients"])
+def test_later_pushes_are_in_the_table_but_not_in_the_domain(kind: str, case: str) -> None:
+    computed, table = both(kind, case)
     for time in (1010.0, 1990.0):
         rows = at(inside(), time)
         found, exact = predicted(table, rows), predicted(computed, rows)
@@ -310,47 +310,69 @@ def test_pushes_of_a_session_that_lasts_on_are_in_the_table_but_not_in_the_domai
             np.testing.assert_allclose(single(table, rows, row).mean[0], found.mean[row], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("time", [-10.0, 2010.0])
+def test_linear_effects_are_computed_where_their_table_would_be_stretched(time: float) -> None:
+    """The error of a derivative grows with the covariate that it is multiplied by."""
+    computed, table = both("analytical", "linear in its coefficients")
+    rows = at(inside(6), time)
+    assert_equal(predicted(table, rows), predicted(computed, rows))
+    assert_equal(single(table, rows), single(computed, rows))
+
+
 def refused_later(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables of the wider range are taken for inaccurate."""
-    errors = effect_table_build.table_errors
-
-    def later_is_off(model: PushModel, table: EffectTable, later: bool, *rest: float) -> EffectErrors:
-        return EffectErrors(99.0, 99.0) if later else errors(model, table, later, *rest)
-
-    monkeypatch.setattr(effect_table_build, "table_errors", later_is_off)
-
-
-def test_where_a_table_of_later_pushes_is_inaccurate_it_ends_with_the_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are taken for inaccurate at later pushes."""
     errors = effect_table_build._errors
 
-    def later_are_off(model: PushModel, table: EffectTable, push: Push, share: float) -> tuple[float, float]:
-        late = push.covariates["elapsed_time"].max() > 1000.0
-        return (99.0, 99.0) if late else errors(model, table, push, share)
+    def later_are_off(table: EffectTable, sample: effect_table_build.Sample, quantile: float) -> tuple[float, float]:
+        late = sample.push.covariates["elapsed_time"].max() > 1000.0
+        return (99.0, 99.0) if late else errors(table, sample, quantile)
 
     monkeypatch.setattr(effect_table_build, "_errors", later_are_off)
-    computed = tabulate(extended("analytical", *CASES["linear"]))
+
+
+@pytest.mark.parametrize("case", ["linear", "linear in its coefficients"])
+def test_a_table_that_is_inaccurate_at_later_pushes_ends_with_the_training(
+    case: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused_later(monkeypatch)
+    computed = tabulate(extended("analytical", *CASES[case]))
     table, rows = with_effect_table(computed), inside()
-    assert table.effects is not None
+    assert table.effects is not None and not table.effects.later and "later" not in table.how
     assert_equal(predicted(table, at(rows, 1010.0)), predicted(computed, at(rows, 1010.0)))
     assert np.abs(predicted(table, rows).mean - predicted(computed, rows).mean).max() > 0.0
 
 
-def test_a_finer_table_of_later_pushes_is_preferred_to_a_coarse_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    def by_size(model: PushModel, table: EffectTable, later: bool) -> EffectErrors:
-        return EffectErrors(99.0 if later and table.spline.knots < 10_000 else 0.0, 0.0)
+def test_a_finer_table_with_later_pushes_is_preferred_to_a_coarse_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_size(table: EffectTable, *_: object) -> EffectErrors:
+        return EffectErrors(99.0 if table.later and table.spline.knots < 10_000 else 0.0, 0.0)
 
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0)))
-    monkeypatch.setattr(effect_table_build, "table_errors", by_size)
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0), (70_000, 1.0)))
+    monkeypatch.setattr(effect_table_build, "errors_of", by_size)
     table = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
-    assert table.effects is not None and table.effects.spline.knots > 10_000
+    assert table.effects is not None and table.effects.later and table.effects.spline.knots > 10_000
+    assert "with later pushes" in table.how
 
 
-def test_a_coarse_table_must_be_accurate_beyond_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_later_pushes_are_not_worth_the_finest_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_range(table: EffectTable, *_: object) -> EffectErrors:
+        return EffectErrors(99.0 if table.later or table.spline.knots < 10_000 else 0.0, 0.0)
+
+    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0), (4_000, 1.0), (35_000, 1.0)))
+    monkeypatch.setattr(effect_table_build, "errors_of", by_range)
+    table, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
+    assert table is not None and not table.later
+    monkeypatch.setattr(effect_table_build, "errors_of", lambda *_: EffectErrors(99.0, 0.0))
+    _, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
+    assert how.count("a table of") == 4 and how.count("with later pushes") == 2
+
+
+def test_a_coarse_table_must_be_accurate_to_half_the_tolerances(monkeypatch: pytest.MonkeyPatch) -> None:
     model = extended("analytical", *CASES["constant"])
     monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
     table, _ = effect_table_build.build_effect_table(model)
     assert table is not None
-    errors = effect_table_build.table_errors(model, table, later=False)
+    samples = effect_table_build._samples(model, False, effect_table_build.CHECKED)
+    errors = effect_table_build.errors_of(table, samples, 0.99)
     for name, error in (("MEAN_TOLERANCE", errors.of_mean), ("COVARIANCE_TOLERANCE", errors.of_covariance)):
         with monkeypatch.context() as patch:
             patch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 0.5),))
@@ -446,7 +468,7 @@ def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: py
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.3)
     found = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
     monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0),))
-    assert found.effects is not None and found.effects.spline.knots > 15_000
+    assert found.effects is not None and found.effects.spline.knots > 15_000, found.how
     monkeypatch.setattr(effect_table_build, "COARSEST", 9.0)
     assert "too many knots" in with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).how
 
@@ -480,16 +502,19 @@ def not_again(*_: object) -> TabulatedModel:
 
 
 @pytest.mark.parametrize(
-    ("kind", "accurate", "later"),
+    ("kind", "case", "accurate", "later"),
     [
-        ("about mechanics", True, True),
-        ("analytical", True, True),
-        ("analytical", True, False),
-        ("analytical", False, True),
+        ("about mechanics", "linear", True, True),
+        ("analytical", "linear", True, True),
+        ("analytical", "linear", True, False),
+        ("analytical", "linear", False, True),
+        ("analytical", "constant", True, False),
+        ("analytical", "linear in its coefficients", True, True),
+        ("analytical", "linear in its coefficients", True, False),
     ],
 )
 def test_tables_of_effects_are_kept_and_checked(
-    kind: str, accurate: bool, later: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, case: str, accurate: bool, later: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """That there is no accurate table is kept too: to find that out takes longest."""
     if not later:
@@ -498,9 +523,10 @@ def test_tables_of_effects_are_kept_and_checked(
     monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((4_000, 1.0),))
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 10.0 if accurate else 0.0)
     monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 10.0)
-    model, rows = extended(kind, *CASES["linear"]), inside(5)
+    model, rows = extended(kind, *CASES[case]), inside(5)
     computed = as_served(model)
     assert (computed.effects is not None) is accurate
+    assert computed.effects is None or computed.effects.later is later
     with monkeypatch.context() as patch:
         patch.setattr(table_cache, "with_effect_table", not_again)
         kept = as_served(model)

@@ -81,9 +81,19 @@ class TickingClock(FakeClock):
 
 @pytest.mark.parametrize(
     ("spin", "wait", "slept"),
-    [(60_000, 4_000_000, 3_940_000), (60_000, 80_000, 40_000), (0, 4_000_000, 4_000_000), (60_000, 0, None)],
+    [
+        (60_000, 4_000_000, 3_940_000),
+        (60_000, 80_000, 40_000),
+        (60_000, 50_000, 20_000),
+        (60_000, 25_000, None),
+        (60_000, 0, None),
+        (0, 4_000_000, 4_000_000),
+        (0, 25_000, 25_000),
+    ],
 )
-def test_end_of_a_sleep_is_waited_for_actively_but_at_most_half_of_it(spin: int, wait: int, slept: int | None) -> None:
+def test_a_wait_ends_actively_for_at_most_half_of_it_unless_it_is_short(
+    spin: int, wait: int, slept: int | None
+) -> None:
     wall = TickingClock()
     clock = PlayerClock(wall, spin=spin)
     assert clock.sleep_until(wait, clock.generation)

@@ -61,6 +61,7 @@ def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
     record = {"format_version": FORMAT_VERSION, "model": digest, **_base_record(tabulated, arrays)}
     if tabulated.effects is not None:
         record["effects"] = _spline_record(tabulated.effects.spline, "effects", arrays)
+        record["effects_later"] = tabulated.effects.later
     if tabulated.effects_how:
         record["effects_how"] = tabulated.effects_how
     if "how" not in record and "effects_how" not in record:
@@ -84,7 +85,8 @@ def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | N
         how = str(record["effects_how"])
         if "effects" not in record:
             return with_effects(tabulated, None, how)
-        effects = effect_table_from(tabulated.model, _spline(record["effects"], arrays["effects"]))
+        later = bool(record.get("effects_later", False))
+        effects = effect_table_from(tabulated.model, _spline(record["effects"], arrays["effects"]), later)
         return None if effects is None else with_effects(tabulated, effects, how)
     except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None

@@ -152,12 +152,16 @@ class EffectTable:
     spline: the shift (3) and its derivatives (3 p) by p parameters, per speed, over place, angle, and, where they
     matter, speed, heading and changes. angles: range, rad.
     speeds: range at the duration of the source, m/s; one speed where they are equal. any_duration: whether another
-    duration does the same as another speed.
+    duration does the same as another speed. linear_range: lows and highs (l,) of the basis values that go with the
+    coefficients in which the shift is linear; an error of a derivative grows with them. later: whether the ranges
+    contain later pushes than those of the training.
     """
 
     source: EffectSource
+    later: bool
     place: PlaceAxis
     change: ChangeAxes
+    linear_range: tuple[Array, Array]
     angles: tuple[float, float]
     speeds: tuple[float, float]
     by_speed: bool
@@ -176,6 +180,8 @@ class EffectTable:
         inside = inside & _within(angle, self.angles, MARGIN) & _within(speed, self.speeds, MARGIN * self.speeds[1])
         if not self.any_duration:
             inside = inside & (np.abs(ratio - 1.0) <= MARGIN)
+        if (linear := self.source.predictor.coefficients.linear).any():
+            inside = inside & within_range(self._columns(push)[:, linear], self.linear_range)
         if self.by_speed:
             columns.append(np.clip(speed, *self.speeds))
         if self.by_heading:
@@ -208,12 +214,23 @@ class EffectTable:
         return Shift(mean, design.transpose(0, 2, 1) @ known.covariance @ design)
 
     def _columns(self, push: Push) -> Array:
-        """The basis columns (n, m) that go with the coefficients."""
-        parts = []
-        for effect in self.source.predictor.effects:
-            values = effect.basis.values(push.covariates, len(push.inputs))
-            parts.append(np.tile(values, (1, len(effect.coefficients) // values.shape[1])))
-        return np.concatenate(parts, axis=1)
+        return basis_columns(self.source.predictor, push)
+
+
+def basis_columns(predictor: ExtendedPredictor, push: Push) -> Array:
+    """The basis values (n, m) that go with the coefficients of all effects."""
+    parts = []
+    for effect in predictor.effects:
+        values = effect.basis.values(push.covariates, len(push.inputs))
+        parts.append(np.tile(values, (1, len(effect.coefficients) // values.shape[1])))
+    return np.concatenate(parts, axis=1)
+
+
+def within_range(values: Array, ends: tuple[Array, Array]) -> BoolArray:
+    """Which rows of values (n, l) lie between ends (l,), to rounding."""
+    low, high = ends
+    margin = MARGIN * np.maximum(np.abs(low), np.abs(high))
+    return np.asarray(((values >= low - margin) & (values <= high + margin)).all(axis=1))
 
 
 def _within(values: Array, ends: tuple[float, float], margin: float) -> BoolArray:

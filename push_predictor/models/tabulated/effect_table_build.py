@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,10 +24,10 @@ import numpy as np
 from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.predictors import ExtendedPredictor, Moments, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
-from push_predictor.models.tabulated.effect_table import EffectSource, EffectTable
+from push_predictor.models.tabulated.effect_table import EffectSource, EffectTable, basis_columns
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.table_accuracy import relative_error
 from push_predictor.types import Array
@@ -36,8 +36,8 @@ CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0, "change,
 SPEED_CELLS = 3  # displacement per speed is nearly a parabola of the speed
 FEWEST_CELLS, FINEST = 4, 2.0  # cells of an axis; factor on CELLS
 COARSEST = 0.2  # factor on CELLS, below which a table is not tried
-# Integrations for a table, some microseconds each, and the share of the tolerances that its errors may take: a coarse
-# one saves seconds, and is used where it is accurate beyond doubt. Tried in turn.
+# Integrations for a table (some microseconds each), and the share of the tolerances that its errors may take. Tried in
+# turn: a coarse table saves seconds, but must be accurate to half the tolerances.
 ATTEMPTS = ((50_000, 0.5), (200_000, 1.0), (800_000, 1.0))
 ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
 ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
@@ -52,77 +52,86 @@ RECHECKED = 10  # the same, when a table is read
 def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     """A table of an extended model's effects, None if there is none, with the reason in words.
 
-    If it is accurate there too, it also holds the pushes of a session that lasts on, up to twice as long as that of the
-    training.
+    If it is accurate there too, it also contains later pushes, as of a session twice as long as the training.
     """
+    predictor = model.predictor
+    assert isinstance(predictor, ExtendedPredictor)
     if (reason := _untabulated(model)) is not None:
         return None, f"exact: {reason}"
-    builders = _builders(model)
+    grows = _grows(predictor)
+    builders = {later: builder for later in {grows, False} if (builder := _builder(model, later)) is not None}
     if not builders:
         return None, "exact: the changes take too many values"
-    how = ""
-    for work, share in ATTEMPTS:
-        for builder in builders if share == 1.0 else builders[:1]:
-            if (table := builder.table(work)) is None:
-                how += "; a table would need too many knots"
-                continue
-            errors = table_errors(model, table, builder.later)
-            found = f"table of {table.spline.knots} knots, {errors}"
-            if errors.within(share):
-                return table, found
-            how += f"; a {found}"
+    known, how = _samples(model, grows, CHECKED), ""
+    for work, share, later in _attempts(grows):
+        if later not in builders:
+            continue
+        if (table := builders[later].table(work)) is None:
+            how += "; a table would need too many knots"
+            continue
+        errors = errors_of(table, known[: 1 + later], 0.99)
+        found = f"table of {table.spline.knots} knots{', with later pushes' if later else ''}, {errors}"
+        if errors.within(share):
+            return table, found
+        how += f"; a {found}"
     return None, f"exact{how}"
 
 
-def effect_table_from(model: PushModel, spline: TensorSpline) -> EffectTable | None:
-    """A table of a spline that was built before; None unless it agrees with the model. Raises ValueError or IndexError
-    if it does not fit the model.
+def effect_table_from(model: PushModel, spline: TensorSpline, later: bool) -> EffectTable | None:
+    """A table of a spline that was built before; None unless it agrees with the model. later: see EffectTable. Raises
+    ValueError or IndexError if it does not fit the model.
     """
-    builders = [] if _untabulated(model) else _builders(model)
-    for builder in builders:
-        if not builder.fits(spline):
-            continue
-        table = builder.with_spline(spline)
-        return table if table_errors(model, table, builder.later, RECHECKED, 0.5).within(1.0) else None
-    return None
+    if _untabulated(model) or (builder := _builder(model, later)) is None:
+        return None
+    table = builder.with_spline(spline)
+    return table if errors_of(table, _samples(model, later, RECHECKED), 0.5).within(1.0) else None
 
 
 def _untabulated(model: PushModel) -> str | None:
-    """In words, why there can be no table, as far as that does not take its axes."""
+    """The reason why there can be no table, whatever its axes; None if there may be one."""
     if RECORDING in model.predictor.needs:
         return "the mechanics depend on the recording"
     return None if len(model.training) else "there are no training pushes"
 
 
-def _builders(model: PushModel) -> list[_Builder]:
-    """The axes of tables, those of the widest table first; none where the changes take too many values."""
+def _attempts(grows: bool) -> Iterator[tuple[int, float, bool]]:
+    """Work, share of the tolerances, and whether to include later pushes, which are worth neither the finest table nor
+    a coarse one without them.
+    """
+    last = len(ATTEMPTS) - 1
+    for k, (work, share) in enumerate(ATTEMPTS):
+        if grows and (k < last or last == 0):
+            yield work, share, True
+        if not grows or k > 0 or last == 0:
+            yield work, share, False
+
+
+def _builder(model: PushModel, later: bool) -> _Builder | None:
+    """The axes of a table; None if the changes take too many values."""
     predictor, rows = model.predictor, model.training
     assert isinstance(predictor, ExtendedPredictor)
     source = EffectSource(predictor, model.usual_duration)
     known = Push(rows.inputs, rows.duration, rows.covariates)
-    found = []
-    for later in (True, False) if _grows(predictor) else (False,):
-        push = predictor.completed(_and_later(known) if later else known)
-        if (change := change_axes(*source.changes(push))) is not None:
-            found.append(_Builder.of(source, push, change, later))
-    return found
+    push = predictor.completed(_and_later(known) if later else known)
+    change = change_axes(*source.changes(push))
+    return None if change is None else _Builder.of(source, push, change, later)
 
 
 def _grows(predictor: ExtendedPredictor) -> bool:
-    """Whether changes go on while a session lasts on."""
-    flowing = (effect.basis for effect in predictor.effects if effect.exact and effect.basis.name not in STEPPED)
-    return any(driver in CUMULATIVE for basis in flowing for driver in basis.drivers)
+    """Whether an effect changes as a session continues."""
+    bases = (effect.basis for effect in predictor.effects if effect.basis.name not in STEPPED)
+    return any(driver in CUMULATIVE for basis in bases for driver in basis.drivers)
 
 
 def _and_later(push: Push) -> Push:
-    """These pushes, and the same at the end of a session that lasts on, twice as long."""
+    """These pushes, followed by `_later` of them."""
     later = _later(push)
     columns = {name: np.append(column, later.covariates[name]) for name, column in push.covariates.items()}
     return Push(np.tile(push.inputs, (2, 1)), np.tile(push.duration, 2), columns)
 
 
 def _later(push: Push) -> Push:
-    """The same pushes, later by as much as they last."""
+    """The same pushes, with cumulative covariates increased by the length of their range."""
     grown = {
         name: column + (column.max() - column.min()) if name in CUMULATIVE else column
         for name, column in push.covariates.items()
@@ -147,26 +156,35 @@ class EffectErrors:
         return f"means to {self.of_mean:.2g} standard deviations, covariances to {100.0 * self.of_covariance:.2g} %"
 
 
-def table_errors(
-    model: PushModel, table: EffectTable, later: bool, checked: int = CHECKED, share: float = 0.99
-) -> EffectErrors:
-    """The differences that a share of the pushes does not exceed.
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Pushes at which a table is compared with its model, the model's moments there, and the shift in them."""
 
-    later: whether later pushes are compared as well; their share counts by itself.
-    """
-    push = _checked(model, checked)
-    parts = [push, _later(push)] if later else [push]
-    errors = [_errors(model, table, part, share) for part in parts]
+    push: Push
+    exact: Moments
+    shift: Shift
+
+
+def errors_of(table: EffectTable, samples: Sequence[Sample], quantile: float) -> EffectErrors:
+    """The differences that this part of each sample does not exceed, in the worst sample."""
+    errors = [_errors(table, sample, quantile) for sample in samples]
     return EffectErrors(max(of_mean for of_mean, _ in errors), max(of_covariance for _, of_covariance in errors))
 
 
-def _errors(model: PushModel, table: EffectTable, push: Push, share: float) -> tuple[float, float]:
-    exact, expected = model.predictor.moments(push), model.predictor.shift(push)
-    found = table.shift(push, table.located(push))
+def _errors(table: EffectTable, sample: Sample, quantile: float) -> tuple[float, float]:
+    exact, expected = sample.exact, sample.shift
+    found = table.shift(sample.push, table.located(sample.push))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
-    of_mean = np.abs(found.mean - table.source.anchor(push) - expected.mean) / sd
+    of_mean = np.abs(found.mean - table.source.anchor(sample.push) - expected.mean) / sd
     of_covariance = relative_error(exact.covariance - expected.covariance + found.covariance, exact.covariance)
-    return float(np.quantile(of_mean.max(axis=1), share)), float(np.quantile(of_covariance, share))
+    return float(np.quantile(of_mean.max(axis=1), quantile)), float(np.quantile(of_covariance, quantile))
+
+
+def _samples(model: PushModel, later: bool, count: int) -> list[Sample]:
+    """Pushes between those of the training, and later ones if wanted."""
+    push = _checked(model, count)
+    pushes = [push, _later(push)] if later else [push]
+    return [Sample(push, model.predictor.moments(push), model.predictor.shift(push)) for push in pushes]
 
 
 def _checked(model: PushModel, count: int) -> Push:
@@ -188,16 +206,17 @@ def _checked(model: PushModel, count: int) -> Push:
 
 @dataclass(frozen=True, eq=False)
 class _Builder:
-    """Axes of a table; later: whether it also holds later pushes."""
+    """Axes of a table; later: see EffectTable."""
 
     source: EffectSource
+    later: bool
     place: PlaceAxis
     change: ChangeAxes
+    linear_range: tuple[Array, Array]
     angles: tuple[float, float]
     speeds: tuple[float, float]
     by_heading: bool
     any_duration: bool
-    later: bool
 
     @classmethod
     def of(cls, source: EffectSource, push: Push, change: ChangeAxes, later: bool) -> _Builder:
@@ -207,7 +226,9 @@ class _Builder:
         outline = source.predictor.physics.outline
         whole = PlaceAxis(outline, 1)
         ends = (float(angle.min()), float(angle.max())), (float(speed.min()), float(speed.max()))
-        plain = cls(source, whole, change, *ends, True, True, later)
+        linear = basis_columns(source.predictor, push)[:, source.predictor.coefficients.linear]
+        linear_range = linear.min(axis=0), linear.max(axis=0)
+        plain = cls(source, later, whole, change, linear_range, *ends, True, True)
         inputs, heading, changes = plain._probes()
 
         def values(where: Array, towards: Array = heading, by: EffectSource = source) -> Array:
@@ -252,16 +273,21 @@ class _Builder:
         together = np.concatenate([moved.coefficients, slopes.coefficients], axis=-1)
         return self.with_spline(TensorSpline(axes, together.astype(np.float32)))
 
-    def fits(self, spline: TensorSpline) -> bool:
-        """Whether a spline was made for these ranges of changes."""
-        ends = [[axis.low, axis.high] for axis in spline.axes[-len(self.change.low) :]] if len(self.change.low) else []
-        own = np.column_stack([self.change.low, self.change.high])
-        return len(ends) == len(own) and bool(np.allclose(np.reshape(ends, own.shape), own, rtol=1e-6))
-
     def with_spline(self, spline: TensorSpline) -> EffectTable:
         """The table with this spline."""
-        axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
-        return EffectTable(self.source, *axes, spline)
+        return EffectTable(
+            self.source,
+            self.later,
+            self.place,
+            self.change,
+            self.linear_range,
+            self.angles,
+            self.speeds,
+            self.by_speed,
+            self.by_heading,
+            self.any_duration,
+            spline,
+        )
 
     def _at_knots(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> Array:
         """The values (boxes, cells_1 + 1, ..., cells_D + 1, K), per speed, at the knots of these axes."""

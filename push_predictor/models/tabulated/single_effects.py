@@ -26,7 +26,8 @@ from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Shift
 from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
-from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable
+from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable, within_range
+from push_predictor.types import Array
 
 
 class SingleEffects:
@@ -44,7 +45,8 @@ class SingleEffects:
         self._levels, change = table.change.levels.tolist(), table.change
         self._sides = list(zip(change.directions.tolist(), change.low.tolist(), change.high.tolist(), strict=True))
         self._rows = 1 + known.parameter  # of the spline's values, after the shift
-        self._linear = known.values * known.linear if known.linear.any() else None
+        self._of_linear = known.linear if known.linear.any() else None
+        self._linear = known.values * known.linear
         outline, self._edges = table.place.outline, table.place.edges
         starts = outline.edge_starts
         self._starts = list(zip(starts[:-1].tolist(), (1.0 / np.diff(starts)).tolist(), strict=True))
@@ -74,15 +76,21 @@ class SingleEffects:
                 return None
             point.append(heading)
         columns = self._effects.columns(given)
-        level = self._changed(columns, point)
-        if level is None:
+        level, basis_values = self._changed(columns, point), self._effects.design(columns)
+        if level is None or not self._linear_known(basis_values):
             return None
         box, known = edge * len(self._levels) + level, table.source.predictor.coefficients
         values = (speed * table.spline.at(point, box)).reshape(-1, 3)
-        mean, design = values[0], values.take(self._rows, axis=0) * self._effects.design(columns)
-        if self._linear is not None:
+        mean, design = values[0], values.take(self._rows, axis=0) * basis_values
+        if self._of_linear is not None:
             mean = mean + self._linear @ design
         return Shift(mean[None], design.T.dot(known.covariance).dot(design)[None])
+
+    def _linear_known(self, basis_values: Array) -> bool:
+        """Whether the basis values (m, 1) that go with linear coefficients lie in the table's range."""
+        if self._of_linear is None:
+            return True
+        return bool(within_range(basis_values[self._of_linear].T, self._table.linear_range)[0])
 
     def _located(self, contact: float) -> tuple[int, int, float]:
         """The edge of a contact, its number among those that differ, and the place on it; see PlaceAxis."""
