@@ -152,9 +152,9 @@ class EffectTable:
     spline: the shift (3) and its derivatives (3 p) by p parameters, per speed, over place, angle, and, where they
     matter, speed, heading and changes. angles: range, rad.
     speeds: range at the duration of the source, m/s; one speed where they are equal. any_duration: whether another
-    duration does the same as another speed. linear_range: lows and highs (l,) of the basis values that go with the
-    coefficients in which the shift is linear; an error of a derivative grows with them. later: whether the ranges
-    contain later pushes than those of the training.
+    duration does the same as another speed. linear_range: lows and highs (l,), margin included, of the basis values
+    that go with the coefficients in which the shift is linear: an error of a derivative grows with them. later: whether
+    the ranges contain later pushes than those of the training.
     """
 
     source: EffectSource
@@ -181,7 +181,8 @@ class EffectTable:
         if not self.any_duration:
             inside = inside & (np.abs(ratio - 1.0) <= MARGIN)
         if (linear := self.source.predictor.coefficients.linear).any():
-            inside = inside & within_range(self._columns(push)[:, linear], self.linear_range)
+            factors, (low, high) = self._columns(push)[:, linear], self.linear_range
+            inside = inside & np.all((factors >= low) & (factors <= high), axis=1)
         if self.by_speed:
             columns.append(np.clip(speed, *self.speeds))
         if self.by_heading:
@@ -224,13 +225,6 @@ def basis_columns(predictor: ExtendedPredictor, push: Push) -> Array:
         values = effect.basis.values(push.covariates, len(push.inputs))
         parts.append(np.tile(values, (1, len(effect.coefficients) // values.shape[1])))
     return np.concatenate(parts, axis=1)
-
-
-def within_range(values: Array, ends: tuple[Array, Array]) -> BoolArray:
-    """Which rows of values (n, l) lie between ends (l,), to rounding."""
-    low, high = ends
-    margin = MARGIN * np.maximum(np.abs(low), np.abs(high))
-    return np.asarray(((values >= low - margin) & (values <= high + margin)).all(axis=1))
 
 
 def _within(values: Array, ends: tuple[float, float], margin: float) -> BoolArray:

@@ -27,7 +27,7 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor, Moments, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
-from push_predictor.models.tabulated.effect_table import EffectSource, EffectTable, basis_columns
+from push_predictor.models.tabulated.effect_table import MARGIN, EffectSource, EffectTable, basis_columns
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.table_accuracy import relative_error
 from push_predictor.types import Array
@@ -227,7 +227,8 @@ class _Builder:
         whole = PlaceAxis(outline, 1)
         ends = (float(angle.min()), float(angle.max())), (float(speed.min()), float(speed.max()))
         linear = basis_columns(source.predictor, push)[:, source.predictor.coefficients.linear]
-        linear_range = linear.min(axis=0), linear.max(axis=0)
+        margin = MARGIN * np.abs(linear).max(axis=0)
+        linear_range = linear.min(axis=0) - margin, linear.max(axis=0) + margin
         plain = cls(source, later, whole, change, linear_range, *ends, True, True)
         inputs, heading, changes = plain._probes()
 

@@ -17,17 +17,17 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import acos, atan2, inf, isfinite, pi
 
 import numpy as np
 
+from push_predictor.models.effects.driver_basis import columns_of
 from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Shift
 from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
-from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable, within_range
-from push_predictor.types import Array
+from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable
 
 
 class SingleEffects:
@@ -45,8 +45,8 @@ class SingleEffects:
         self._levels, change = table.change.levels.tolist(), table.change
         self._sides = list(zip(change.directions.tolist(), change.low.tolist(), change.high.tolist(), strict=True))
         self._rows = 1 + known.parameter  # of the spline's values, after the shift
-        self._of_linear = known.linear if known.linear.any() else None
-        self._linear = known.values * known.linear
+        self._linear = known.values * known.linear if known.linear.any() else None
+        self._linear_ends = list(_ends_of_linear(table))
         outline, self._edges = table.place.outline, table.place.edges
         starts = outline.edge_starts
         self._starts = list(zip(starts[:-1].tolist(), (1.0 / np.diff(starts)).tolist(), strict=True))
@@ -76,21 +76,22 @@ class SingleEffects:
                 return None
             point.append(heading)
         columns = self._effects.columns(given)
-        level, basis_values = self._changed(columns, point), self._effects.design(columns)
-        if level is None or not self._linear_known(basis_values):
+        level = self._changed(columns, point)
+        if level is None or not self._in_linear_range(columns):
             return None
         box, known = edge * len(self._levels) + level, table.source.predictor.coefficients
         values = (speed * table.spline.at(point, box)).reshape(-1, 3)
-        mean, design = values[0], values.take(self._rows, axis=0) * basis_values
-        if self._of_linear is not None:
+        mean, design = values[0], values.take(self._rows, axis=0) * self._effects.design(columns)
+        if self._linear is not None:
             mean = mean + self._linear @ design
         return Shift(mean[None], design.T.dot(known.covariance).dot(design)[None])
 
-    def _linear_known(self, basis_values: Array) -> bool:
-        """Whether the basis values (m, 1) that go with linear coefficients lie in the table's range."""
-        if self._of_linear is None:
-            return True
-        return bool(within_range(basis_values[self._of_linear].T, self._table.linear_range)[0])
+    def _in_linear_range(self, columns: Columns) -> bool:
+        return all(
+            low <= value <= high
+            for effect, ends in self._linear_ends
+            for value, (low, high) in zip(columns[effect], ends, strict=True)
+        )
 
     def _located(self, contact: float) -> tuple[int, int, float]:
         """The edge of a contact, its number among those that differ, and the place on it; see PlaceAxis."""
@@ -132,6 +133,16 @@ class SingleEffects:
             if all(abs(change - other) <= SAME for change, other in zip(stepped, known, strict=True)):
                 return level
         return None
+
+
+def _ends_of_linear(table: EffectTable) -> Iterator[tuple[int, list[tuple[float, float]]]]:
+    """The number of each effect that is linear in its coefficients, and the ends of its basis values in the table."""
+    start, (low, high) = 0, table.linear_range
+    for k, effect in enumerate(table.source.predictor.effects):
+        if not effect.exact:
+            own = slice(start, start + columns_of(effect.basis))  # the same for each of its parameters
+            yield k, list(zip(low[own].tolist(), high[own].tolist(), strict=True))
+            start += len(effect.coefficients)
 
 
 def _turned(angle: float) -> float:
