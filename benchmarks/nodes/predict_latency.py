@@ -75,7 +75,7 @@ WARM_UP = 200
 SIZES = (100, 1000)  # windows
 REQUESTS = 200  # different ones of each kind
 EFFECT = "friction, linear"  # of EFFECTS
-LATER, FAR = 1900.0, 5000.0  # s; the training pushes take 1000, and the table of the effect holds twice that
+LATER, FAR = 1900.0, 5000.0  # s; the training pushes take 1000, and the table of the effect contains up to twice that
 SETTLING = 15.0  # s, until the servers have computed all that makes predictions fast
 ROUNDS = 5
 

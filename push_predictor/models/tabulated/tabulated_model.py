@@ -178,7 +178,7 @@ class TabulatedModel:
 
     @cached_property
     def _noise(self) -> Array | None:
-        """The covariance (3, 3) that the mechanics below effects add to all pushes; None for a learnt base."""
+        """The covariance (3, 3) that the mechanics below effects add to all pushes; None for other bases."""
         base = self.model.predictor.base
         return base.covariance * self._factor if isinstance(base, MECHANICS) else None
 
@@ -197,7 +197,7 @@ class TabulatedModel:
         return SingleEffects(self.effects)
 
     def _added(self, push: Push) -> Prediction:
-        """What a learnt base adds to a table of effects: all but the displacement of its mechanics."""
+        """What a base other than mechanics adds to a table of effects: all but the displacement of its mechanics."""
         predictor = self.model.predictor.base
         if self.domain is None:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)

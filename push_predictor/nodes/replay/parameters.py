@@ -57,7 +57,7 @@ PARAMETERS: tuple[Param, ...] = (
     Param(
         "spin_us",
         60,
-        "busy-wait during the last microseconds before a deadline, at most half of the wait: less lateness, more CPU",
+        "busy-wait during the last microseconds of a wait, at most half of a short one: less lateness, more CPU",
         0,
         5000,
     ),
