@@ -41,8 +41,7 @@ from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated import effect_table_build
 from push_predictor.models.tabulated.effect_axes import change_axes
 from push_predictor.models.tabulated.effect_table import EffectTable
-from push_predictor.models.tabulated.effect_table_build import EffectErrors
-from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -343,8 +342,8 @@ def test_a_table_that_is_inaccurate_at_later_pushes_ends_with_the_training(
 
 
 def test_a_finer_table_with_later_pushes_is_preferred_to_a_coarse_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    def by_size(table: EffectTable, *_: object) -> EffectErrors:
-        return EffectErrors(99.0 if table.later and table.spline.knots < 10_000 else 0.0, 0.0)
+    def by_size(table: EffectTable, *_: object) -> TableAccuracy:
+        return TableAccuracy(99.0 if table.later and table.spline.knots < 10_000 else 0.0, 0.0)
 
     monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0), (70_000, 1.0)))
     monkeypatch.setattr(effect_table_build, "errors_of", by_size)
@@ -354,14 +353,14 @@ def test_a_finer_table_with_later_pushes_is_preferred_to_a_coarse_one_without(mo
 
 
 def test_later_pushes_are_not_worth_the_finest_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    def by_range(table: EffectTable, *_: object) -> EffectErrors:
-        return EffectErrors(99.0 if table.later or table.spline.knots < 10_000 else 0.0, 0.0)
+    def by_range(table: EffectTable, *_: object) -> TableAccuracy:
+        return TableAccuracy(99.0 if table.later or table.spline.knots < 10_000 else 0.0, 0.0)
 
     monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0), (4_000, 1.0), (35_000, 1.0)))
     monkeypatch.setattr(effect_table_build, "errors_of", by_range)
     table, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
     assert table is not None and not table.later
-    monkeypatch.setattr(effect_table_build, "errors_of", lambda *_: EffectErrors(99.0, 0.0))
+    monkeypatch.setattr(effect_table_build, "errors_of", lambda *_: TableAccuracy(99.0, 0.0))
     _, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
     assert how.count("a table of") == 4 and how.count("with later pushes") == 2
 
@@ -373,7 +372,7 @@ def test_a_coarse_table_must_be_accurate_to_half_the_tolerances(monkeypatch: pyt
     assert table is not None
     samples = effect_table_build._samples(model, False, effect_table_build.CHECKED)
     errors = effect_table_build.errors_of(table, samples, 0.99)
-    for name, error in (("MEAN_TOLERANCE", errors.of_mean), ("COVARIANCE_TOLERANCE", errors.of_covariance)):
+    for name, error in (("MEAN_TOLERANCE", errors.mean), ("COVARIANCE_TOLERANCE", errors.covariance)):
         with monkeypatch.context() as patch:
             patch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 0.5),))
             patch.setattr(effect_table_build, name, 1.9 * error)

@@ -29,7 +29,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
 from push_predictor.models.tabulated.effect_table import MARGIN, EffectSource, EffectTable, basis_columns
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
-from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 from push_predictor.types import Array
 
 CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0, "change, later": 20.0}
@@ -71,7 +71,7 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
             continue
         errors = errors_of(table, known[: 1 + later], 0.99)
         found = f"table of {table.spline.knots} knots{', with later pushes' if later else ''}, {errors}"
-        if errors.within(share):
+        if errors.within(share * MEAN_TOLERANCE, share * COVARIANCE_TOLERANCE):
             return table, found
         how += f"; a {found}"
     return None, f"exact{how}"
@@ -84,7 +84,8 @@ def effect_table_from(model: PushModel, spline: TensorSpline, later: bool) -> Ef
     if _untabulated(model) or (builder := _builder(model, later)) is None:
         return None
     table = builder.with_spline(spline)
-    return table if errors_of(table, _samples(model, later, RECHECKED), 0.5).within(1.0) else None
+    errors = errors_of(table, _samples(model, later, RECHECKED), 0.5)
+    return table if errors.within(MEAN_TOLERANCE, COVARIANCE_TOLERANCE) else None
 
 
 def _untabulated(model: PushModel) -> str | None:
@@ -139,23 +140,6 @@ def _later(push: Push) -> Push:
     return replace(push, covariates=grown)
 
 
-@dataclass(frozen=True)
-class EffectErrors:
-    """Differences of a table and the model: of means, in predicted standard deviations, and of covariances, relative
-    (see table_accuracy.TableAccuracy).
-    """
-
-    of_mean: float
-    of_covariance: float
-
-    def within(self, share: float) -> bool:
-        """Whether they take at most this share of the tolerances."""
-        return self.of_mean <= share * MEAN_TOLERANCE and self.of_covariance <= share * COVARIANCE_TOLERANCE
-
-    def __str__(self) -> str:
-        return f"means to {self.of_mean:.2g} standard deviations, covariances to {100.0 * self.of_covariance:.2g} %"
-
-
 @dataclass(frozen=True, eq=False)
 class Sample:
     """Pushes at which a table is compared with its model, the model's moments there, and the shift in them."""
@@ -165,10 +149,10 @@ class Sample:
     shift: Shift
 
 
-def errors_of(table: EffectTable, samples: Sequence[Sample], quantile: float) -> EffectErrors:
+def errors_of(table: EffectTable, samples: Sequence[Sample], quantile: float) -> TableAccuracy:
     """The differences that this part of each sample does not exceed, in the worst sample."""
     errors = [_errors(table, sample, quantile) for sample in samples]
-    return EffectErrors(max(of_mean for of_mean, _ in errors), max(of_covariance for _, of_covariance in errors))
+    return TableAccuracy(max(of_mean for of_mean, _ in errors), max(of_covariance for _, of_covariance in errors))
 
 
 def _errors(table: EffectTable, sample: Sample, quantile: float) -> tuple[float, float]:

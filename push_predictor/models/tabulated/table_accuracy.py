@@ -33,7 +33,7 @@ CHECKED = 250  # random pushes of the domain, as many training pushes, and as ma
 
 @dataclass(frozen=True)
 class TableAccuracy:
-    """The largest differences found between table and model.
+    """The largest differences found between table and model, or those that most pushes do not exceed.
 
     mean: in predicted standard deviations. covariance: relative error of the variance of any combination of outputs,
     which is the largest absolute eigenvalue of L^-1 T L^-T - I, where T is the table's covariance and L L' the model's.
@@ -45,10 +45,14 @@ class TableAccuracy:
     @property
     def accepted(self) -> bool:
         """Whether a table with these errors may be used: at half the tolerances, since not every push was compared."""
-        return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.covariance <= COVARIANCE_TOLERANCE
+        return self.within(0.5 * MEAN_TOLERANCE, 0.5 * COVARIANCE_TOLERANCE)
+
+    def within(self, mean: float, covariance: float) -> bool:
+        """Whether they are at most these."""
+        return self.mean <= mean and self.covariance <= covariance
 
     def __str__(self) -> str:
-        return f"means to {self.mean:.1e} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
+        return f"means to {self.mean:.2g} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
 
 
 @dataclass(frozen=True, eq=False)
