@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Building a table of effects: which axes matter, how many knots, and how accurate it is."""
+"""Building a table of effects: which axes matter, and how many knots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,12 +24,21 @@ import numpy as np
 from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, Moments, Shift
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
 from push_predictor.models.tabulated.effect_table import MARGIN, EffectSource, EffectTable, basis_columns
+from push_predictor.models.tabulated.effect_table_accuracy import (
+    CHECKED,
+    HALF,
+    MOST,
+    RECHECKED,
+    accepted,
+    errors_of,
+    later_pushes,
+    samples,
+)
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
-from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 from push_predictor.types import Array
 
 CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0, "change, later": 20.0}
@@ -43,10 +52,6 @@ ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they
 ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
 PROBES = 64  # random pushes that show which axes matter
 ALIKE = 1e-4  # of the largest value
-MEAN_TOLERANCE = 0.2  # predicted standard deviations, in 99 of 100 pushes; the root of the mean square is a fifth of it
-COVARIANCE_TOLERANCE = 0.1  # relative, of the variance of any combination of outputs, in 99 of 100 pushes
-CHECKED = 400  # pushes: training rows, and as many with other inputs
-RECHECKED = 10  # the same, when a table is read
 
 
 def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
@@ -62,16 +67,16 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     builders = {later: builder for later in {grows, False} if (builder := _builder(model, later)) is not None}
     if not builders:
         return None, "exact: the changes take too many values"
-    known, how = _samples(model, grows, CHECKED), ""
+    known, how = samples(model, grows, CHECKED), ""
     for work, share, later in _attempts(grows):
         if later not in builders:
             continue
         if (table := builders[later].table(work)) is None:
             how += "; a table would need too many knots"
             continue
-        errors = errors_of(table, known[: 1 + later], 0.99)
+        errors = errors_of(table, known[: 1 + later], MOST)
         found = f"table of {table.spline.knots} knots{', with later pushes' if later else ''}, {errors}"
-        if errors.within(share * MEAN_TOLERANCE, share * COVARIANCE_TOLERANCE):
+        if accepted(errors, share):
             return table, found
         how += f"; a {found}"
     return None, f"exact{how}"
@@ -84,8 +89,7 @@ def effect_table_from(model: PushModel, spline: TensorSpline, later: bool) -> Ef
     if _untabulated(model) or (builder := _builder(model, later)) is None:
         return None
     table = builder.with_spline(spline)
-    errors = errors_of(table, _samples(model, later, RECHECKED), 0.5)
-    return table if errors.within(MEAN_TOLERANCE, COVARIANCE_TOLERANCE) else None
+    return table if accepted(errors_of(table, samples(model, later, RECHECKED), HALF)) else None
 
 
 def _untabulated(model: PushModel) -> str | None:
@@ -125,67 +129,10 @@ def _grows(predictor: ExtendedPredictor) -> bool:
 
 
 def _and_later(push: Push) -> Push:
-    """These pushes, followed by `_later` of them."""
-    later = _later(push)
+    """These pushes, followed by the same later."""
+    later = later_pushes(push)
     columns = {name: np.append(column, later.covariates[name]) for name, column in push.covariates.items()}
     return Push(np.tile(push.inputs, (2, 1)), np.tile(push.duration, 2), columns)
-
-
-def _later(push: Push) -> Push:
-    """The same pushes, with cumulative covariates increased by the length of their range."""
-    grown = {
-        name: column + (column.max() - column.min()) if name in CUMULATIVE else column
-        for name, column in push.covariates.items()
-    }
-    return replace(push, covariates=grown)
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Pushes at which a table is compared with its model, the model's moments there, and the shift in them."""
-
-    push: Push
-    exact: Moments
-    shift: Shift
-
-
-def errors_of(table: EffectTable, samples: Sequence[Sample], quantile: float) -> TableAccuracy:
-    """The differences that this part of each sample does not exceed, in the worst sample."""
-    errors = [_errors(table, sample, quantile) for sample in samples]
-    return TableAccuracy(max(of_mean for of_mean, _ in errors), max(of_covariance for _, of_covariance in errors))
-
-
-def _errors(table: EffectTable, sample: Sample, quantile: float) -> tuple[float, float]:
-    exact, expected = sample.exact, sample.shift
-    found = table.shift(sample.push, table.located(sample.push))
-    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
-    of_mean = np.abs(found.mean - table.source.anchor(sample.push) - expected.mean) / sd
-    of_covariance = relative_error(exact.covariance - expected.covariance + found.covariance, exact.covariance)
-    return float(np.quantile(of_mean.max(axis=1), quantile)), float(np.quantile(of_covariance, quantile))
-
-
-def _samples(model: PushModel, later: bool, count: int) -> list[Sample]:
-    """Pushes between those of the training, and later ones if wanted."""
-    push = _checked(model, count)
-    pushes = [push, _later(push)] if later else [push]
-    return [Sample(push, model.predictor.moments(push), model.predictor.shift(push)) for push in pushes]
-
-
-def _checked(model: PushModel, count: int) -> Push:
-    """Training rows, and rows with inputs drawn evenly between them."""
-    rng, rows = np.random.default_rng(0), model.training
-    known = rows.take(rng.integers(len(rows), size=2 * count))
-    inputs = known.inputs.copy()
-    low, high = rows.inputs.min(axis=0), rows.inputs.max(axis=0)
-    low[1], high[1] = 0.0, 1.0
-    inputs[count:] = rng.uniform(low, high, (count, 3))
-    covariates = dict(known.covariates)
-    if {"slider_heading", "push_heading"} <= set(covariates):
-        normal = model.rig.outline.inward_normal(inputs[:, 1])
-        covariates["push_heading"] = (
-            covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2]
-        )
-    return model.predictor.completed(Push(inputs, np.full(len(inputs), model.usual_duration), covariates))
 
 
 @dataclass(frozen=True, eq=False)
