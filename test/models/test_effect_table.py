@@ -38,9 +38,9 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import table_cache
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated import effect_table_accuracy, effect_table_build
-from push_predictor.models.tabulated.effect_axes import change_axes
-from push_predictor.models.tabulated.effect_table import EffectTable
+from push_predictor.models.tabulated.effect_tables import accuracy, build
+from push_predictor.models.tabulated.effect_tables.axes import change_axes
+from push_predictor.models.tabulated.effect_tables.table import EffectTable
 from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 from push_predictor.models.train import TrainingOptions, train_model
@@ -65,10 +65,10 @@ def coarse_integration() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sixth of the usual work; tables that are a little too coarse are used nevertheless."""
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((35_000, 1.0),))
-    monkeypatch.setattr(effect_table_build, "COARSEST", 0.0)
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 0.5)
-    monkeypatch.setattr(effect_table_accuracy, "COVARIANCE_TOLERANCE", 0.3)
+    monkeypatch.setattr(build, "ATTEMPTS", ((35_000, 1.0),))
+    monkeypatch.setattr(build, "COARSEST", 0.0)
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 0.5)
+    monkeypatch.setattr(accuracy, "COVARIANCE_TOLERANCE", 0.3)
 
 
 def effect(mechanism: str, basis: DriverBasis, size: float = 1.0, exact: bool = True) -> Effect:
@@ -152,7 +152,7 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
 )
 def test_table_is_close_to_the_exact_effects(kind: str, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind == "fitted":  # its noise is small
-        monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((50_000, 1.0),))
+        monkeypatch.setattr(build, "ATTEMPTS", ((50_000, 1.0),))
     assert_close(kind, case)
 
 
@@ -320,13 +320,13 @@ def test_linear_effects_are_computed_where_their_table_would_be_stretched(time: 
 
 def refused_later(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tables are taken for inaccurate at later pushes."""
-    errors = effect_table_accuracy._errors
+    errors = accuracy._errors
 
-    def later_are_off(table: EffectTable, sample: effect_table_accuracy.Sample, quantile: float) -> tuple[float, float]:
+    def later_are_off(table: EffectTable, sample: accuracy.Sample, quantile: float) -> tuple[float, float]:
         late = sample.push.covariates["elapsed_time"].max() > 1000.0
         return (99.0, 99.0) if late else errors(table, sample, quantile)
 
-    monkeypatch.setattr(effect_table_accuracy, "_errors", later_are_off)
+    monkeypatch.setattr(accuracy, "_errors", later_are_off)
 
 
 @pytest.mark.parametrize("case", ["linear", "linear in its coefficients"])
@@ -345,8 +345,8 @@ def test_a_finer_table_with_later_pushes_is_preferred_to_a_coarse_one_without(mo
     def by_size(table: EffectTable, *_: object) -> TableAccuracy:
         return TableAccuracy(99.0 if table.later and table.spline.knots < 10_000 else 0.0, 0.0)
 
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0), (70_000, 1.0)))
-    monkeypatch.setattr(effect_table_build, "errors_of", by_size)
+    monkeypatch.setattr(build, "ATTEMPTS", ((3_000, 0.5), (35_000, 1.0), (70_000, 1.0)))
+    monkeypatch.setattr(build, "errors_of", by_size)
     table = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
     assert table.effects is not None and table.effects.later and table.effects.spline.knots > 10_000
     assert "with later pushes" in table.how
@@ -356,29 +356,29 @@ def test_later_pushes_are_not_worth_the_finest_table(monkeypatch: pytest.MonkeyP
     def by_range(table: EffectTable, *_: object) -> TableAccuracy:
         return TableAccuracy(99.0 if table.later or table.spline.knots < 10_000 else 0.0, 0.0)
 
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0), (4_000, 1.0), (35_000, 1.0)))
-    monkeypatch.setattr(effect_table_build, "errors_of", by_range)
-    table, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
+    monkeypatch.setattr(build, "ATTEMPTS", ((3_000, 1.0), (4_000, 1.0), (35_000, 1.0)))
+    monkeypatch.setattr(build, "errors_of", by_range)
+    table, how = build.build_effect_table(extended("analytical", *CASES["linear"]))
     assert table is not None and not table.later
-    monkeypatch.setattr(effect_table_build, "errors_of", lambda *_: TableAccuracy(99.0, 0.0))
-    _, how = effect_table_build.build_effect_table(extended("analytical", *CASES["linear"]))
+    monkeypatch.setattr(build, "errors_of", lambda *_: TableAccuracy(99.0, 0.0))
+    _, how = build.build_effect_table(extended("analytical", *CASES["linear"]))
     assert how.count("a table of") == 4 and how.count("with later pushes") == 2
 
 
 def test_a_coarse_table_must_be_accurate_to_half_the_tolerances(monkeypatch: pytest.MonkeyPatch) -> None:
     model = extended("analytical", *CASES["constant"])
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
-    table, _ = effect_table_build.build_effect_table(model)
+    monkeypatch.setattr(build, "ATTEMPTS", ((5_000, 1.0),))
+    table, _ = build.build_effect_table(model)
     assert table is not None
-    samples = effect_table_accuracy.samples(model, False, effect_table_accuracy.CHECKED)
-    errors = effect_table_accuracy.errors_of(table, samples, effect_table_accuracy.MOST)
+    samples = accuracy.samples(model, False, accuracy.CHECKED)
+    errors = accuracy.errors_of(table, samples, accuracy.MOST)
     for name, error in (("MEAN_TOLERANCE", errors.mean), ("COVARIANCE_TOLERANCE", errors.covariance)):
         with monkeypatch.context() as patch:
-            patch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 0.5),))
-            patch.setattr(effect_table_accuracy, name, 1.9 * error)
-            assert effect_table_build.build_effect_table(model)[0] is None
-            patch.setattr(effect_table_accuracy, name, 2.1 * error)
-            assert effect_table_build.build_effect_table(model)[0] is not None
+            patch.setattr(build, "ATTEMPTS", ((5_000, 0.5),))
+            patch.setattr(accuracy, name, 1.9 * error)
+            assert build.build_effect_table(model)[0] is None
+            patch.setattr(accuracy, name, 2.1 * error)
+            assert build.build_effect_table(model)[0] is not None
 
 
 def test_covariance_that_effects_share_is_in_the_table() -> None:
@@ -452,8 +452,8 @@ def test_changes_that_take_too_many_values_have_no_table() -> None:
 
 
 def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 1e-6)
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 1e-6)
+    monkeypatch.setattr(build, "ATTEMPTS", ((5_000, 1.0),))
     table = with_effect_table(tabulate(extended("analytical", *CASES["constant"])))
     assert table.effects is None
     assert "effects: exact; a table of" in table.how and "standard deviations" in table.how
@@ -463,12 +463,12 @@ def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyP
 
 
 def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0), (35_000, 1.0)))
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 0.3)
+    monkeypatch.setattr(build, "ATTEMPTS", ((3_000, 1.0), (35_000, 1.0)))
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 0.3)
     found = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0),))
+    monkeypatch.setattr(build, "ATTEMPTS", ((3_000, 1.0),))
     assert found.effects is not None and found.effects.spline.knots > 15_000, found.how
-    monkeypatch.setattr(effect_table_build, "COARSEST", 9.0)
+    monkeypatch.setattr(build, "COARSEST", 9.0)
     assert "too many knots" in with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).how
 
 
@@ -486,8 +486,8 @@ def test_model_without_effects_is_left_as_it_is() -> None:
 
 
 def test_registry_tabulates_effects(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((5_000, 1.0),))
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 10.0)
+    monkeypatch.setattr(build, "ATTEMPTS", ((5_000, 1.0),))
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 10.0)
     path = tmp_path / "m.pushmodel"
     extended("about nothing", *CASES["linear"]).save(path)
     registry = ModelRegistry()
@@ -519,9 +519,9 @@ def test_tables_of_effects_are_kept_and_checked(
     if not later:
         refused_later(monkeypatch)
     monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(tmp_path / "tables"))
-    monkeypatch.setattr(effect_table_build, "ATTEMPTS", ((4_000, 1.0),))
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 10.0 if accurate else 0.0)
-    monkeypatch.setattr(effect_table_accuracy, "COVARIANCE_TOLERANCE", 10.0)
+    monkeypatch.setattr(build, "ATTEMPTS", ((4_000, 1.0),))
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 10.0 if accurate else 0.0)
+    monkeypatch.setattr(accuracy, "COVARIANCE_TOLERANCE", 10.0)
     model, rows = extended(kind, *CASES[case]), inside(5)
     computed = as_served(model)
     assert (computed.effects is not None) is accurate
@@ -533,7 +533,7 @@ def test_tables_of_effects_are_kept_and_checked(
     for given in (rows, at(rows, 1500.0)):
         one, other = predicted(computed, given), predicted(kept, given)
         assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
-    monkeypatch.setattr(effect_table_accuracy, "MEAN_TOLERANCE", 1e-9)
+    monkeypatch.setattr(accuracy, "MEAN_TOLERANCE", 1e-9)
     monkeypatch.setattr(table_cache, "with_effect_table", not_again)
     if accurate:
         with pytest.raises(AssertionError, match="a table was computed"):

@@ -48,7 +48,8 @@ from push_predictor.models.request import PushRequest, check_request, check_tabl
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated import effect_table_build, tabulated_prior
+from push_predictor.models.tabulated import tabulated_prior
+from push_predictor.models.tabulated.effect_tables import build
 from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
@@ -83,7 +84,7 @@ def small_tables() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch, coarse_effects():
         patch.setattr(tabulated_prior, "MOST_KNOTS", 10)
-        patch.setattr(effect_table_build, "ATTEMPTS", ((3_000, 1.0),))
+        patch.setattr(build, "ATTEMPTS", ((3_000, 1.0),))
         yield
 
 

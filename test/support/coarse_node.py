@@ -25,12 +25,12 @@ from importlib import import_module
 
 from coarse_pictures import coarse_pictures
 
-from push_predictor.models.tabulated import effect_table_build
+from push_predictor.models.tabulated.effect_tables import build
 from push_predictor.nodes.entry import install_handlers
 
 ALL_THE_TIME = ExitStack()
 ALL_THE_TIME.enter_context(coarse_pictures())
-effect_table_build.ATTEMPTS = ()  # a table takes two seconds; without one an extended model predicts exactly
+build.ATTEMPTS = ()  # a table takes two seconds; without one an extended model predicts exactly
 
 if __name__ == "__main__":
     install_handlers()

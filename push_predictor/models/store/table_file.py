@@ -33,7 +33,7 @@ from push_predictor.errors import ModelFileError
 from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.arrays_record import read_arrays
-from push_predictor.models.tabulated.effect_table_build import effect_table_from
+from push_predictor.models.tabulated.effect_tables.build import effect_table_from
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.prediction_table import TableNodes
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed

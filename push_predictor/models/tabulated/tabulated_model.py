@@ -22,7 +22,7 @@ other push and every other model is predicted by the model itself.
 The mechanics have no table, neither alone nor as the mean of a learnt model: they have kinks where contacts begin to
 slip, and a table would have to be very fine there. A single push is computed in plain numbers instead. A prior model
 averages over many parameters, and has a coarse table of its own (tabulated_prior). Effects take several integrations a
-push: `with_effect_table` tabulates them, with the mechanics that they change (effect_table).
+push: `with_effect_table` tabulates them, with the mechanics that they change (effect_tables).
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ from push_predictor.models.predictors import (
     Shift,
 )
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.effect_table import EffectTable
-from push_predictor.models.tabulated.effect_table_build import build_effect_table
+from push_predictor.models.tabulated.effect_tables.build import build_effect_table
+from push_predictor.models.tabulated.effect_tables.single import SingleEffects
+from push_predictor.models.tabulated.effect_tables.table import EffectTable
 from push_predictor.models.tabulated.prediction_table import OnGrid, TooFineError, on_grid
-from push_predictor.models.tabulated.single_effects import SingleEffects
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import (
     FeatureBox,

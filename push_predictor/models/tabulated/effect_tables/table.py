@@ -46,7 +46,7 @@ from push_predictor.models.predictors import (
     MechanicsPredictor,
 )
 from push_predictor.models.predictors.predictor import Shift
-from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis
+from push_predictor.models.tabulated.effect_tables.axes import STEPPED, ChangeAxes, PlaceAxis
 from push_predictor.models.tabulated.interpolation import TensorSpline
 from push_predictor.types import Array, BoolArray, IntArray
 

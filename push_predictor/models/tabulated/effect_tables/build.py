@@ -26,9 +26,7 @@ from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.effect_axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
-from push_predictor.models.tabulated.effect_table import MARGIN, EffectSource, EffectTable, basis_columns
-from push_predictor.models.tabulated.effect_table_accuracy import (
+from push_predictor.models.tabulated.effect_tables.accuracy import (
     CHECKED,
     HALF,
     MOST,
@@ -38,6 +36,8 @@ from push_predictor.models.tabulated.effect_table_accuracy import (
     later_pushes,
     samples,
 )
+from push_predictor.models.tabulated.effect_tables.axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
+from push_predictor.models.tabulated.effect_tables.table import MARGIN, EffectSource, EffectTable, basis_columns
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.types import Array
 

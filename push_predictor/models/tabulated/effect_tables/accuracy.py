@@ -25,7 +25,7 @@ from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Moments, Shift
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.effect_table import EffectTable
+from push_predictor.models.tabulated.effect_tables.table import EffectTable
 from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 
 MEAN_TOLERANCE = 0.2  # predicted standard deviations, in 99 of 100 pushes; the root of the mean square is a fifth of it

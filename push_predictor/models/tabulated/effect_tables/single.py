@@ -26,8 +26,8 @@ from push_predictor.models.effects.driver_basis import columns_of
 from push_predictor.models.effects.scalar_effects import Columns, ScalarEffects
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Shift
-from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
-from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable
+from push_predictor.models.tabulated.effect_tables.axes import SAME, STEPPED
+from push_predictor.models.tabulated.effect_tables.table import MARGIN, TURN, EffectTable
 
 
 class SingleEffects:
