@@ -318,22 +318,34 @@ def test_linear_effects_are_computed_where_their_table_would_be_stretched(time: 
     assert_equal(single(table, rows), single(computed, rows))
 
 
-def refused_later(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_linear_effect_has_a_range_of_its_own() -> None:
+    warm = effect("contact_friction", DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,)), 0.5, exact=False)
+    computed = tabulate(extended("analytical", GENERIC, warm))
+    table, rows = with_effect_table(computed), inside(6)
+    assert table.effects is not None
+    hot = with_covariate(rows, "topic:/warmth", np.full(len(rows), 4.0))
+    assert_equal(predicted(table, hot), predicted(computed, hot))
+    assert_equal(single(table, hot), single(computed, hot))
+    assert np.abs(single(table, rows).mean - single(computed, rows).mean).max() > 0.0
+
+
+def refused_later(monkeypatch: pytest.MonkeyPatch, off: tuple[float, float] = (99.0, 99.0)) -> None:
     """Tables are taken for inaccurate at later pushes."""
     errors = accuracy._errors
 
     def later_are_off(table: EffectTable, sample: accuracy.Sample, quantile: float) -> tuple[float, float]:
         late = sample.push.covariates["elapsed_time"].max() > 1000.0
-        return (99.0, 99.0) if late else errors(table, sample, quantile)
+        return off if late else errors(table, sample, quantile)
 
     monkeypatch.setattr(accuracy, "_errors", later_are_off)
 
 
 @pytest.mark.parametrize("case", ["linear", "linear in its coefficients"])
+@pytest.mark.parametrize("off", [(99.0, 0.0), (0.0, 99.0)])
 def test_a_table_that_is_inaccurate_at_later_pushes_ends_with_the_training(
-    case: str, monkeypatch: pytest.MonkeyPatch
+    case: str, off: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    refused_later(monkeypatch)
+    refused_later(monkeypatch, off)
     computed = tabulate(extended("analytical", *CASES[case]))
     table, rows = with_effect_table(computed), inside()
     assert table.effects is not None and not table.effects.later and "later" not in table.how
