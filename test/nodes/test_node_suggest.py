@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
+from push_predictor.nodes import predict_server
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
 from push_predictor_interfaces.srv import ListModels, SuggestPushes
 
@@ -108,8 +110,16 @@ def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any]
     assert not len(response.velocity)
 
 
-def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(folder: Path) -> None:
-    domain = harness.free_domain()
+def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, domain = Event(), harness.free_domain()
+
+    def noted(*arguments: Any) -> None:
+        begun.set()
+        handle_suggest_pushes(*arguments)
+
+    monkeypatch.setattr(predict_server, "handle_suggest_pushes", noted)
     running = hosted_node("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
     with running, harness.ros_context(domain) as node:
         suggest = node.create_client(SuggestPushes, "suggest_pushes")
@@ -118,7 +128,7 @@ def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactiv
         assert suggest.wait_for_service(harness.START_TIMEOUT)
         long = suggest.call_async(SuggestPushes.Request(count=200))
         assert harness.call(node.create_client(ListModels, "list_models"), ListModels.Request()).names == ["gp"]
-        assert not long.done()
+        assert begun.wait(harness.START_TIMEOUT) and not long.done()
         stop = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
         assert harness.call(change, stop).success
         assert harness.wait_until(long.done)
