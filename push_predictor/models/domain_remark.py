@@ -48,7 +48,8 @@ def _reason(model: PushModel, push: Push, row: int) -> str:
         if not low <= value <= high:
             outside.append(_outside(name, name, value, f"{low:.4g} to {high:.4g}"))
     if model.covariate_ranges:
-        outside += _outside_covariates(model, _alone(push, row))
+        alone = push if len(push.inputs) == 1 else push.take(slice(row, row + 1))
+        outside += _outside_covariates(model, alone)
     return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
 
 
@@ -60,14 +61,6 @@ def _outside_covariates(model: PushModel, alone: Push) -> list[str]:
         if not known.contains_one(value):
             found.append(_outside(f"covariate {name}", name, value, str(known)))
     return found
-
-
-def _alone(push: Push, row: int) -> Push:
-    """One of n pushes."""
-    if len(push.inputs) == 1:
-        return push
-    given = {name: column[row : row + 1] for name, column in push.covariates.items()}
-    return Push(push.inputs[row : row + 1], push.duration[row : row + 1], given)
 
 
 def _outside(title: str, name: str, value: float, accepted: str) -> str:

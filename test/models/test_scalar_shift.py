@@ -63,8 +63,7 @@ def pushes(n: int = 16) -> Push:
 
 
 def one(push: Push, row: int) -> Push:
-    rows = slice(row, row + 1)
-    return Push(push.inputs[rows], push.duration[rows], {name: x[rows] for name, x in push.covariates.items()})
+    return push.take(slice(row, row + 1))
 
 
 def extended(*effects: Effect, of_effects: FittedMechanics | None = None) -> ExtendedPredictor:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.types import Array
+from push_predictor.types import Array, BoolArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,11 @@ class Push:
     inputs: Array
     duration: Array
     covariates: Mapping[str, Array]
+
+    def take(self, rows: IntArray | BoolArray | slice) -> Push:
+        """Some of these pushes."""
+        covariates = {name: column[rows] for name, column in self.covariates.items()}
+        return Push(self.inputs[rows], self.duration[rows], covariates)
 
 
 @dataclass(frozen=True)

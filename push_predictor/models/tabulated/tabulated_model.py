@@ -115,7 +115,7 @@ class TabulatedModel:
             return self._shifted(push, self.effects.shift(push, located))
         if not located.inside.any():
             return self._computed(push)
-        chosen, other = (_taken(push, rows) for rows in (located.inside, ~located.inside))
+        chosen, other = (push.take(rows) for rows in (located.inside, ~located.inside))
         table = self._shifted(chosen, self.effects.shift(chosen, self.effects.located(chosen)))
         return _merged(located.inside, table, self._computed(other))
 
@@ -281,12 +281,6 @@ def with_effect_table(tabulated: TabulatedModel) -> TabulatedModel:
 def with_effects(tabulated: TabulatedModel, table: EffectTable | None, how: str) -> TabulatedModel:
     """The same with this table of its effects, None if they are computed; how: in words."""
     return replace(tabulated, effects=table, effects_how=how)
-
-
-def _taken(push: Push, rows: BoolArray) -> Push:
-    return Push(
-        push.inputs[rows], push.duration[rows], {name: column[rows] for name, column in push.covariates.items()}
-    )
 
 
 def with_base(model: PushModel, base: PriorPredictor) -> PushModel:

@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -31,13 +32,20 @@ from push_predictor.models.tabulated.effect_tables.accuracy import (
     HALF,
     MOST,
     RECHECKED,
+    Sample,
     accepted,
     errors_of,
     later_pushes,
     samples,
 )
 from push_predictor.models.tabulated.effect_tables.axes import STEPPED, ChangeAxes, PlaceAxis, change_axes
-from push_predictor.models.tabulated.effect_tables.table import MARGIN, EffectSource, EffectTable, basis_columns
+from push_predictor.models.tabulated.effect_tables.table import (
+    MARGIN,
+    EffectAxes,
+    EffectSource,
+    EffectTable,
+    basis_columns,
+)
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.types import Array
 
@@ -48,7 +56,6 @@ COARSEST = 0.2  # factor on CELLS, below which a table is not tried
 # Integrations for a table (some microseconds each), and the share of the tolerances that its errors may take. Tried in
 # turn: a coarse table saves seconds, but must be accurate to half the tolerances.
 ATTEMPTS = ((50_000, 0.5), (200_000, 1.0), (800_000, 1.0))
-ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
 ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
 PROBES = 64  # random pushes that show which axes matter
 ALIKE = 1e-4  # of the largest value
@@ -64,26 +71,24 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     if (reason := _untabulated(model)) is not None:
         return None, f"exact: {reason}"
     grows = _grows(predictor)
-    builders = {later: builder for later in {grows, False} if (builder := _builder(model, later)) is not None}
-    if not builders:
-        return None, "exact: the changes take too many values"
-    known, how = samples(model, grows, CHECKED), ""
+    builder, known, how = cache(partial(_builder, model)), list[Sample](), ""
     for work, share, later in _attempts(grows):
-        if later not in builders:
+        if (axes := builder(later)) is None:
             continue
-        if (table := builders[later].table(work)) is None:
+        if (table := axes.table(work)) is None:
             how += "; a table would need too many knots"
             continue
+        known = known or samples(model, grows, CHECKED)
         errors = errors_of(table, known[: 1 + later], MOST)
         found = f"table of {table.spline.knots} knots{', with later pushes' if later else ''}, {errors}"
         if accepted(errors, share):
             return table, found
         how += f"; a {found}"
-    return None, f"exact{how}"
+    return None, f"exact{how or ': the changes take too many values'}"
 
 
 def effect_table_from(model: PushModel, spline: TensorSpline, later: bool) -> EffectTable | None:
-    """A table of a spline that was built before; None unless it agrees with the model. later: see EffectTable. Raises
+    """A table of a spline that was built before; None unless it agrees with the model. later: see EffectAxes. Raises
     ValueError or IndexError if it does not fit the model.
     """
     if _untabulated(model) or (builder := _builder(model, later)) is None:
@@ -135,19 +140,8 @@ def _and_later(push: Push) -> Push:
     return Push(np.tile(push.inputs, (2, 1)), np.tile(push.duration, 2), columns)
 
 
-@dataclass(frozen=True, eq=False)
-class _Builder:
-    """Axes of a table; later: see EffectTable."""
-
-    source: EffectSource
-    later: bool
-    place: PlaceAxis
-    change: ChangeAxes
-    linear_range: tuple[Array, Array]
-    angles: tuple[float, float]
-    speeds: tuple[float, float]
-    by_heading: bool
-    any_duration: bool
+class _Builder(EffectAxes):
+    """Tables with these axes."""
 
     @classmethod
     def of(cls, source: EffectSource, push: Push, change: ChangeAxes, later: bool) -> _Builder:
@@ -177,11 +171,6 @@ class _Builder:
             any_duration=_alike(here, values(inputs * [0.5, 1.0, 1.0], by=twice)),
         )
 
-    @property
-    def by_speed(self) -> bool:
-        """Whether the speeds differ."""
-        return self.speeds[1] > ONE_SPEED * self.speeds[0]
-
     def _probes(self) -> tuple[Array, Array, Array]:
         rng = np.random.default_rng(0)
         low, high = np.array([self.speeds[0], 0.0, self.angles[0]]), np.array([self.speeds[1], 1.0, self.angles[1]])
@@ -207,19 +196,7 @@ class _Builder:
 
     def with_spline(self, spline: TensorSpline) -> EffectTable:
         """The table with this spline."""
-        return EffectTable(
-            self.source,
-            self.later,
-            self.place,
-            self.change,
-            self.linear_range,
-            self.angles,
-            self.speeds,
-            self.by_speed,
-            self.by_heading,
-            self.any_duration,
-            spline,
-        )
+        return EffectTable(**{field.name: getattr(self, field.name) for field in fields(EffectAxes)}, spline=spline)
 
     def _at_knots(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> Array:
         """The values (boxes, cells_1 + 1, ..., cells_D + 1, K), per speed, at the knots of these axes."""

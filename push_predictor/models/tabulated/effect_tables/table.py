@@ -52,6 +52,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 TURN = 2.0 * np.pi
 MARGIN = 1e-6  # of an angle, rad, and of a speed, relative
+ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,15 +147,13 @@ class Located:
 
 
 @dataclass(frozen=True, eq=False)
-class EffectTable:
-    """A table of effects.
+class EffectAxes:
+    """The axes of a table of effects, and what it contains.
 
-    spline: the shift (3) and its derivatives (3 p) by p parameters, per speed, over place, angle, and, where they
-    matter, speed, heading and changes. angles: range, rad.
-    speeds: range at the duration of the source, m/s; one speed where they are equal. any_duration: whether another
-    duration does the same as another speed. linear_range: lows and highs (l,), margin included, of the basis values
-    that go with the coefficients in which the shift is linear: an error of a derivative grows with them. later: whether
-    the ranges contain later pushes than those of the training.
+    angles: range, rad. speeds: range at the duration of the source, m/s. any_duration: whether another duration does
+    the same as another speed. linear_range: lows and highs (l,), margin included, of the basis values that go with the
+    coefficients in which the shift is linear: an error of a derivative grows with them. later: whether the ranges
+    contain later pushes than those of the training.
     """
 
     source: EffectSource
@@ -164,9 +163,23 @@ class EffectTable:
     linear_range: tuple[Array, Array]
     angles: tuple[float, float]
     speeds: tuple[float, float]
-    by_speed: bool
     by_heading: bool
     any_duration: bool
+
+    @cached_property
+    def by_speed(self) -> bool:
+        """Whether the speeds differ."""
+        return self.speeds[1] > ONE_SPEED * self.speeds[0]
+
+
+@dataclass(frozen=True, eq=False)
+class EffectTable(EffectAxes):
+    """A table of effects.
+
+    spline: the shift (3) and its derivatives (3 p) by p parameters, per speed, over place, angle, and, where they
+    matter, speed, heading and changes.
+    """
+
     spline: TensorSpline
 
     def located(self, push: Push) -> Located:
