@@ -35,8 +35,8 @@ from push_predictor.design.information import Information
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.parameter_update import CORRELATION
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_requests

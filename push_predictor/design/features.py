@@ -27,11 +27,10 @@ import numpy as np
 import scipy
 
 from push_predictor.errors import RequestError
-from push_predictor.models.effects.exact import Mechanics, joint
+from push_predictor.models.effects.exact import joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameter_draws import displacements
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
@@ -39,6 +38,7 @@ from push_predictor.models.predictors import (
     Predictor,
     PriorPredictor,
 )
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.types import Array
 
@@ -119,7 +119,7 @@ def _of_parameters(fitted: FittedMechanics, push: Push) -> Array:
 def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:
     """Features (n, 3, q) in m, m, rad of the effects' uncertain coefficients."""
     completed = extended.completed(push)
-    designs = joint(Mechanics(extended.physics, extended.mechanics), extended.effects, completed).designs
+    designs = joint(extended.mechanics, extended.effects, completed).designs
     covariance = scipy.linalg.block_diag(*(effect.covariance for effect in extended.effects))
     begin = np.cumsum([0, *(len(effect.coefficients) for effect in extended.effects)])
     for (i, j), shared in extended.cross.items():

@@ -28,14 +28,11 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.convex import is_convex
+from push_predictor.geometry import boundary
 from push_predictor.geometry.frames import paired, rotate, to_body, to_world
 from push_predictor.types import Array, BoolArray, IntArray
 
 SMOOTH_TABLE = 8192  # chords that approximate the arc length of an ellipse: relative error 1e-8
-NEWTON_STEPS = 60  # enough for bisection alone
-PARAMETER_TOLERANCE = 1e-14  # rad
-ROUNDING = 1e-12  # m; a point this near to a corner has the normal of an edge, not the direction of a rounding error
 SAME_LENGTH = 1e-6  # m; tolerance of vertices and their images under a symmetry
 CENTRED = (0.0, 0.0, 0.0)  # pose of axes that are those of the body frame
 
@@ -169,47 +166,35 @@ class Outline:
 
     def project(self, points: Array) -> Projection:
         """Nearest boundary points of points (n, 2) in the body frame."""
-        points = np.atleast_2d(np.asarray(points, dtype=np.float64))
-        return self._project_smooth(points) if self.semi_axes is not None else self._project_polygon(points)
+        points = np.array(points, dtype=np.float64, ndmin=2, order="C")
+        found = np.empty((len(points), 8))
+        boundary.project(points, *self.boundary, found)
+        edge, share = found[:, 5].astype(np.int64), found[:, 6]
+        if self.semi_axes is not None:
+            return Projection(found[:, :2], found[:, 2:4], found[:, 4], found[:, 7] > 0.0, lambda: self._arc_at(share))
+        return Projection(
+            found[:, :2], found[:, 2:4], found[:, 4], found[:, 7] > 0.0, lambda: self.contact_on_edge(edge, share)
+        )
+
+    @cached_property
+    def boundary(self) -> tuple[Array, Array, Array]:
+        """The outline as the compiled functions take it, SI units: edges (V, 9), axes (5,), curve (2, m).
+
+        edges: x, y of the start, x, y along the edge, square of its length, outward normal x, y, contact at the start,
+        share of the perimeter. Of a smooth outline there are none: axes are its semi-axes, x, y and angle of its pose,
+        and curve has lengths along it and its parameters there.
+        """
+        if self.semi_axes is not None:
+            return np.zeros((0, 9)), np.array([*self.semi_axes, *self.pose]), np.stack([self._arc, self._table])
+        along, starts = self._ends - self.vertices, self.edge_starts
+        columns = [self.vertices, along, np.sum(along**2, axis=1), self._edge_normals, starts[:-1], np.diff(starts)]
+        return np.ascontiguousarray(np.column_stack(columns)), np.zeros(5), np.zeros((2, 1))
 
     # --- polygons -----------------------------------------------------------------------------------------------
 
     @cached_property
     def _ends(self) -> Array:
         return np.roll(self.vertices, -1, axis=0)
-
-    @cached_property
-    def _edges(self) -> tuple[Array, Array]:
-        """Edges (V, 2) as vectors in m, and their squared lengths (V,)."""
-        along = self._ends - self.vertices
-        return along, np.asarray(np.sum(along**2, axis=1))
-
-    @cached_property
-    def _edge_columns(self) -> tuple[Array, ...]:
-        """Columns (V, 1): x, y of the edges' first vertices, x, y along them, and their squared lengths."""
-        along, squared = self._edges
-        return tuple(column[:, None].copy() for column in (*self.vertices.T, *along.T, squared))
-
-    @cached_property
-    def is_convex(self) -> bool:
-        """Whether the vertices make a convex polygon without straight corners."""
-        return is_convex(self.vertices)
-
-    @cached_property
-    def edge_lines(self) -> Array:
-        """Of the edges (6, V): outward normal x, y and distance of the line from the origin in that direction; x, y and
-        constant of the share of the edge, from its first vertex on, at which a point's foot lies.
-        """
-        along, squared = self._edges
-        shares = along / squared[:, None]
-        of_normal, of_share = ((self.vertices * factors).sum(axis=1) for factors in (self._edge_normals, shares))
-        return np.stack([*self._edge_normals.T, of_normal, *shares.T, of_share])
-
-    @cached_property
-    def _shift_per_rise(self) -> Array:
-        """Of edges (V, 1), change of x per change of y; of level edges, which no level line crosses, any number."""
-        along, rise = self._edges[0].T[..., None]
-        return np.asarray(along / np.where(rise == 0.0, 1.0, rise))
 
     @cached_property
     def _edge_normals(self) -> Array:
@@ -230,54 +215,6 @@ class Outline:
         image = self.vertices @ turn.T
         return bool(np.allclose(image, np.roll(self.vertices, -(len(image) // order), axis=0), atol=SAME_LENGTH))
 
-    def _project_polygon(self, points: Array) -> Projection:
-        return self._project_convex(points) if self.is_convex else self._project_any(points)
-
-    def _project_convex(self, points: Array) -> Projection:
-        """On the edge whose line a point lies farthest outside; the nearest corner can only be one of its ends."""
-        (x, y), (normal_x, normal_y, offset, *_) = points.T, self.edge_lines[:, :, None]
-        edge = (x * normal_x + y * normal_y - offset).argmax(axis=0)
-        nx, ny, offset, share_x, share_y, first = self.edge_lines.take(edge, axis=1)
-        distance, share = x * nx + y * ny - offset, x * share_x + y * share_y - first
-        away_x, away_y = distance * nx, distance * ny
-        at_vertex = ((share <= 0.0) | (share >= 1.0)) & (distance > ROUNDING)
-        if at_vertex.any():
-            along_x, along_y = self._edges[0].T.take(edge, axis=1)
-            beyond = np.where(at_vertex, share - np.where(share < 0.5, 0.0, 1.0), 0.0)
-            away_x, away_y = away_x + beyond * along_x, away_y + beyond * along_y
-            distance = np.where(at_vertex, np.sqrt(away_x * away_x + away_y * away_y), distance)
-            divisor = np.where(at_vertex, distance, 1.0)
-            nx, ny = np.where(at_vertex, away_x / divisor, nx), np.where(at_vertex, away_y / divisor, ny)
-        nearest = paired(x - away_x, y - away_y)
-        return Projection(nearest, paired(nx, ny), distance, at_vertex, lambda: self.contact_on_edge(edge, share))
-
-    def _project_any(self, points: Array) -> Projection:
-        """Of any polygon: of the nearest points of its edges, the nearest."""
-        # By edge first and by coordinate: arrays of n numbers in a row, where those of two would be slow.
-        x0, y0, along_x, along_y, squared = self._edge_columns
-        offset_x, offset_y = points[:, 0] - x0, points[:, 1] - y0
-        fraction = (offset_x * along_x + offset_y * along_y) / squared
-        fraction = np.minimum(np.maximum(fraction, 0.0), 1.0)
-        away_x, away_y = offset_x - fraction * along_x, offset_y - fraction * along_y
-        distance = away_x * away_x + away_y * away_y
-        edge = distance.argmin(axis=0)
-        nearest = edge * len(points) + np.arange(len(points))  # flat: take is faster than indices of both axes
-        share, length = fraction.take(nearest), np.sqrt(distance.take(nearest))
-        away = paired(away_x.take(nearest), away_y.take(nearest))
-        inside = self._contains(offset_x, offset_y)
-        at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
-        radial = away / np.maximum(length, 1e-300)[:, None]
-        normal = np.where(at_vertex[:, None], radial, self._edge_normals.take(edge, axis=0))
-        distance = np.where(inside, -length, length)
-        return Projection(points - away, normal, distance, at_vertex, lambda: self.contact_on_edge(edge, share))
-
-    def _contains(self, offset_x: Array, offset_y: Array) -> BoolArray:
-        """Which of n points lie inside; offsets (V, n) of each from the vertices."""
-        below = offset_y < 0.0
-        crosses = below != np.concatenate([below[1:], below[:1]])
-        right_of = offset_x < offset_y * self._shift_per_rise
-        return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=0))
-
     # --- circles and ellipses -----------------------------------------------------------------------------------
 
     @cached_property
@@ -286,11 +223,6 @@ class Outline:
         x, y = self._in_axes(self.vertices[:1])[0]
         first = np.arctan2(y / b, x / a)
         return np.asarray(first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
-
-    @property
-    def curve_table(self) -> tuple[Array, Array]:
-        """Lengths along a smooth outline's curve in m, and the curve's parameters there, both increasing."""
-        return self._arc, self._table
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
@@ -310,37 +242,11 @@ class Outline:
     def _curve_parameter(self, contact: Array) -> Array:
         return np.asarray(np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table))
 
-    def _project_smooth(self, points: Array) -> Projection:
-        parameter = self._nearest_parameter(self._in_axes(points))
-        nearest, normal = self._curve(parameter), self._curve_normal(parameter)
-        distance = np.einsum("nj,nj->n", points - nearest, normal)
-        nowhere = np.zeros(len(points), dtype=np.bool_)
-        return Projection(nearest, normal, distance, nowhere, lambda: self._curve_contact(parameter))
-
-    def _curve_contact(self, parameter: Array) -> Array:
+    def _arc_at(self, parameter: Array) -> Array:
         """Contacts (n,) of the curve's parameters (n,)."""
         turned = self._table[0] + (parameter - self._table[0]) % (2.0 * np.pi)
         contact = np.interp(turned, self._table, self._arc) / self.perimeter
         return np.asarray(np.clip(contact, 0.0, np.nextafter(1.0, 0.0)))
-
-    def _nearest_parameter(self, points: Array) -> Array:
-        """Safeguarded Newton's method in the first quadrant, where the slope has a single root."""
-        a, b = self.semi_axes or (1.0, 1.0)
-        x, y = np.abs(points.T)
-        t, low, high = np.arctan2(a * y, b * x), np.zeros_like(x), np.full_like(x, np.pi / 2.0)
-        ax, by, skew = x * a, y * b, b * b - a * a
-        for _ in range(NEWTON_STEPS):  # stationarity of |curve(t) - point|^2
-            cos, sin = np.cos(t), np.sin(t)
-            slope = skew * cos * sin + ax * sin - by * cos
-            bend = skew * (cos * cos - sin * sin) + ax * cos + by * sin
-            falls, bends = slope > 0.0, bend > 0.0
-            low, high = np.where(falls, low, t), np.where(falls, t, high)
-            newton = t - slope / np.where(bends, bend, np.inf)
-            usable = bends & (newton >= low) & (newton <= high)
-            before, t = t, np.where(usable, newton, (low + high) / 2.0)
-            if np.all(np.abs(t - before) < PARAMETER_TOLERANCE):
-                break
-        return np.asarray(np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0])))
 
 
 def _signed_area(vertices: Array) -> float:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import UNITS
 from push_predictor.types import BoolArray
@@ -57,9 +57,8 @@ def _outside_covariates(model: PushModel, alone: Push) -> list[str]:
     """What is outside of the covariates of one push."""
     completed, found = model.predictor.completed(alone).covariates, []
     for name, known in model.covariate_ranges.items():
-        value = float(completed[name][0])
-        if not known.contains_one(value):
-            found.append(_outside(f"covariate {name}", name, value, str(known)))
+        if not known.contains(completed[name])[0]:
+            found.append(_outside(f"covariate {name}", name, float(completed[name][0]), str(known)))
     return found
 
 

@@ -28,9 +28,9 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import InputLimits, Moments, Predictor
+from push_predictor.models.push import Push
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_pushes
 from push_predictor.recordings.rig import Rig
@@ -164,18 +164,11 @@ class PushModel:
 
         Raises KeyError where one is missing.
         """
-        if not self.covariate_ranges:
-            return np.ones(len(push.inputs), dtype=np.bool_)
-        return self.in_covariate_ranges(self.predictor.completed(push).covariates, len(push.inputs))
-
-    def in_covariate_ranges(self, covariates: Mapping[str, Array], n: int) -> BoolArray:
-        """The same for n pushes with all covariates that the effects need."""
-        if n == 1:  # in plain numbers, several times as fast
-            alone = {name: float(covariates[name][0]) for name in self.covariate_ranges}
-            return np.array([all(known.contains_one(alone[name]) for name, known in self.covariate_ranges.items())])
-        seen = np.ones(n, dtype=np.bool_)
-        for name, known in self.covariate_ranges.items():
-            seen &= known.contains(covariates[name])
+        seen = np.ones(len(push.inputs), dtype=np.bool_)
+        if self.covariate_ranges:
+            covariates = self.predictor.completed(push).covariates
+            for name, known in self.covariate_ranges.items():
+                seen &= known.contains(covariates[name])
         return seen
 
     @cached_property

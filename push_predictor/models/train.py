@@ -26,12 +26,11 @@ from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import (
-    AnalyticalPredictor,
     GaussianProcessPredictor,
     MechanicsMean,
     MechanicsPredictor,
@@ -148,7 +147,7 @@ def _predictor(
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
     if options.fit:
         return _fitted(rows, rig, options, watch)
-    return _with_covariance(AnalyticalPush(rig.outline, rig.pusher_radius), rows), []
+    return predictor_about(analytical_mechanics(rig.outline, rig.pusher_radius), rows), []
 
 
 def _fitted(rows: PushTable, rig: Rig, options: TrainingOptions, watch: Watch) -> tuple[MechanicsPredictor, list[Rung]]:
@@ -178,12 +177,10 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor
-    if isinstance(predictor, MechanicsPredictor):
-        again = predictor_about(predictor.fitted, table)
-    elif isinstance(predictor, PriorPredictor):
+    if isinstance(predictor, PriorPredictor):
         again = sharpened(prior_predictor(predictor.fitted.mechanics, model.rig, seed), table, seed)
     else:
-        again = _with_covariance(predictor.physics, table)
+        again = predictor_about(predictor.mechanics, table)
     return PushModel(name, model.kind, model.rig, again, table, provenance)
 
 
@@ -220,9 +217,3 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
         push = table.push_id[row]
         turn[row] = taken[push] = taken.get(push, -1) + 1
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
-
-
-def _with_covariance(physics: AnalyticalPush, rows: PushTable) -> AnalyticalPredictor:
-    """The analytical predictor with the covariance of its residuals on these rows."""
-    residuals = rows.outcomes - physics.displacement(rows.inputs, rows.duration)
-    return AnalyticalPredictor(physics, residuals.T @ residuals / len(residuals))

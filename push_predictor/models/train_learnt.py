@@ -35,10 +35,10 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import candidates
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, Scaling
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
 from push_predictor.models.predictors.tails_fit import fit_tails
+from push_predictor.models.push import Push
 from push_predictor.models.train_mechanics import fit_rows
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable

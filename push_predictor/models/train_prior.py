@@ -54,7 +54,7 @@ def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPr
     mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
     push = np.unique(rows.push_id, return_inverse=True)[1]
     fit_rows = FitRows(rows.inputs, rows.duration, rows.outcomes, push, rows.covariates)
-    found = updated(mechanics, names, _values(before.fitted.values), fit_rows, before.physics.support.length)
+    found = updated(mechanics, names, _values(before.fitted.values), fit_rows, before.fitted.ellipsoid.length)
     values = dict(zip(names, found.values.tolist(), strict=True))
     draws = normal_draws(names, found.values, found.covariance, seed)
     return PriorPredictor(FittedMechanics(mechanics, values, found.covariance), draws, found.noise)

@@ -50,7 +50,7 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
     )
     watch("force", 0.6)
     known = analysis.take(question.inside)  # faster pushes need more force, and training does not show how much
-    forces = wrench_effects(known, model.training, question.evidence.physics, question.share("wrench"), seed)
+    forces = wrench_effects(known, model.training, question.evidence.mechanics, question.share("wrench"), seed)
     biased = None if motion.terms else _biased(forces, spread=bool(motion.variance))
     return Searched(measured, motion, forces, None if biased is None else _corrected(question, biased))
 

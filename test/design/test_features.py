@@ -31,7 +31,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,

@@ -41,7 +41,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_update import CORRELATION
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes

@@ -34,7 +34,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation

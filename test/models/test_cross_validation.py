@@ -28,7 +28,7 @@ from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable

@@ -40,7 +40,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
 from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push_model import KINDS, PushModel

@@ -32,7 +32,7 @@ from push_predictor.models.gaussian_process.regression import best_held_out, hel
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, MechanicsMean, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model

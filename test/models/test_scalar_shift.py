@@ -29,7 +29,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
 from push_predictor.types import Array
 

@@ -31,7 +31,7 @@ from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.predictors.tails import INTERVAL_KINDS, STEPS, Tails, half_widths, joint_radius

@@ -35,7 +35,7 @@ from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import ACCURACY, AnalyticalPush
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.train import train_model

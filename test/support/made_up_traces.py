@@ -28,7 +28,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import Mechanics, has_exact_effects, joint_shift
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable

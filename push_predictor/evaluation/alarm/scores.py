@@ -40,10 +40,10 @@ from push_predictor.evaluation.alarm.evidence import (
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.splits import push_folds
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
-from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanisms import LIBRARY, Mechanism
 from push_predictor.models.predictors import Moments
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -67,7 +67,7 @@ class Calibration:
     kinds: tuple[ScoreKind, ...]
     scores: Array
     mechanisms: tuple[Mechanism, ...]
-    physics: AnalyticalPush
+    mechanics: FittedMechanics
     window_correlation: Array
 
 
@@ -145,7 +145,7 @@ def calibrate(model: PushModel, watch: Watch = no_watch) -> Calibration:
         raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
     mean, covariance = held_out_moments(model, watch)
     mechanisms = tuple(mechanism for mechanism in LIBRARY if _computable(mechanism, table))
-    blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, model.base.predictor.physics, np.empty(0))
+    blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, model.base.predictor.mechanics, np.empty(0))
     rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
     parts = _parts(blank, table, mean, covariance)
     known = replace(blank, window_correlation=np.array([_window_correlation(*part, rows) for part in parts]))
@@ -188,17 +188,11 @@ def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, c
     Pushes are scored together, which takes little longer than for one. Pushes with long windows are scored one by one:
     the longest window sets the integration step, and a score must not depend on other pushes.
     """
-    far = windows.inputs[:, 0] * windows.duration > FEWEST_STEPS * LONGEST_STEP
-    alone = set(windows.push_id[far].tolist())
-    together = np.array([push not in alone for push in windows.push_id.tolist()], dtype=bool)
-    groups = [np.flatnonzero(together), *(np.flatnonzero(windows.push_id == push) for push in sorted(alone))]
     found: dict[str, Array] = {}
-    for rows in groups:
-        part = windows.take(rows)
-        parts = _parts(calibration, part, mean[rows], covariance[rows]) if len(rows) else []
-        for push in part.pushes:
-            own = part.push_id == push
-            found[push] = _scores(calibration, [(along[own], reach[own]) for along, reach in parts])
+    parts = _parts(calibration, windows, mean, covariance)
+    for push in windows.pushes:
+        own = windows.push_id == push
+        found[push] = _scores(calibration, [(along[own], reach[own]) for along, reach in parts])
     return found
 
 
@@ -223,7 +217,7 @@ def _parts(calibration: Calibration, table: PushTable, mean: Array, covariance: 
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     unknown = {name: np.full(len(z), np.nan) for m in calibration.mechanisms for name in m.needs}
     push = Push(table.inputs, table.duration, {**unknown, **table.covariates})
-    responses = [mechanism.response(calibration.physics, push) for mechanism in calibration.mechanisms]
+    responses = [mechanism.response(calibration.mechanics, push) for mechanism in calibration.mechanisms]
     columns = np.concatenate([generic, *(whitener @ response for response in responses)], axis=2)
     along, reach = np.einsum("nkp,nk->np", columns, z), np.linalg.norm(columns, axis=1)
     return [(size, np.ones(len(z))), *zip(along.T, reach.T, strict=True)]

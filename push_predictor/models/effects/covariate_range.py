@@ -18,13 +18,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.types import Array, BoolArray
-
-Numbers: TypeAlias = "float | Array"
 
 HEADINGS = ("slider_heading", "push_heading")  # they wrap around
 CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
@@ -43,17 +40,10 @@ class CovariateRange:
 
     def contains(self, values: Array) -> BoolArray:
         """Which of the values (n,) lie in the range."""
-        return np.asarray(self._within(values))
-
-    def contains_one(self, value: float) -> bool:
-        """Whether a value lies in the range."""
-        return bool(self._within(value))
-
-    def _within(self, values: Numbers) -> bool | BoolArray:
         least, most = self._ends
         if self.heading:
             values = least + (values - least) % TURN
-        return (values >= least) & (values <= most)
+        return np.asarray((values >= least) & (values <= most))
 
     @cached_property
     def _ends(self) -> tuple[float, float]:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import cos, log1p, sin
 
 import numpy as np
 
@@ -51,10 +50,6 @@ class DriverBasis:
         """The columns (n, m) of the basis at n pushes; a constant is one column of ones."""
         columns = [np.asarray(covariates[name], dtype=np.float64) for name in self.drivers]
         return BASES[self.name](self, columns, n)
-
-    def values_one(self, covariates: Mapping[str, float]) -> list[float]:
-        """The same for one push, in plain numbers."""
-        return _ONE[self.name](self, [covariates[name] for name in self.drivers])
 
 
 def _scaled(basis: DriverBasis, columns: list[Array]) -> list[Array]:
@@ -113,33 +108,6 @@ BASES: dict[str, Callable[[DriverBasis, list[Array], int], Array]] = {
     "periodic, twice around": _periodic_twice,
     "category": _category,
     "map": _map,
-}
-
-
-def _scaled_one(basis: DriverBasis, values: list[float]) -> list[float]:
-    return [(value - c) / s for value, c, s in zip(values, basis.centre, basis.scale, strict=True)]
-
-
-def _quadratic_one(basis: DriverBasis, values: list[float]) -> list[float]:
-    x = _scaled_one(basis, values)[0]
-    return [x, x * x]
-
-
-def _map_one(basis: DriverBasis, values: list[float]) -> list[float]:
-    x, y = _scaled_one(basis, values)
-    return [x, y, x * y, x * x, y * y]
-
-
-_ONE: dict[str, Callable[[DriverBasis, list[float]], list[float]]] = {
-    "constant": lambda basis, values: [1.0],
-    "linear": _scaled_one,
-    "logarithmic": lambda basis, values: [log1p(max((values[0] - basis.place) / basis.scale[0], 0.0))],
-    "quadratic": _quadratic_one,
-    "step": lambda basis, values: [float(values[0] >= basis.place)],
-    "periodic": lambda basis, values: [cos(values[0]), sin(values[0])],
-    "periodic, twice around": lambda basis, values: [cos(2.0 * values[0]), sin(2.0 * values[0])],
-    "category": lambda basis, values: [float(values[0] == level) for level in basis.levels[1:]],
-    "map": _map_one,
 }
 
 

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Push
-from push_predictor.models.mechanisms.mechanism import Mechanism
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanisms import mechanism_named
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 GENERIC_TERMS = 6  # of the polynomial, for each output
@@ -31,12 +31,12 @@ GENERIC_TERMS = 6  # of the polynomial, for each output
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Shift of the mean: sum over parameters p and columns m of the basis, response_p x basis_m x coefficient_pm.
+    """What an effect changes: sum over parameters p and columns m of the basis, parameter_p x basis_m x coefficient_pm.
 
     mechanism: of LIBRARY or REFINEMENTS, or None for the generic one. coefficients (p * m,), p first; covariance of
-    them (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path).
-    exact: the sum over the columns changes parameters of the mechanics, and the shift is what that changes (see
-    exact.py); otherwise the shift is linear in the coefficients, as effects of older model files are.
+    them (p * m, p * m). A mechanism's sum over the columns changes parameters of the mechanics, and the mean shifts by
+    what that changes (exact.py). The generic effect has no mechanics: the shift is linear in its coefficients, with the
+    responses of `generic_responses`; outcome_scale (3,): their unit (m, m, rad per metre of the tip's path).
     """
 
     mechanism: str | None
@@ -45,7 +45,16 @@ class Effect:
     coefficients: Array
     covariance: Array
     outcome_scale: Array
-    exact: bool = False
+
+    @property
+    def exact(self) -> bool:
+        """Whether it changes parameters of the mechanics."""
+        return self.mechanism is not None
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the parameters of the mechanics that it changes."""
+        return () if self.mechanism is None else mechanism_named(self.mechanism).quantities
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -53,29 +62,24 @@ class Effect:
         own = () if self.mechanism is None else mechanism_named(self.mechanism).needs
         return tuple(dict.fromkeys([*self.basis.drivers, *own]))
 
-    def design(self, physics: AnalyticalPush, push: Push) -> Array:
-        """The design matrices (n, 3, p * m) of a linear effect: shift = design @ coefficients."""
-        return design_of(self.mechanism, self.basis, physics, push, self.outcome_scale)
-
-    def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
-        """Shift of the mean (n, 3) by a linear effect, and its covariance (n, 3, 3)."""
-        design = self.design(physics, push)
-        return design @ self.coefficients, design @ self.covariance @ np.transpose(design, (0, 2, 1))
+    def design(self, mechanics: FittedMechanics, push: Push) -> Array:
+        """The design matrices (n, 3, p * m) of a generic effect: shift = design @ coefficients."""
+        return design_of(self.mechanism, self.basis, mechanics, push, self.outcome_scale)
 
 
 def design_of(
-    mechanism: str | None, basis: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
+    mechanism: str | None, basis: DriverBasis, mechanics: FittedMechanics, push: Push, outcome_scale: Array
 ) -> Array:
     """The design matrices (n, 3, p * m) of an effect: products of responses and basis columns."""
-    responses = responses_of(mechanism, physics, push, outcome_scale)
+    responses = responses_of(mechanism, mechanics, push, outcome_scale)
     return products(responses, basis.values(push.covariates, len(push.inputs)))
 
 
-def responses_of(mechanism: str | None, physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+def responses_of(mechanism: str | None, mechanics: FittedMechanics, push: Push, outcome_scale: Array) -> Array:
     """Derivatives (n, 3, p) of the outcome by the parameters of a mechanism."""
     if mechanism is None:
-        return generic_responses(physics, push, outcome_scale)
-    return mechanism_named(mechanism).response(physics, push)
+        return generic_responses(mechanics, push, outcome_scale)
+    return mechanism_named(mechanism).response(mechanics, push)
 
 
 def products(responses: Array, values: Array) -> Array:
@@ -83,14 +87,14 @@ def products(responses: Array, values: Array) -> Array:
     return np.asarray((responses[:, :, :, None] * values[:, None, None, :]).reshape(len(responses), 3, -1))
 
 
-def generic_responses(physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+def generic_responses(mechanics: FittedMechanics, push: Push, outcome_scale: Array) -> Array:
     """A low-order polynomial of contact and angle for each output (n, 3, 3 * 6), per metre of the tip's path.
 
     outcome_scale (3,): the unit, m, m and rad per metre. The contact enters by the lever arm of its normal force about
     the centre of friction, as a fraction of the limit surface's length, so that an outline's symmetries are folded.
     """
     path_length = push.inputs[:, 0] * push.duration
-    basis = path_length[:, None] * _polynomial(physics, push.inputs)
+    basis = path_length[:, None] * _polynomial(mechanics, push.inputs)
     n, m = basis.shape
     responses = np.zeros((n, 3, 3 * m))
     for k in range(3):
@@ -98,19 +102,14 @@ def generic_responses(physics: AnalyticalPush, push: Push, outcome_scale: Array)
     return responses
 
 
-def _polynomial(physics: AnalyticalPush, inputs: Array) -> Array:
+def _polynomial(mechanics: FittedMechanics, inputs: Array) -> Array:
     _, contact, angle = inputs.T
-    normal = physics.outline.inward_normal(contact)
-    arm = physics.outline.point(contact) - np.asarray(physics.support.centre)
-    lever = (arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]) / physics.support.length
+    surface, normal = mechanics.ellipsoid, mechanics.outline.inward_normal(contact)
+    arm = mechanics.outline.point(contact) - surface.centre
+    lever = (arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]) / surface.length
     return np.column_stack([np.ones_like(angle), lever, angle, lever * angle, lever**2, angle**2])
 
 
 def generic_width() -> int:
     """Number of responses of the generic mechanism."""
     return 3 * GENERIC_TERMS
-
-
-def mechanism_named(name: str) -> Mechanism:
-    """The mechanism of that name. Raises KeyError if there is none."""
-    return {mechanism.name: mechanism for mechanism in (*LIBRARY, *REFINEMENTS)}[name]

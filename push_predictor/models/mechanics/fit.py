@@ -34,8 +34,6 @@ NEARLY_CONVERGED = 0.5  # the same while parameters are chosen
 LONG_STEP = 0.5  # prior standard deviations
 DIFFERENCE = 0.05  # prior standard deviations
 SHORTENINGS = 6
-ROWS_AT_ONCE = 20000  # of the forward model, which takes little longer for ten times as many rows
-SLOW = ("inertia", "pushing_height")  # with them the forward model takes much longer: not together with others
 
 
 class Displacing(Protocol):
@@ -237,26 +235,11 @@ class _Problem:
         derivatives = np.zeros((*residuals.shape, len(self.names)))
         step = DIFFERENCE * self.spread
         step = np.where(values + step > self.high, -step, step)
-        most = max(1, ROWS_AT_ONCE // len(residuals))
-        for alone in (None, *SLOW):
-            group = [k for k in wanted if (self.names[k] if self.names[k] in SLOW else None) == alone]
-            for first in range(0, len(group), most):
-                part = group[first : first + most]
-                derivatives[:, :, part] = (residuals[:, :, None] - self._moved(values, step, part)) / step[part]
+        for k in wanted:
+            moved = values.copy()
+            moved[k] += step[k]
+            derivatives[:, :, k] = (residuals - self.residuals(moved)) / step[k]
         return derivatives[:, :, wanted]
-
-    def _moved(self, values: Array, step: Array, moved: Sequence[int]) -> Array:
-        """Residuals (n, 3, k) with one of the k parameters moved at a time, computed as one set of pushes."""
-        rows, n, count = self.rows, len(self.rows.duration), len(moved)
-        given: dict[str, float | Array] = dict(zip(self.names, values.tolist(), strict=True))
-        for turn, k in enumerate(moved):
-            column = np.full(n * count, values[k])
-            column[turn * n : (turn + 1) * n] += step[k]
-            given[self.names[k]] = column
-        inputs, duration = np.tile(rows.inputs, (count, 1)), np.tile(rows.duration, count)
-        covariates = {name: np.tile(column, count) for name, column in rows.covariates.items()}
-        found = self.mechanics.displacement(given, inputs, duration, covariates).reshape(count, n, 3)
-        return np.moveaxis(rows.outcomes - found, 0, 2)
 
     def solved(self, values: Array, residuals: Array, jacobian: Array | None, enough: float = CONVERGED) -> JointFit:
         """The fit from a start: steps are taken until one with derivatives of this point gains less than `enough`."""

@@ -16,22 +16,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.limit_surface import Support
+from push_predictor.errors import RigError
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.mechanics.forward import COLUMN, RECORDING, TEXTBOOK, PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.pressure import patch
+from push_predictor.models.mechanics.pressure import PressureDistribution, patch
+from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
-NO_CHANGES: Mapping[str, Array] = MappingProxyType({})
-ACCURACY_OF_SHIFT = 1e-3  # relative; of a shift it is 0.2 %, six times as fast as with the model's own accuracy
-RECORDING = "recording"  # the covariate that numbers recordings with different supports
+Changes = Mapping[str, Array]  # by name of a parameter: what is added to its value at each push, (n,)
+
+NO_CHANGES: Changes = MappingProxyType({})
+# Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
+DIFFERENCE = 0.5
+TEXTBOOK_FRICTION = 0.3
+ANALYTICAL_ACCURACY = 1e-4  # of a displacement, relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,43 +59,117 @@ class FittedMechanics:
         names += [need for name in self.values for need in BY_NAME[name].needs]
         return tuple(dict.fromkeys(names))
 
-    def displacement(
-        self,
-        inputs: Array,
-        duration: Array,
-        covariates: Mapping[str, Array] | None = None,
-        changes: Mapping[str, Array] = NO_CHANGES,
-    ) -> Array:
-        """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement.
+    @property
+    def outline(self) -> Outline:
+        """Of the slider."""
+        return self.mechanics.outline
 
-        changes: by name of a parameter, what is added to its value at each push (n,).
+    def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
+        """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
+        return self.mechanics.displaced(self._row, inputs, duration, covariates)
+
+    def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
+        """Displacements (k, n, 3) with each of k sets of changes of parameters, computed as one set of pushes.
+
+        The heading of a push follows from that of the slider where it is given.
         """
-        changed = {name: self.value(name) + change for name, change in changes.items()}
-        return self.mechanics.displacement({**self.values, **changed}, inputs, duration, covariates)
+        k, n = len(tried), len(push.inputs)
+        values = np.empty((k, n, len(TEXTBOOK)))
+        values[:] = self._row
+        for own, changes in zip(values, tried, strict=True):
+            for name, change in changes.items():
+                own[:, COLUMN[name]] += change
+        given = self._covariates(push, tried)
+        if k > 1:
+            given = {name: np.tile(column, k) for name, column in given.items()}
+        inputs = np.broadcast_to(push.inputs, (k, n, 3)).reshape(-1, 3)
+        duration = np.broadcast_to(push.duration, (k, n)).reshape(-1)
+        return self.mechanics.displaced(values.reshape(k * n, -1), inputs, duration, given).reshape(k, n, 3)
+
+    def slopes(self, changes: Changes, push: Push) -> dict[str, Array]:
+        """Derivatives (n, 3) of the displacement under changes, by each parameter that changes, by differences."""
+        steps, tried = {name: ends_of(name, self.value(name), change) for name, change in changes.items()}, []
+        for name, ends in steps.items():
+            tried += [{**changes, name: end} for end in ends]
+        if not tried:
+            return {}
+        moved = self.displacements(tried, push)
+        return slopes_between(steps, moved)
 
     def value(self, name: str) -> float:
         """The value of a parameter: the fitted one, or the textbook's."""
         return self.values.get(name, BY_NAME[name].textbook)
 
-    def ellipsoid(self) -> AnalyticalPush:
-        """The ellipsoidal model with the same contact friction, and the length and centre of the pressure.
+    @cached_property
+    def ellipsoid(self) -> PowerSurface:
+        """The ellipsoidal limit surface with the length and centre of the pressure.
 
-        Of recordings with different supports it takes the mean. Responses of effects are computed from it.
+        Of recordings with different supports it takes the mean.
         """
         mechanics = self.mechanics
         supports = [mechanics.support] if mechanics.support is not None else list(mechanics.supports.values())
         supports = supports or [patch(mechanics.outline, self.value("rim_exponent"))]
-        x, y = np.mean([support.centre for support in supports], axis=0)
-        length = float(np.mean([support.length for support in supports]))
-        centre = float(x) + self.value("centre_x"), float(y) + self.value("centre_y")
-        friction = self.value("contact_friction")
-        return AnalyticalPush(mechanics.outline, mechanics.pusher_radius, friction, Support(centre, length))
+        centre = np.mean([support.centre for support in supports], axis=0)
+        shift = np.array([self.value("centre_x"), self.value("centre_y")])
+        return PowerSurface(centre + shift, float(np.mean([support.length for support in supports])))
+
+    @cached_property
+    def _row(self) -> Array:
+        row = TEXTBOOK.copy()
+        for name, value in self.values.items():
+            row[COLUMN[name]] = value
+        return row[None]
+
+    def _covariates(self, push: Push, tried: Sequence[Changes]) -> dict[str, Array]:
+        """What the mechanics need of the covariates of pushes."""
+        given = push.covariates
+        used = {RECORDING: given[RECORDING]} if self.mechanics.supports and RECORDING in given else {}
+        names = {name for changes in tried for name in changes}
+        if any(BY_NAME[name].needs for name in (*names, *self.values)):
+            used["push_heading"] = self._heading(push)
+        return used
+
+    def _heading(self, push: Push) -> Array:
+        if "slider_heading" not in push.covariates:
+            return push.covariates["push_heading"]
+        normal = self.outline.inward_normal(push.inputs[:, 1])
+        return np.asarray(
+            push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+        )
 
 
-def mechanics_of(physics: AnalyticalPush) -> FittedMechanics:
-    """The analytical model as mechanics with one parameter, for what changes of parameters shift.
+def ends_of(name: str, value: float, change: Array) -> tuple[Array, Array]:
+    """Changes (n,) of a parameter below and above, between which a derivative is taken.
 
-    A shift is a difference of displacements, whose errors are alike: it needs less accuracy than a displacement.
+    No coefficient of friction and no inertia is below zero.
     """
-    mechanics = replace(physics.mechanics, accuracy=ACCURACY_OF_SHIFT)
-    return FittedMechanics(mechanics, {"contact_friction": physics.contact_friction}, np.zeros((1, 1)))
+    step = DIFFERENCE * BY_NAME[name].spread
+    least = -value if BY_NAME[name].low == 0.0 else -np.inf
+    return np.maximum(change - step, np.minimum(least, change)), change + step
+
+
+def slopes_between(ends: Mapping[str, tuple[Array, Array]], moved: Array) -> dict[str, Array]:
+    """Derivatives (n, 3) by q parameters, from displacements (2 q, n, 3) at both ends of each."""
+    return {
+        name: (moved[2 * k + 1] - moved[2 * k]) / (high - low)[:, None]
+        for k, (name, (low, high)) in enumerate(ends.items())
+    }
+
+
+def analytical_mechanics(
+    outline: Outline,
+    pusher_radius: float,
+    contact_friction: float = TEXTBOOK_FRICTION,
+    surface: PowerSurface | PressureDistribution | None = None,
+) -> FittedMechanics:
+    """The model of Lynch, Maekawa and Tanie 1992: quasi-static pushing on the ellipsoid of uniform pressure.
+
+    pusher_radius in m; surface: another limit surface. Raises RigError for a radius or a friction that is not a finite
+    number >= 0.
+    """
+    for name, value in (("pusher_radius", pusher_radius), ("contact_friction", contact_friction)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise RigError(f"{name}: {value!r} is not accepted, give a finite number >= 0")
+    surface = uniform_ellipsoid(outline) if surface is None else surface
+    mechanics = PushMechanics(outline, pusher_radius, surface, accuracy=ANALYTICAL_ACCURACY)
+    return FittedMechanics(mechanics, {"contact_friction": contact_friction}, np.zeros((1, 1)))

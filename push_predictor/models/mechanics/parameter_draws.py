@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import scipy
 
-from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.types import Array
 
@@ -39,7 +39,6 @@ MIRRORED = (
 # Through the speed: they matter beyond quasi-static pushing, and without them only the distance travelled counts. The
 # height of a push shifts the pressure, as centre_x and centre_y do; the rim exponent spreads it.
 NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height", "pressure_spread")
-ROWS_AT_ONCE = 20_000
 
 
 def drawn_parameters(known_support: bool) -> tuple[str, ...]:
@@ -83,18 +82,14 @@ def displacements(
 
     inputs (n, 3), duration (n,) s, covariates as in PushMechanics.displacement.
     """
-    k, step = len(draws), max(1, ROWS_AT_ONCE // len(draws))
-    parts = [np.empty((0, k, 3))]
-    for start in range(0, len(inputs), step):
-        part = slice(start, start + step)
-        count = len(inputs[part])
-        values = {name: np.tile(column, count) for name, column in zip(names, draws.T, strict=True)}
-        repeated = {name: np.repeat(column[part], k) for name, column in covariates.items()}
-        moved = mechanics.displacement(
-            values, np.repeat(inputs[part], k, axis=0), np.repeat(duration[part], k), repeated
-        )
-        parts.append(moved.reshape(-1, k, 3))
-    return np.concatenate(parts)
+    n, k = len(inputs), len(draws)
+    values = np.tile(TEXTBOOK, (n, k, 1))
+    values[:, :, [COLUMN[name] for name in names]] = draws
+    repeated = {name: np.repeat(column, k) for name, column in covariates.items()}
+    moved = mechanics.displaced(
+        values.reshape(n * k, -1), np.repeat(inputs, k, axis=0), np.repeat(duration, k), repeated
+    )
+    return moved.reshape(n, k, 3)
 
 
 def _sobol(dimensions: int, count: int, seed: int) -> Array:

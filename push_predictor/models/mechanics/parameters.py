@@ -20,8 +20,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-
 from push_predictor.types import Array
 
 # Values by name: a number, or one per push (n,). A name that is missing has its textbook value.
@@ -132,33 +130,6 @@ PARAMETERS: tuple[MechanicsParameter, ...] = (
     ),
 )
 BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
-
-
-class RowValues:
-    """Values of the parameters of n pushes, and their covariates. Raises KeyError for a name that is no parameter."""
-
-    def __init__(self, values: ParameterValues, n: int, covariates: Mapping[str, Array]) -> None:
-        unknown = set(values) - set(BY_NAME)
-        if unknown:
-            raise KeyError(f"{sorted(unknown)[0]!r} is no parameter of the mechanics: {', '.join(BY_NAME)}")
-        self.n, self.covariates, self._values = n, covariates, values
-        self._active = {name for name, value in values.items() if np.any(np.asarray(value) != 0.0)}
-        self._rows: dict[str, Array] = {}  # asked for at every step of an integration
-
-    def of(self, name: str) -> Array:
-        """(n,) of a parameter."""
-        if name not in self._rows:
-            value = np.asarray(self._values.get(name, BY_NAME[name].textbook), dtype=np.float64)
-            self._rows[name] = np.broadcast_to(value, self.n)
-        return self._rows[name]
-
-    def active(self, *names: str) -> bool:
-        """Whether any of these differs from zero."""
-        return not self._active.isdisjoint(names)
-
-    def pair(self, first: str, second: str) -> Array:
-        """(n, 2) of two parameters."""
-        return np.column_stack([self.of(first), self.of(second)])
 
 
 def parameter_table() -> str:

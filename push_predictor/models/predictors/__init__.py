@@ -20,7 +20,6 @@ mechanics, mechanisms and effects.
 
 from __future__ import annotations
 
-from push_predictor.models.predictors.analytical_predictor import AnalyticalPredictor
 from push_predictor.models.predictors.extended_predictor import ExtendedPredictor
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean
@@ -31,7 +30,6 @@ from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
 
 __all__ = [
-    "AnalyticalPredictor",
     "BasePredictor",
     "Cross",
     "ExtendedPredictor",

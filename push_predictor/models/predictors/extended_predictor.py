@@ -21,17 +21,13 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.coefficients import Coefficients, coefficients_of
+from push_predictor.models.effects.covariance import covariance_of
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import Mechanics, joint
-from push_predictor.models.effects.scalar_shift import ScalarShift
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
+from push_predictor.models.effects.exact import joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.scalar.mechanics import ScalarMechanics, scalar_mechanics
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.tails import Tails
+from push_predictor.models.push import Push
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 
@@ -43,24 +39,20 @@ GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so th
 class ExtendedPredictor:
     """A base with effects: each shifts the mean and adds its own uncertainty to the covariance.
 
-    physics: the analytical model from which the responses of linear effects are computed. scale (3,): factor on the
-    base's standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see Predictor; pairs that it
-    lacks are independent. Without it, two effects with correlated covariates would seem far less certain than their sum
-    is.
-    of_effects: the mechanics whose parameters exact effects change; None for those of the base.
+    scale (3,): factor on the base's standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see
+    Predictor; pairs that it lacks are independent. Without it, two effects with correlated covariates would seem far
+    less certain than their sum is.
     """
 
     base: BasePredictor
-    physics: AnalyticalPush
     effects: tuple[Effect, ...]
     scale: Array
     cross: Cross = field(default_factory=dict)
-    of_effects: FittedMechanics | None = None
 
     @property
     def mechanics(self) -> FittedMechanics:
         """See Predictor."""
-        return self.of_effects or self.base.mechanics
+        return self.base.mechanics
 
     @property
     def learnt(self) -> bool:
@@ -104,7 +96,7 @@ class ExtendedPredictor:
             return push
         given = dict(zip(INPUTS, push.inputs.T, strict=True))
         if SIDE in self._of_inputs:
-            given[SIDE] = self.physics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
+            given[SIDE] = self.mechanics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
         own = {name: given[name] for name in self._of_inputs}
         return replace(push, covariates={**push.covariates, **own})
 
@@ -132,23 +124,14 @@ class ExtendedPredictor:
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
-        if len(push.inputs) == 1 and self._single is not None and (alone := self._single.shift(push)) is not None:
-            return Shift(*alone)
-        together = joint(Mechanics(self.physics, self.mechanics), self.effects, push)
+        together = joint(self.mechanics, self.effects, push)
         design = np.concatenate(together.designs, axis=2)
-        return Shift(together.shift, design @ self.coefficients.covariance @ design.transpose(0, 2, 1))
+        return Shift(together.shift, design @ self._covariance @ design.transpose(0, 2, 1))
 
     @cached_property
-    def coefficients(self) -> Coefficients:
-        """All coefficients of the effects; there must be one."""
-        return coefficients_of(self.effects, self.cross)
-
-    @cached_property
-    def _single(self) -> ScalarShift | None:
-        """The effects of single pushes in plain numbers; None where they, or the mechanics, have no such form."""
-        if not isinstance(self.of_effects, ScalarMechanics) or not all(effect.exact for effect in self.effects):
-            return None
-        return ScalarShift(self.effects, self.coefficients, self.of_effects)
+    def _covariance(self) -> Array:
+        """Of the coefficients of all effects."""
+        return covariance_of(self.effects, self.cross)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""
@@ -163,12 +146,3 @@ class ExtendedPredictor:
     def with_independent_outputs(self) -> Predictor:
         """See Predictor."""
         return replace(self, base=self.base.with_independent_outputs())
-
-    def with_scalar_mechanics(self) -> Predictor:
-        """See Predictor."""
-        return replace(
-            self,
-            physics=scalar_analytical(self.physics),
-            base=self.base.with_scalar_mechanics(),
-            of_effects=scalar_mechanics(self.mechanics),
-        )

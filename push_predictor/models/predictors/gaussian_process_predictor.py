@@ -28,16 +28,14 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
-from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
+from push_predictor.models.push import Push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, IntArray
 
@@ -80,16 +78,11 @@ class GaussianProcessPredictor(WithoutEffects):
         return self.mean is not None
 
     @cached_property
-    def physics(self) -> AnalyticalPush:
-        """See Predictor: the ellipsoidal model nearest to the mean, or the textbook's."""
-        if self.mean is not None:
-            return self.mean.fitted.ellipsoid()
-        return AnalyticalPush(self.rig.outline, self.rig.pusher_radius)
-
-    @cached_property
     def mechanics(self) -> FittedMechanics:
         """See Predictor: the mean, or the textbook's analytical model."""
-        return self.mean.fitted if self.mean is not None else mechanics_of(self.physics)
+        if self.mean is not None:
+            return self.mean.fitted
+        return analytical_mechanics(self.rig.outline, self.rig.pusher_radius)
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -192,12 +185,6 @@ class GaussianProcessPredictor(WithoutEffects):
     def with_independent_outputs(self) -> GaussianProcessPredictor:
         """See Predictor."""
         return replace(self, correlation=None)
-
-    def with_scalar_mechanics(self) -> GaussianProcessPredictor:
-        """See Predictor."""
-        if self.mean is None:
-            return self
-        return replace(self, mean=replace(self.mean, fitted=scalar_mechanics(self.mean.fitted)))
 
     def _units(self, push: Push) -> Array:
         """Standard deviations of what was learnt, in units of the outcomes, (3,) or (n, 3)."""

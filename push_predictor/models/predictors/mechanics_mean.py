@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 

@@ -12,30 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The predictor of fitted mechanics: the exact forward model with one covariance for all pushes."""
+"""The predictor of mechanics, textbook's or fitted: the forward model with one covariance for all pushes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
-from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.of_mechanics import OfFittedMechanics, with_one_covariance
+from push_predictor.models.predictors.of_mechanics import OfMechanics
 from push_predictor.models.predictors.predictor import Moments
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 
 @dataclass(frozen=True, eq=False)
-class MechanicsPredictor(OfFittedMechanics):
-    """Mechanics with fitted parameters; covariance (3, 3) of the outcomes about it."""
+class MechanicsPredictor(OfMechanics):
+    """Mechanics with their parameters; covariance (3, 3) of the outcomes about it."""
 
     covariance: Array
 
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
-        return with_one_covariance(mean, self.covariance)
-
-    def with_scalar_mechanics(self) -> MechanicsPredictor:
-        """See Predictor."""
-        return replace(self, fitted=scalar_mechanics(self.fitted))
+        of_all = self.covariance[None].repeat(len(mean), axis=0)
+        return Moments(mean, of_all, of_all.copy())

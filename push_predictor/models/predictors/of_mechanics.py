@@ -18,22 +18,38 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TypeVar
 
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
+from push_predictor.models.push import Push
 from push_predictor.types import Array, IntArray
 
 Self = TypeVar("Self")
 
 
+@dataclass(frozen=True, eq=False)
 class OfMechanics(WithoutEffects, ABC):
     """A predictor without a learnt function of its inputs, whose predictive is taken for a Gaussian."""
+
+    fitted: FittedMechanics
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return self.fitted
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor."""
+        return self.fitted.needs
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor: those that the parameters depend on."""
+        return self.fitted.needs
 
     @property
     def learnt(self) -> bool:
@@ -79,36 +95,3 @@ class OfMechanics(WithoutEffects, ABC):
     def with_independent_outputs(self: Self) -> Self:
         """See Predictor: itself."""
         return self
-
-
-def with_one_covariance(mean: Array, covariance: Array) -> Moments:
-    """Moments with means (n, 3) and the same covariance (3, 3) for all, of the outcome and of the process."""
-    of_all = covariance[None].repeat(len(mean), axis=0)
-    return Moments(mean, of_all, of_all.copy())
-
-
-@dataclass(frozen=True, eq=False)
-class OfFittedMechanics(OfMechanics):
-    """A predictor by mechanics with fitted parameters."""
-
-    fitted: FittedMechanics
-
-    @cached_property
-    def physics(self) -> AnalyticalPush:
-        """See Predictor: the nearest ellipsoidal model."""
-        return self.fitted.ellipsoid()
-
-    @property
-    def mechanics(self) -> FittedMechanics:
-        """See Predictor."""
-        return self.fitted
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See Predictor."""
-        return self.fitted.needs
-
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """See Predictor: those that the parameters depend on."""
-        return self.fitted.needs

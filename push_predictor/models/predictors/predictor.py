@@ -22,10 +22,9 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.tails import Tails
+from push_predictor.models.push import Push
 from push_predictor.types import Array, BoolArray, IntArray
 
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
@@ -75,12 +74,8 @@ class Predictor(Protocol):
         """For effects i < j that were estimated jointly: the covariance (coefficients of i, coefficients of j)."""
 
     @property
-    def physics(self) -> AnalyticalPush:
-        """Mechanics from which the responses of effects are computed: its own, or the textbook's if learnt."""
-
-    @property
     def mechanics(self) -> FittedMechanics:
-        """Mechanics whose parameters exact effects change: its own, or the textbook's if it has none."""
+        """Mechanics whose parameters effects change: its own, or the textbook's if it has none."""
 
     @property
     def learnt(self) -> bool:
@@ -137,9 +132,6 @@ class Predictor(Protocol):
     def with_independent_outputs(self) -> Predictor:
         """The same predictor without the correlation of its outputs; an analytical base keeps its covariance."""
 
-    def with_scalar_mechanics(self) -> Predictor:
-        """The same predictor, faster for single pushes: it computes their mechanics in plain numbers."""
-
 
 class BasePredictor(Predictor, Protocol):
     """A predictor without effects, which effects can extend."""
@@ -154,5 +146,5 @@ class BasePredictor(Predictor, Protocol):
     def with_independent_outputs(self) -> BasePredictor:
         """See Predictor."""
 
-    def with_scalar_mechanics(self) -> BasePredictor:
-        """See Predictor."""
+    def about_mean(self, learnt: Moments, push: Push) -> Moments:
+        """Moments of the outcomes from those of what was learnt, which a table may contain."""

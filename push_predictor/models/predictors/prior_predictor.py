@@ -22,13 +22,12 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.mechanics.fitted import RECORDING
-from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.forward import RECORDING, PushMechanics
 from push_predictor.models.mechanics.parameter_draws import displacements
 from push_predictor.models.mechanics.process_noise import ProcessNoise
-from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.of_mechanics import OfFittedMechanics
+from push_predictor.models.predictors.of_mechanics import OfMechanics
 from push_predictor.models.predictors.predictor import InputLimits, Moments
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 ACCURACY = 0.01  # of a draw's displacement: moves means by less than 0.3 % of a standard deviation, in half the time
@@ -37,7 +36,7 @@ STEEPEST = 1.4  # rad: in a grazing push the tip soon leaves the slider, or miss
 
 
 @dataclass(frozen=True, eq=False)
-class PriorPredictor(OfFittedMechanics):
+class PriorPredictor(OfMechanics):
     """The moments of the mechanics' answers under draws of their parameters, and process noise.
 
     fitted: the most probable parameters. draws (k, p): of these, in the order of `fitted.values`. All of them are known
@@ -70,10 +69,6 @@ class PriorPredictor(OfFittedMechanics):
         """Covariance (n, 3, 3) of the process noise."""
         return self._noise(self._displacements(self._around, push), push)
 
-    def with_scalar_mechanics(self) -> PriorPredictor:
-        """See Predictor: itself."""
-        return self
-
     @cached_property
     def _mechanics(self) -> PushMechanics:
         return replace(self.fitted.mechanics, accuracy=ACCURACY)
@@ -90,7 +85,7 @@ class PriorPredictor(OfFittedMechanics):
     def _noise(self, around: Array, push: Push) -> Array:
         """Process covariance (n, 3, 3) from displacements (n, 7, 3) under the parameters of `_around`."""
         travel = push.inputs[:, 0] * push.duration
-        return self.noise.covariance(around, travel, np.full(len(travel), self.physics.support.length))
+        return self.noise.covariance(around, travel, np.full(len(travel), self.fitted.ellipsoid.length))
 
     def _displacements(self, values: Array, push: Push) -> Array:
         """Displacements (n, k, 3) of n pushes under k rows (k, p) of parameters."""

@@ -21,8 +21,8 @@ from typing import TypeVar
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
+from push_predictor.models.push import Push
 
 Self = TypeVar("Self")
 
@@ -67,6 +67,10 @@ class WithoutEffects:
     def with_effects(self, moments: Moments, push: Push) -> Moments:
         """See Predictor."""
         return moments
+
+    def about_mean(self, learnt: Moments, push: Push) -> Moments:
+        """See BasePredictor."""
+        return learnt
 
     def shift(self, push: Push) -> Shift:
         """See Predictor: zero."""

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, generic_width, mechanism_named
-from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
+from push_predictor.models.effects.effect import Effect, generic_width
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.models.predictors import Cross
 from push_predictor.types import Array
 
@@ -91,7 +91,6 @@ def _record(effect: Effect) -> dict[str, Any]:
         "form": {key: list(value) if isinstance(value, tuple) else value for key, value in vars(effect.basis).items()},
         "coefficients": effect.coefficients.tolist(),
         "outcome_scale": effect.outcome_scale.tolist(),
-        **({"exact": True} if effect.exact else {}),
     }
 
 
@@ -106,11 +105,8 @@ def _effect(record: dict[str, Any], covariance: Array) -> Effect:
         raise ValueError(f"covariance of shape {covariance.shape}, {size} x {size} finite numbers are needed")
     if np.linalg.eigvalsh(covariance)[0] < -1e-9 * np.trace(covariance):
         raise ValueError("covariance is not positive semidefinite")
-    exact = bool(record.get("exact", False))
-    if exact and (mechanism is None or not mechanism_named(mechanism).quantities):
-        raise ValueError(f"mechanism {mechanism!r} has no exact effects")
     scale = _numbers(record, "outcome_scale", 3)
-    return Effect(mechanism, str(record["covariate"]), basis, coefficients, covariance, scale, exact)
+    return Effect(mechanism, str(record["covariate"]), basis, coefficients, covariance, scale)
 
 
 def _basis(record: dict[str, Any]) -> DriverBasis:

@@ -27,13 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.process_noise import VARYING, ProcessNoise
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import (
-    AnalyticalPredictor,
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsMean,
@@ -42,6 +38,7 @@ from push_predictor.models.predictors import (
     PriorPredictor,
     Scaling,
 )
+from push_predictor.models.push import Push
 from push_predictor.models.store.correlation_record import correlation_of, correlation_record
 from push_predictor.models.store.effects_record import cross_of, cross_record, effects_of, effects_record
 from push_predictor.models.store.mechanics_record import mechanics_of, mechanics_record
@@ -52,7 +49,6 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
 BASE_OUTCOMES = "base_outcomes"
 DRAWS = "draws"
 MOST_DRAWS = 10_000
@@ -82,16 +78,10 @@ def _extended_record(predictor: ExtendedPredictor, arrays: dict[str, np.ndarray]
         arrays[BASE_OUTCOMES] = predictor.base.targets  # those of the training rows minus the effects
     return {
         "base": predictor_record(predictor.base, arrays),
-        "physics": _physics_record(predictor.physics),
         "effects": effects_record(predictor.effects, arrays),
         "scale": predictor.scale.tolist(),
         **({"cross": cross_record(predictor.cross, arrays)} if predictor.cross else {}),
     }
-
-
-@predictor_record.register
-def _analytical_record(predictor: AnalyticalPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    return {**_physics_record(predictor.physics), "covariance": predictor.covariance.tolist()}
 
 
 @predictor_record.register
@@ -122,28 +112,17 @@ def _mean_record(mean: MechanicsMean) -> dict[str, Any]:
     return {"mechanics": mechanics_record(mean.fitted), "travel": mean.travel}
 
 
-def _physics_record(physics: AnalyticalPush) -> dict[str, Any]:
-    support = physics.support
-    return {
-        "contact_friction": physics.contact_friction,
-        "centre": list(support.centre),
-        "length": support.length,
-    }
-
-
 def predictor_of(record: dict[str, Any], source: Source) -> Predictor:
     """The predictor of a record. Raises KeyError, TypeError, or ValueError for what no predictor has."""
     return _extended(record, source) if "effects" in record else _base(record, source)
 
 
-def _base(
-    record: dict[str, Any], source: Source
-) -> AnalyticalPredictor | MechanicsPredictor | PriorPredictor | GaussianProcessPredictor:
+def _base(record: dict[str, Any], source: Source) -> MechanicsPredictor | PriorPredictor | GaussianProcessPredictor:
     if source.kind == "prior":
         return _prior(record, source)
     if source.kind != "analytical":
         return _learnt(record, source)
-    return _mechanics(record, source) if "mechanics" in record else _analytical(record, source.rig)
+    return _mechanics(record, source)
 
 
 def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
@@ -154,26 +133,10 @@ def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
         source = replace(source, targets=finite(source.arrays, BASE_OUTCOMES))
     base = _base(record["base"], source)
     cross = cross_of(record.get("cross", []), effects, source.arrays)
-    predictor = ExtendedPredictor(base, _physics(record["physics"], source.rig), effects, scale, cross)
+    predictor = ExtendedPredictor(base, effects, scale, cross)
     if missing := [name for name in predictor.needs if name not in source.training.covariates]:
         raise ValueError(f"an effect needs the covariate {missing[0]}, which the training rows lack")
     return predictor
-
-
-def _physics(record: dict[str, Any], rig: Rig) -> AnalyticalPush:
-    x, y = record["centre"]
-    support = Support((float(x), float(y)), float(record["length"]))
-    reach = float(np.abs(rig.outline.vertices).max())
-    largest = max(abs(support.centre[0]), abs(support.centre[1]), support.length, rig.pusher_radius)
-    if not (largest < LARGEST_RATIO * reach and support.length > reach / LARGEST_RATIO):
-        # The integration would never end.
-        raise ValueError("support or pusher is far too large or too small for the outline")
-    return AnalyticalPush(rig.outline, rig.pusher_radius, float(record["contact_friction"]), support)
-
-
-def _analytical(record: dict[str, Any], rig: Rig) -> AnalyticalPredictor:
-    physics = _physics(record, rig)
-    return AnalyticalPredictor(physics, _covariance(record))
 
 
 def _mechanics(record: dict[str, Any], source: Source) -> MechanicsPredictor:

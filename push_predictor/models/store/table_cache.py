@@ -31,15 +31,15 @@ from pathlib import Path
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError
-from push_predictor.models.predictors import PriorPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, model_digest
 from push_predictor.models.store.table_file import FORMAT_VERSION, read_tables, write_tables
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 
 FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
-NO_TABLE_YET = "exact: its table is being computed"
+NO_TABLE_YET = "computed: its table is being computed"
 MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
 
@@ -57,7 +57,6 @@ def load_served(path: Path) -> TabulatedModel:
 def load_at_once(path: Path) -> TabulatedModel:
     """The same, but a model without tables on disk predicts by itself, and states that its table is missing.
 
-    A prior model gets its table: by itself it takes a thousand integrations for a push.
     `completed` adds the tables. Raises ModelFileError.
     """
     model = load_model(path, check=False)
@@ -84,7 +83,7 @@ def _naming(path: Path) -> Iterator[None]:
 @one_blas_thread()
 def completed(served: TabulatedModel) -> TabulatedModel:
     """A model of `load_at_once` with its tables; itself if it has them."""
-    if served.base_how != NO_TABLE_YET:
+    if served.how != NO_TABLE_YET:
         return served
     tabulated = _computed(served.model)
     tabulated.free_matrices()
@@ -94,7 +93,7 @@ def completed(served: TabulatedModel) -> TabulatedModel:
 
 @one_blas_thread()
 def as_served(model: PushModel) -> TabulatedModel:
-    """The model as the server predicts with it: with the tables of its base and of its effects."""
+    """The model as the server predicts with it: with its table."""
     return _read(model, None) or _computed(model)
 
 
@@ -106,7 +105,7 @@ def keep_tables(model: PushModel, path: Path) -> None:
     """
     if not path.is_file():
         return
-    served = _read(model, None) or _tabulated(model)
+    served = _read(model, None) or tabulate(model)
     write_tables(tables_of(path), model_digest(model), served)
 
 
@@ -140,23 +139,19 @@ def _read(model: PushModel, path: Path | None) -> TabulatedModel | None:
 
 
 def _without_tables(model: PushModel) -> TabulatedModel:
-    if isinstance(model.base.predictor, PriorPredictor):
-        return _computed(model)
+    if not isinstance(model.base.predictor, GaussianProcessPredictor):
+        return tabulate(model)
     return TabulatedModel(model, NO_TABLE_YET)
 
 
 def _computed(model: PushModel) -> TabulatedModel:
     """The model with its tables, which are kept; a folder that takes no files is no error."""
-    served, digest = _tabulated(model), model_digest(model)
+    served, digest = tabulate(model), model_digest(model)
     if (kept := _kept(digest)) is not None:
         with suppress(OSError):
             write_tables(kept, digest, served)
             _delete_oldest(kept.parent)
     return served
-
-
-def _tabulated(model: PushModel) -> TabulatedModel:
-    return with_effect_table(tabulate(model))
 
 
 def _return_memory() -> None:

@@ -30,27 +30,17 @@ from typing import Any
 import numpy as np
 
 from push_predictor.errors import ModelFileError
-from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.arrays_record import read_arrays
-from push_predictor.models.tabulated.effect_tables.build import effect_table_from
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
 from push_predictor.models.tabulated.prediction_table import TableNodes
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
-from push_predictor.models.tabulated.tabulated_model import (
-    ONLY_LEARNT,
-    TabulatedModel,
-    with_base,
-    with_domain,
-    with_effects,
-    without_mean,
-)
-from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, compared, with_spline
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, with_domain, without_mean
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
-FORMAT_VERSION = 4  # also to be raised when a table's values change their meaning
+FORMAT_VERSION = 5  # also to be raised when a table's values change their meaning
 RECORD = "record"
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
 
@@ -59,12 +49,7 @@ def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
     """Write the tables of a model with this digest, none if it has none. Raises OSError."""
     arrays: dict[str, Array] = {}
     record = {"format_version": FORMAT_VERSION, "model": digest, **_base_record(tabulated, arrays)}
-    if tabulated.effects is not None:
-        record["effects"] = _spline_record(tabulated.effects.spline, "effects", arrays)
-        record["effects_later"] = tabulated.effects.later
-    if tabulated.effects_how:
-        record["effects_how"] = tabulated.effects_how
-    if "how" not in record and "effects_how" not in record:
+    if "how" not in record:
         return
     text = np.frombuffer(json.dumps(record, allow_nan=False).encode(), dtype=np.uint8)
     buffer = io.BytesIO()
@@ -79,29 +64,19 @@ def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | N
         record = json.loads(arrays.pop(RECORD).tobytes().decode())
         if (record["format_version"], record["model"]) != (FORMAT_VERSION, digest):
             return None
-        tabulated = _base(model, record, arrays)
-        if tabulated is None or not model.predictor.effects:
-            return tabulated
-        how = str(record["effects_how"])
-        if "effects" not in record:
-            return with_effects(tabulated, None, how)
-        later = bool(record.get("effects_later", False))
-        effects = effect_table_from(tabulated.model, _spline(record["effects"], arrays["effects"]), later)
-        return None if effects is None else with_effects(tabulated, effects, how)
+        return _base(model, record, arrays)
     except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None
 
 
 def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[str, Any]:
     base = tabulated.model.base
-    if isinstance(base.predictor, TabulatedPrior):
-        return {"how": tabulated.base_how, "prior": _spline_record(base.predictor.spline, "prior", arrays)}
     if tabulated.domain is None or tabulated.error is None:
         return {}
     domain, nodes = tabulated.domain, tabulated.domain.table.nodes
     arrays |= {f"nodes_{k}": values for k, values in enumerate(nodes.values)}
     return {
-        "how": tabulated.base_how,
+        "how": tabulated.how,
         "ends": [domain.least.tolist(), domain.most.tolist()],
         "nodes": [nodes.cells, nodes.coarse, nodes.least],
         "error": astuple(tabulated.error),
@@ -110,17 +85,6 @@ def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[st
 
 
 def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Array]) -> TabulatedModel | None:
-    predictor = model.base.predictor
-    if "how" not in record:  # computing says at once why the base has no table
-        return (
-            None
-            if isinstance(predictor, PriorPredictor | GaussianProcessPredictor)
-            else TabulatedModel(model, ONLY_LEARNT)
-        )
-    if isinstance(predictor, PriorPredictor):
-        prior = with_spline(predictor, _spline(record["prior"], arrays["prior"]))
-        accurate = compared(predictor, prior, CHECKED)[1]
-        return TabulatedModel(with_base(model, prior), str(record["how"])) if accurate else None
     learnt = without_mean(model.base)
     assert isinstance(learnt.predictor, GaussianProcessPredictor)
     cells, coarse, least_variances = record["nodes"]
@@ -138,12 +102,3 @@ def _probes_record(probes: Probes) -> dict[str, Any]:
 
 def _probes(record: Mapping[str, Any]) -> Probes:
     return Probes(*(np.array(record[name]) for name in Probes.__dataclass_fields__))
-
-
-def _spline_record(spline: TensorSpline, name: str, arrays: dict[str, Array]) -> list[Any]:
-    arrays[name] = spline.coefficients
-    return [astuple(axis) for axis in spline.axes]
-
-
-def _spline(axes: list[Any], coefficients: Array) -> TensorSpline:
-    return TensorSpline([Axis(*axis) for axis in axes], coefficients)

@@ -24,16 +24,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from push_predictor.models.tabulated.spline import spline_values
 from push_predictor.types import Array, IntArray
 
 _NOT_A_KNOT = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # no jump of the third derivative at the knot next to an end
-_ROWS_AT_ONCE = 1024  # of 4^D coefficients each: they stay in the cache
-_Numbers = TypeVar("_Numbers", float, Array)
 
 
 @dataclass(frozen=True)
@@ -73,69 +71,31 @@ class Axis:
 class TensorSpline:
     """Interpolating cubic splines of K functions on boxes that share their D axes; twice differentiable in each.
 
-    coefficients (boxes, cells_1 + 3, ..., cells_D + 3, K); `through` computes them from values at the knots.
+    coefficients (boxes, cells_1 + 3, ..., cells_D + 3, K), in single precision: half the memory, with an error that
+    every comparison of a table with its model contains.
     """
 
     def __init__(self, axes: Sequence[Axis], coefficients: Array) -> None:
-        self.axes, shape = tuple(axes), coefficients.shape
+        self.axes = tuple(axes)
+        self.coefficients = np.ascontiguousarray(coefficients, dtype=np.float32)
+        self._rows = self.coefficients.reshape(-1, coefficients.shape[-1])
         self._low = np.array([axis.low for axis in axes])
         self._per_unit = np.array([axis.cells / (axis.high - axis.low) for axis in axes])
-        self._last = np.array([axis.cells - 1 for axis in axes])
-        self._sides = list(zip(self._low.tolist(), self._per_unit.tolist(), self._last.tolist(), strict=True))
-        self.coefficients = np.ascontiguousarray(coefficients)
-        self._rows = self.coefficients.reshape(-1, shape[-1])
-        strides = [int(np.prod(shape[d + 1 : -1])) for d in range(len(axes) + 1)]
-        self._box_stride, self._strides = strides[0], np.array(strides[1:])
-        self._block: IntArray = np.indices((4,) * len(axes)).reshape(len(axes), -1).T @ self._strides
-
-    @classmethod
-    def through(cls, axes: Sequence[Axis], values: Array) -> TensorSpline:
-        """The splines through values (boxes, k_1 + 1, ..., k_D + 1, K) at the knots of splines with k cells an axis: as
-        many as these axes have, or fewer.
-        """
-        for d, axis in enumerate(axes):
-            values = along(d + 1, axis.coarse_to_coefficients(values.shape[d + 1] - 1), values)
-        return cls(axes, values)
+        self._cells = np.array([axis.cells for axis in axes], dtype=np.intp)
 
     @property
     def knots(self) -> int:
         """How many knots there are, in all boxes."""
         return len(self.coefficients) * int(np.prod([axis.cells + 1 for axis in self.axes]))
 
-    def at(self, point: Sequence[float], box: int) -> Array:
-        """Values (K,) at one point, in plain numbers: an array of one row costs several times as much."""
-        index: list[Any] = [box]
-        weights: list[float] = []
-        for x, (low, per_unit, last) in zip(point, self._sides, strict=True):
-            place = (x - low) * per_unit
-            cell = min(int(place), last)
-            index.append(slice(cell, cell + 4))
-            weights += _weights(place - cell)
-        values, of_sides = self.coefficients[tuple(index)], np.array(weights)
-        for start in range(0, len(weights), 4):
-            values = of_sides[start : start + 4].dot(values.reshape(4, -1))
-        return np.asarray(values)
-
-    def __call__(self, points: Array, box: IntArray | int) -> Array:
-        """Values (n, K) at points (n, D) within the axes, each in its box (n,), or all in one."""
-        boxes = np.broadcast_to(box, len(points))
-        starts = range(0, max(1, len(points)), _ROWS_AT_ONCE)
-        parts = (slice(start, start + _ROWS_AT_ONCE) for start in starts)
-        return np.concatenate([self._values(points[part], boxes[part]) for part in parts])
-
-    def _values(self, points: Array, box: IntArray) -> Array:
-        place = (points - self._low) * self._per_unit
-        cell = np.minimum(place.astype(np.int64), self._last)
-        weights = np.stack(_weights(place - cell), axis=-1)
-        product = weights[:, 0]
-        for d in range(1, weights.shape[1]):
-            product = (product[:, :, None] * weights[:, d, None, :]).reshape(-1, 4 ** (d + 1))
-        first = cell @ self._strides + box * self._box_stride
-        block = self._rows.take(first[:, None] + self._block, axis=0)
-        return np.asarray((product[:, None, :] @ block)[:, 0])
+    def __call__(self, points: Array, box: IntArray) -> Array:
+        """Values (n, K) at points (n, D) within the axes, each in its box (n,)."""
+        values = np.empty((len(points), self._rows.shape[1]))
+        spline_values(points, box, self._low, self._per_unit, self._cells, self._rows, values)
+        return values
 
 
-def _weights(u: _Numbers) -> list[_Numbers]:
+def _weights(u: Array) -> list[Array]:
     """The four cubic B-splines that are not zero at the place u of a cell, 0 to 1."""
     v = 1.0 - u
     uu, vv = u * u, v * v
@@ -151,7 +111,7 @@ def _knots_to_coefficients(cells: int) -> Array:
     """Matrix (cells + 3, cells + 1): the spline takes the values, and has no knot next to an end."""
     equations = np.zeros((cells + 3, cells + 3))
     rows = np.arange(cells + 1)
-    for k, weight in enumerate(_weights(0.0)[:3]):
+    for k, weight in enumerate(_weights(np.zeros(()))[:3]):
         equations[rows + 1, rows + k] = weight
     equations[0, :5] = equations[-1, -5:] = _NOT_A_KNOT
     return np.asarray(np.linalg.inv(equations)[:, 1:-1])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Correlation matrices of three outputs as three unbounded numbers, which a table can interpolate.
+"""Correlation matrices of three outputs as three unbounded numbers, which a table can interpolate; `spline.table_moments` turns them back.
 
 They are atanh of r12, of r13 and of the partial correlation r23.1. Any three numbers give a positive definite matrix.
 An error e in one of them changes the variance of any combination of outputs by at most about 2 e (relative), however
@@ -21,15 +21,11 @@ close to +-1 the correlation is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import sqrt, tanh
-
 import numpy as np
 
 from push_predictor.types import Array
 
 _LARGEST = 1.0 - 1e-12
-_PLACES = np.array([[0, 1, 2], [1, 0, 3], [2, 3, 0]])
 
 
 def unbounded(correlation: Array) -> Array:
@@ -37,16 +33,3 @@ def unbounded(correlation: Array) -> Array:
     r12, r13, r23 = correlation[:, 0, 1], correlation[:, 0, 2], correlation[:, 1, 2]
     partial = (r23 - r12 * r13) / np.sqrt((1.0 - r12**2) * (1.0 - r13**2))
     return np.arctanh(np.clip(np.column_stack([r12, r13, partial]), -_LARGEST, _LARGEST))
-
-
-def bounded(numbers: Array) -> Array:
-    """Correlation matrices (n, 3, 3) of the three numbers (n, 3)."""
-    r12, r13, partial = np.tanh(numbers.T)
-    r23 = r12 * r13 + partial * np.sqrt((1.0 - r12**2) * (1.0 - r13**2))
-    return np.asarray(np.stack([np.ones(len(numbers)), r12, r13, r23], axis=-1)[:, _PLACES])
-
-
-def bounded_one(numbers: Sequence[float]) -> tuple[float, float, float]:
-    """r12, r13 and r23 of the three numbers."""
-    r12, r13, partial = tanh(numbers[0]), tanh(numbers[1]), tanh(numbers[2])
-    return r12, r13, r12 * r13 + partial * sqrt((1.0 - r12 * r12) * (1.0 - r13 * r13))

@@ -25,8 +25,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
-from math import exp, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -36,15 +36,16 @@ from push_predictor.models.gaussian_process.constant import ConstantNoise
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
-from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.predictors.correlation import Correlation, correlations, covariances
+from push_predictor.models.predictors import GaussianProcessPredictor, Moments
+from push_predictor.models.predictors.correlation import Correlation, correlations
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
-from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.tabulated.push_chart import Chart, Whole
+from push_predictor.models.tabulated.partial_correlation import unbounded
+from push_predictor.models.tabulated.push_chart import Chart
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
+from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.tabulated.table_sides import Side, table_sides
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 OnGrid: TypeAlias = GridRegression | ConstantNoise
 
@@ -106,42 +107,16 @@ class PredictionTable:
         """Lower bounds of the variances of f."""
         return self.nodes.least
 
-    def moments(self, points: Array, box: Whole) -> tuple[Array, Array, Array]:
-        """Mean (n, 3), outcome and process covariance (n, 3, 3), SI units, at (n, 3) velocity, place, angle."""
-        values = self.spline(points[:, self.columns], box)
-        coupling = bounded(values[:, 9:]) if values.shape[1] > 9 else None
-        latent, process = np.maximum(values[:, 3:6], self.least), np.exp(values[:, 6:9])
-        return values[:, :3], *covariances(latent, process, coupling)
+    def moments(self, points: Array, box: IntArray) -> Moments:
+        """Moments in SI units at points (n, 3: velocity, place, angle) in boxes (n,)."""
+        values = self.spline(np.ascontiguousarray(points[:, self.columns]), box)
+        covariance, process = np.empty((2, len(points), 3, 3))
+        table_moments(values, self._least, covariance, process)
+        return Moments(values[:, :3], covariance, process)
 
-    def moments_one(self, point: Sequence[float], box: int) -> list[float]:
-        """The same for one point, in plain numbers: 3 of the mean, 9 of the outcome's and 9 of the process covariance,
-        row by row.
-        """
-        values = self.spline.at(point[self.columns], box).tolist()
-        latent = [max(value, least) for value, least in zip(values[3:6], self.least, strict=True)]
-        process = exp(values[6]), exp(values[7]), exp(values[8])
-        return _in_numbers(values[:3], latent, process, bounded_one(values[9:]) if len(values) > 9 else None)
-
-
-def _in_numbers(
-    mean: Sequence[float],
-    latent: Sequence[float],
-    process: Sequence[float],
-    correlation: tuple[float, float, float] | None,
-) -> list[float]:
-    """3 numbers of the mean, 9 of the outcome's and 9 of the process covariance, row by row: the same as `covariances`.
-
-    latent, process (3): variances of the functions and of the process. correlation: of outputs 1 and 2, 1 and 3, 2 and
-    3; None where they are independent.
-    """
-    (u, v, w), (p, q, r) = latent, process
-    a, b, c = u + p, v + q, w + r
-    if correlation is None:
-        return [*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r]
-    r12, r13, r23 = correlation
-    pq, pr, qr = r12 * sqrt(p * q), r13 * sqrt(p * r), r23 * sqrt(q * r)
-    ab, ac, bc = pq + r12 * sqrt(u * v), pr + r13 * sqrt(u * w), qr + r23 * sqrt(v * w)
-    return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
+    @cached_property
+    def _least(self) -> Array:
+        return np.array(self.least, dtype=np.float64)
 
 
 def tabulate(
@@ -189,7 +164,6 @@ def from_nodes(
         matrices = [axis.coarse_to_coefficients(count) for axis, count in zip(axes, nodes.coarse, strict=True)]
         parts += [_along_all(matrices, values) for values in coupling]
     order = [3 * output + part for part in range(3) for output in range(3)] + list(range(9, len(parts)))
-    # In single precision: half the memory, with an error that the comparison with the model contains.
     coefficients = np.empty((*np.broadcast_shapes(*(part.shape for part in parts)), len(parts)), dtype=np.float32)
     for place, k in enumerate(order):  # what is constant has one box
         coefficients[..., place] = parts[k]

@@ -20,19 +20,14 @@ coordinates a model's predictions are smooth; `features.push_features` is what i
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
-from math import inf
-from typing import Protocol, TypeAlias, cast
+from typing import Protocol
 
 import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.features import EDGE_SPACING
 from push_predictor.types import Array, IntArray
-
-Numbers: TypeAlias = Array | float
-Whole: TypeAlias = IntArray | int
 
 
 class Chart(Protocol):
@@ -46,14 +41,11 @@ class Chart(Protocol):
     def place_columns(self) -> tuple[int, ...]:
         """The columns of the features that the place becomes."""
 
-    def place(self, contact: Array) -> tuple[Array, Whole]:
+    def place(self, contact: Array) -> tuple[Array, IntArray]:
         """Places (n,) and boxes of contacts (n,) in [0, 1)."""
 
-    def place_one(self, contact: float) -> tuple[float, int]:
-        """The same for one contact, in plain numbers."""
-
-    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
-        """The features of one place or of many, column by column."""
+    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
+        """The features of places (n,), column by column."""
 
     def place_range(self, places: Array) -> tuple[float, float]:
         """The part of its axis that a domain around places (m,) can reach."""
@@ -72,15 +64,11 @@ class CircleChart:
     boxes = 1
     place_columns: tuple[int, ...] = ()
 
-    def place(self, contact: Array) -> tuple[Array, Whole]:
+    def place(self, contact: Array) -> tuple[Array, IntArray]:
         """See Chart."""
-        return contact, 0
+        return contact, np.zeros(len(contact), dtype=np.intp)
 
-    def place_one(self, contact: float) -> tuple[float, int]:
-        """See Chart."""
-        return contact, 0
-
-    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
         """See Chart."""
         return ()
 
@@ -97,15 +85,11 @@ class SmoothChart:
     boxes = 1
     place_columns = (1, 2)
 
-    def place(self, contact: Array) -> tuple[Array, Whole]:
+    def place(self, contact: Array) -> tuple[Array, IntArray]:
         """See Chart."""
-        return self.order * contact % 1.0, 0
+        return self.order * contact % 1.0, np.zeros(len(contact), dtype=np.intp)
 
-    def place_one(self, contact: float) -> tuple[float, int]:
-        """See Chart."""
-        return self.order * contact % 1.0, 0
-
-    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
         """See Chart."""
         turn = 2.0 * np.pi * place
         return np.cos(turn), np.sin(turn)
@@ -123,22 +107,15 @@ class PolygonChart:
     def __init__(self, outline: Outline) -> None:
         self.boxes = len(outline.vertices) // outline.rotational_symmetry
         self._starts, self._per_length = outline.edge_starts, 1.0 / np.diff(outline.edge_starts)
-        self._edges = list(zip(self._starts.tolist(), self._per_length.tolist(), strict=False))
 
-    def place(self, contact: Array) -> tuple[Array, Whole]:
+    def place(self, contact: Array) -> tuple[Array, IntArray]:
         """See Chart."""
         edge = self._starts.searchsorted(contact, side="right") - 1
         return (contact - self._starts[edge]) * self._per_length[edge], edge % self.boxes
 
-    def place_one(self, contact: float) -> tuple[float, int]:
+    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
         """See Chart."""
-        edge = bisect_right(self._edges, (contact, inf)) - 1
-        start, per_length = self._edges[edge]
-        return (contact - start) * per_length, edge % self.boxes
-
-    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
-        """See Chart."""
-        return (cast(Numbers, EDGE_SPACING * box + place),)
+        return (np.asarray(EDGE_SPACING * box + place),)
 
     def place_range(self, places: Array) -> tuple[float, float]:
         """See Chart: where edges differ, the domain contains most of them completely."""

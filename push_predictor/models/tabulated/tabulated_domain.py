@@ -23,91 +23,48 @@ from math import pi
 
 import numpy as np
 
-from push_predictor.models.features import push_features
-from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor, Moments
 from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
 from push_predictor.models.tabulated.prediction_table import OnGrid, PredictionTable, TableNodes, from_nodes, tabulate
-from push_predictor.models.tabulated.push_chart import Chart, Whole, push_chart
-from push_predictor.types import Array, BoolArray
+from push_predictor.models.tabulated.push_chart import Chart, push_chart
+from push_predictor.types import Array, BoolArray, IntArray
 
 FASTEST = 2.0  # largest training speeds, up to which a wide table reaches
 
 
 @dataclass(frozen=True, eq=False)
-class FeatureBox:
-    """The box of features, from low (F,) to high (F,), of PushModel.in_domain, margin included."""
+class TabulatedDomain:
+    """A table of a box that contains the domain: from least to most (3,) of velocity, place and angle."""
 
     chart: Chart
-    low: Array
-    high: Array
-
-    def contains(self, push: Sequence[float]) -> bool:
-        """Whether one push lies in the domain, in plain numbers."""
-        velocity, contact, angle = push
-        return self._contains(velocity, *self.chart.place_one(contact), angle)
-
-    def _contains(self, velocity: float, place: float, box: Whole, angle: float) -> bool:
-        features = (velocity, *self.chart.place_features(place, box), angle)
-        return all(low <= feature <= high for feature, (low, high) in zip(features, self._bounds, strict=True))
-
-    @cached_property
-    def _bounds(self) -> list[tuple[float, float]]:
-        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
-
-
-def feature_box(model: PushModel) -> FeatureBox:
-    """The box of a model's training rows."""
-    features = push_features(model.rig.outline, model.training.inputs)
-    least, most = features.min(axis=0), features.max(axis=0)
-    margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
-    return FeatureBox(push_chart(model.rig.outline), least - margin, most + margin)
-
-
-@dataclass(frozen=True, eq=False)
-class TabulatedDomain(FeatureBox):
-    """The domain with a table of a box that contains it: from least to most (3,) of velocity, place and angle."""
-
     table: PredictionTable
     least: Array
     most: Array
 
     def covered(self, inputs: Array) -> BoolArray:
         """Which of the pushes (n, 3) the table contains, (n,)."""
-        return self._covered(np.column_stack([inputs[:, 0], self.chart.place(inputs[:, 1])[0], inputs[:, 2]]))
+        return self._inside(self._points(inputs)[0])
 
-    def predict(self, inputs: Array) -> tuple[BoolArray, Prediction | None]:
-        """Which of the pushes (n, 3) the table contains, and the predictions if it contains all of them."""
-        velocity, contact, angle = inputs.T
-        place, box = self.chart.place(contact)
-        points = np.column_stack([velocity, place, angle])
-        covered = self._covered(points)
-        if not covered.all():
-            return covered, None
-        features = np.column_stack([velocity, *self.chart.place_features(place, box), angle])
-        inside = np.asarray(((features >= self.low) & (features <= self.high)).all(axis=1))
-        return covered, Prediction(*self.table.moments(points, box), inside)
+    def moments(self, inputs: Array) -> Moments | None:
+        """The moments of pushes (n, 3), None unless the table contains all of them."""
+        points, box = self._points(inputs)
+        return self.table.moments(points, box) if self._inside(points).all() else None
 
-    def predict_one(self, push: Sequence[float]) -> Prediction | None:
-        """The prediction for one push, in plain numbers, several times as fast; None if the table lacks it."""
-        velocity, contact, angle = push
-        place, box = self.chart.place_one(contact)
-        (slow, start, left), (fast, end, right) = self._ends
-        if not (slow <= velocity <= fast and start <= place <= end and left <= angle <= right):
-            return None
-        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
-        covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
-        inside = np.array([self._contains(velocity, place, box, angle)])
-        return Prediction(numbers[None, :3], covariance, process_covariance, inside)
+    def _points(self, inputs: Array) -> tuple[Array, IntArray]:
+        """Velocity, place and angle (n, 3), and boxes (n,)."""
+        place, box = self.chart.place(inputs[:, 1])
+        points = inputs.copy()
+        points[:, 1] = place
+        return points, box
 
-    def _covered(self, points: Array) -> BoolArray:
+    def _inside(self, points: Array) -> BoolArray:
         low, high = self._ends
         return np.asarray(((points >= low) & (points <= high)).all(axis=1))
 
     @cached_property
-    def _ends(self) -> tuple[list[float], list[float]]:
+    def _ends(self) -> tuple[Array, Array]:
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(self.most)
-        return (self.least - margin).tolist(), (self.most + margin).tolist()
+        return self.least - margin, self.most + margin
 
 
 def wide_box(model: PushModel) -> tuple[Array, Array]:
@@ -135,14 +92,13 @@ def tabulated_domain(
 
     posteriors: its regressions, see prediction_table.on_grid; refinement: of the table. Raises TooFineError.
     """
-    box = feature_box(model)
-    table = tabulate(predictor, posteriors, box.chart, *ends, refinement)
-    return TabulatedDomain(box.chart, box.low, box.high, table, *ends)
+    chart = push_chart(model.rig.outline)
+    return TabulatedDomain(chart, tabulate(predictor, posteriors, chart, *ends, refinement), *ends)
 
 
 def domain_from_nodes(
     model: PushModel, predictor: GaussianProcessPredictor, ends: tuple[Array, Array], nodes: TableNodes
 ) -> TabulatedDomain:
     """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
-    box = feature_box(model)
-    return TabulatedDomain(box.chart, box.low, box.high, from_nodes(nodes, predictor, box.chart, *ends), *ends)
+    chart = push_chart(model.rig.outline)
+    return TabulatedDomain(chart, from_nodes(nodes, predictor, chart, *ends), *ends)

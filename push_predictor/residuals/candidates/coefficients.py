@@ -31,7 +31,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import JointShift, has_exact_effects, joint, joint_shift, joint_shifts
+from push_predictor.models.effects.exact import JointShift, joint, joint_shift, joint_shifts
 from push_predictor.models.predictors import Cross
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.evidence.residualizer import Residualizer
@@ -133,10 +133,7 @@ class _Problem:
         scale, start = evidence_scale(evidence), []
         for c in candidates:
             size = c.plain.shape[2]
-            exact = has_exact_effects(c.mechanism)
-            start.append(
-                Effect(c.mechanism, c.covariate, c.basis, np.zeros(size), np.zeros((size, size)), scale, exact)
-            )
+            start.append(Effect(c.mechanism, c.covariate, c.basis, np.zeros(size), np.zeros((size, size)), scale))
         residualizer = Residualizer(np.empty((len(evidence.table), 0)) if controls is None else controls)
         nuisance = None if z is None else candidates[0].nuisance
         z = evidence.z if z is None else z

@@ -23,8 +23,7 @@ import numpy as np
 
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import mechanism_named
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanisms import LIBRARY, mechanism_named
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import CONSTANT, screening_bases

@@ -25,13 +25,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.effect import mechanism_named
-from push_predictor.models.effects.exact import displaced, sums_of, within_limits
+from push_predictor.models.effects.exact import sums_of, within_limits
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.ladder import Group
 from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParameter, ParameterValues
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.mechanisms import mechanism_named
+from push_predictor.models.push import Push
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.types import Array
@@ -44,30 +44,25 @@ WEAK = 0.5  # prior standard deviation, as a share of the largest, of what the m
 class ParameterChanges:
     """Changes of a model's mechanics on n windows, by coefficients of candidates.
 
-    A coefficient of an exact candidate changes a quantity of the mechanics by a column of its basis; that of a linear
-    one adds its column of displacements (n, 3). groups: the coefficients of each candidate.
+    A coefficient changes a quantity of the mechanics by a column of its candidate's basis. groups: the coefficients of
+    each candidate.
     """
 
     evidence: Evidence
     groups: tuple[Group, ...]
     columns: Mapping[str, tuple[Candidate, str, int]]  # candidate, quantity, column of its basis
-    linear: Mapping[str, Array]
 
     @staticmethod
     def of(evidence: Evidence, candidates: Sequence[Candidate]) -> ParameterChanges:
         """The changes that these candidates make; names of coefficients begin with the quantity."""
-        groups, columns, linear = [], dict[str, tuple[Candidate, str, int]](), dict[str, Array]()
+        groups, columns = [], dict[str, tuple[Candidate, str, int]]()
         for number, c in enumerate(candidates):
             mechanism, m = mechanism_named(str(c.mechanism)), 1 if c.values is None else c.values.shape[1]
-            names = mechanism.quantities or (mechanism.name,) * len(mechanism.parameters)
-            keys = [(name, k, _key(c, name, number, i, k)) for i, name in enumerate(names) for k in range(m)]
+            names = enumerate(mechanism.quantities)
+            keys = [(name, k, _key(c, name, number, i, k)) for i, name in names for k in range(m)]
             groups.append(tuple(key for *_, key in keys))
-            if mechanism.quantities:
-                columns.update({key: (c, name, k) for name, k, key in keys})
-            else:
-                moved = np.asarray(np.linalg.solve(evidence.whitener, c.plain), dtype=np.float64)
-                linear.update({key: moved[:, :, k] for k, (*_, key) in enumerate(keys)})
-        return ParameterChanges(evidence, tuple(groups), columns, linear)
+            columns.update({key: (c, name, k) for name, k, key in keys})
+        return ParameterChanges(evidence, tuple(groups), columns)
 
     def rows(self) -> FitRows:
         """The windows for a fit: outcomes under the mechanics with the effects that the model has already."""
@@ -79,46 +74,38 @@ class ParameterChanges:
     def displacement(
         self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
     ) -> Array:
-        """Displacement (k n, 3) of the windows, k times; values: of the coefficients, each a number or (k n,)."""
+        """Displacement (n, 3) of the windows; values: of the coefficients, each a number or (n,)."""
         push, n = Push(inputs, duration, covariates or {}), len(inputs)
-        changes = sums_of([effect for effect in self.evidence.effects if effect.exact], push)
-        added = np.zeros((n, 3))
+        changes = dict(sums_of(self.evidence.effects, push))
         for key, value in values.items():
             strength = np.broadcast_to(np.asarray(value, dtype=np.float64), n)
-            if key in self.linear:
-                added += strength[:, None] * np.tile(self.linear[key], (n // len(self.linear[key]), 1))
-                continue
             c, quantity, k = self.columns[key]
             changes[quantity] = changes.get(quantity, 0.0) + strength * c.basis.values(push.covariates, n)[:, k]
-        return np.asarray(displaced(self._mechanics, [within_limits(changes)], push)[0] + added)
+        return np.asarray(self._mechanics.displacements([within_limits(changes)], push)[0])
 
     @property
     def _mechanics(self) -> FittedMechanics:
-        fitted = self.evidence.mechanics.fitted
+        fitted = self.evidence.mechanics
         return replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY))
 
     def _parameters(self) -> dict[str, MechanicsParameter]:
         """The coefficients as parameters of a fit, which are zero in the model."""
-        fitted, found = self.evidence.mechanics.fitted, dict[str, MechanicsParameter]()
+        fitted, found = self.evidence.mechanics, dict[str, MechanicsParameter]()
         for key, (c, quantity, _) in self.columns.items():
             known, value = BY_NAME[quantity], fitted.value(quantity)
             if c.basis.is_constant:
                 found[key] = replace(known, name=key, textbook=0.0, low=known.low - value, high=known.high - value)
             else:
                 found[key] = _of_size(key, max(value - known.low, known.high - value))
-        return {**found, **{key: _of_size(key, _largest(key)) for key in self.linear}}
+        return found
 
 
 def _key(c: Candidate, quantity: str, number: int, parameter: int, column: int) -> str:
     """A name for a coefficient of candidate `number`: that of the quantity itself if it is constant."""
-    if c.basis.is_constant and mechanism_named(str(c.mechanism)).quantities:
+    if c.basis.is_constant:
         return quantity
     return f"{quantity} {number} {parameter} {column}"
 
 
 def _of_size(key: str, largest: float) -> MechanicsParameter:
     return MechanicsParameter(key, "", 0.0, -largest, largest, WEAK * largest, "", "")
-
-
-def _largest(key: str) -> float:
-    return max(parameter.largest for parameter in mechanism_named(key.split()[0]).parameters)

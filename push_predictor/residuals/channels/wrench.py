@@ -34,7 +34,7 @@ import numpy as np
 
 from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
     Contrast,
@@ -128,7 +128,7 @@ class _Force:
 
 
 def wrench_effects(
-    table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float = 0.01, seed: int = 0
+    table: PushTable, baseline: PushTable | None, mechanics: FittedMechanics, alpha: float = 0.01, seed: int = 0
 ) -> WrenchFinding:
     """Effects on the force of new windows that differ from the baseline (the model's training windows).
 
@@ -136,8 +136,8 @@ def wrench_effects(
     """
     zero = zero_shift(table, baseline)
     if zero is None:
-        return _of_contact(table, baseline, physics, alpha, seed)
-    found = _of_contact(table, baseline, physics, alpha / PARTS, seed)
+        return _of_contact(table, baseline, mechanics, alpha, seed)
+    found = _of_contact(table, baseline, mechanics, alpha / PARTS, seed)
     shifted = WrenchEffect(WRENCH_BIAS, zero.covariate, zero.basis, zero.parameters, _of_channel(zero.p_value), ())
     since = SESSION if zero.covariate == CONSTANT else zero.covariate
     return WrenchFinding(
@@ -158,7 +158,7 @@ def _of_channel(p_value: float) -> float:
 
 
 def _of_contact(
-    table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float, seed: int
+    table: PushTable, baseline: PushTable | None, mechanics: FittedMechanics, alpha: float, seed: int
 ) -> WrenchFinding:
     """Effects on the force while the pusher pushes."""
     if any(name not in table.covariates for name in FORCES):
@@ -166,7 +166,7 @@ def _of_contact(
     windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
     if len(windows.pushes) < FEWEST_PUSHES:
         return NO_WRENCH
-    force = _force_of(stacked(windows, base, FORCES), physics)
+    force = _force_of(stacked(windows, base, FORCES), mechanics)
     return _searched(force, alpha, seed)
 
 
@@ -178,11 +178,11 @@ def _pressing(table: PushTable) -> PushTable:
     return table.take(force > LEAST_FORCE * max(float(np.median(force)), np.finfo(float).tiny))
 
 
-def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
-    each = [loads(table, physics) for table in stack.tables]
+def _force_of(stack: Stacked, mechanics: FittedMechanics) -> _Force:
+    each = [loads(table, mechanics) for table in stack.tables]
     z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
     most = max(FEWEST_INPUTS, sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT)
-    controls = stack.joined([inputs_of(table, physics, most) for table in stack.tables])
+    controls = stack.joined([inputs_of(table, mechanics, most) for table in stack.tables])
     unit = np.maximum([robust_deviation(column) for column in Residualizer(controls)(z).T], 1e-12)
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
     tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))

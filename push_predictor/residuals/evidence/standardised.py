@@ -21,11 +21,10 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.effect import Effect, generic_responses, mechanism_named
-from push_predictor.models.effects.exact import Mechanics, undisturbed
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.effects.effect import Effect, responses_of
+from push_predictor.models.effects.exact import undisturbed
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
@@ -47,14 +46,9 @@ class Evidence:
     table: PushTable
     residual: Array
     whitener: Array
-    mechanics: Mechanics
+    mechanics: FittedMechanics
     effects: tuple[Effect, ...] = ()
     chosen: frozenset[str] = frozenset()
-
-    @property
-    def physics(self) -> AnalyticalPush:
-        """The analytical model of the slider, from which mechanisms' responses are computed."""
-        return self.mechanics.physics
 
     @property
     def z(self) -> Array:
@@ -93,28 +87,25 @@ class Evidence:
         return Evidence(*taken, self.mechanics, self.effects, self.chosen)
 
 
-def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | None = None) -> Evidence:
+def evidence_of(model: PushModel, table: PushTable) -> Evidence:
     """Residuals of a table under a model that was not trained on it.
 
-    physics: the analytical model of the slider in place of the model's own mechanics. A learnt model's outputs are
-    standardised one by one. A strong correlation of the outputs would give the largest weight to small parts of the
+    A learnt model's outputs are standardised one by one. A strong correlation of the outputs would give the largest weight to small parts of the
     residual: in one recording, the second order of an effect was found before the effect itself.
     """
     predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
-    mechanics = mechanics_under(model) if physics is None else Mechanics(physics, mechanics_of(physics))
-    return Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics, model.predictor.effects)
+    residual = table.outcomes - mean
+    return Evidence(table, residual, whitener_of(covariance), mechanics_under(model), model.predictor.effects)
 
 
-def mechanics_under(model: PushModel) -> Mechanics:
+def mechanics_under(model: PushModel) -> FittedMechanics:
     """What effects of a push model act on: its own mechanics, or the textbook's for a learnt one without.
 
     Shifts are differences, and their fits take many: less accuracy than that of a prediction is enough.
     """
     fitted = model.predictor.base.mechanics
-    return Mechanics(
-        model.predictor.physics, replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY_OF_FITS))
-    )
+    return replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY_OF_FITS))
 
 
 def push_order(table: PushTable) -> IntArray:
@@ -151,12 +142,7 @@ def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
 
 
 def _whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
-    physics, push = evidence.physics, evidence.push
-    response = (
-        generic_responses(physics, push, evidence_scale(evidence))
-        if mechanism is None
-        else mechanism_named(mechanism).response(physics, push)
-    )
+    response = responses_of(mechanism, evidence.mechanics, evidence.push, evidence_scale(evidence))
     return np.asarray(np.einsum("nij,njp->nip", evidence.whitener, response))
 
 

@@ -20,7 +20,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import between_ends
 from push_predictor.residuals.outcome import Sized

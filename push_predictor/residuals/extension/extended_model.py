@@ -22,9 +22,8 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model
 from push_predictor.residuals.candidates.candidate import Candidate
@@ -45,7 +44,7 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     # About mechanics, a learnt base expresses little in its own inputs, and a refit keeps the mechanics.
     own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else None
     effects, cross = estimated_effects(evidence, candidates, own_inputs, of_size=True)
-    predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
+    predictor = _with_effects(base.predictor, effects, cross)
     table = spread_rows(base, evidence.table)
     if learnt or absorbs:
         shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
@@ -55,12 +54,8 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     return held_out_windows(with_predictor(base, table, predictor)).calibrated()
 
 
-def _with_effects(
-    predictor: Predictor, physics: AnalyticalPush, effects: tuple[Effect, ...], cross: Cross
-) -> ExtendedPredictor:
+def _with_effects(predictor: Predictor, effects: tuple[Effect, ...], cross: Cross) -> ExtendedPredictor:
     """The predictor with these effects after those that it has, unscaled."""
     had = len(predictor.effects)
     moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
-    return ExtendedPredictor(
-        predictor.base, physics, (*predictor.effects, *effects), np.ones(3), {**predictor.cross, **moved}
-    )
+    return ExtendedPredictor(predictor.base, (*predictor.effects, *effects), np.ones(3), {**predictor.cross, **moved})

@@ -21,8 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -52,7 +52,7 @@ class Unseen:
         factor = np.array([_likeliest(*columns) for columns in zip(square.T, own.T, other.T, strict=True)])
         if isinstance(predictor, ExtendedPredictor):
             return replace(model, predictor=replace(predictor, scale=predictor.scale * factor))
-        return replace(model, predictor=ExtendedPredictor(predictor.base, predictor.physics, (), factor))
+        return replace(model, predictor=ExtendedPredictor(predictor.base, (), factor))
 
 
 def new_windows(model: PushModel, table: PushTable) -> Unseen:

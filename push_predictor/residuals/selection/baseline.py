@@ -29,7 +29,7 @@ from typing import get_args
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.exact import Mechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
@@ -125,7 +125,7 @@ class Baseline:
         return Nuisance(self.evidence, self.inputs, mechanisms, self._response)
 
 
-def baseline_of(model: PushModel, mechanics: Mechanics, inputs: Array | None = None) -> Baseline:
+def baseline_of(model: PushModel, mechanics: FittedMechanics, inputs: Array | None = None) -> Baseline:
     """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps.
 
     inputs (n, 3): of the new windows. If these leave out a part of training's inputs, this part is not compared, as

@@ -28,7 +28,7 @@ from itertools import takewhile
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.fit import fit_jointly
 from push_predictor.models.mechanics.ladder import (
@@ -40,7 +40,7 @@ from push_predictor.models.mechanics.ladder import (
     climb_from,
     least_gain,
 )
-from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism, mechanism_named
 from push_predictor.models.train import training_rows
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
@@ -139,12 +139,10 @@ def _constants(evidence: Evidence) -> list[Candidate]:
 
 
 def _shows(evidence: Evidence, mechanism: Mechanism) -> bool:
-    mechanics, table = evidence.mechanics.fitted.mechanics, evidence.table
+    mechanics, table = evidence.mechanics.mechanics, evidence.table
     known = mechanics.support is not None or all_supports_known(mechanics, table.covariates)
     if mechanism.name == "rim_pressure" and known:
         return False  # an ellipsoid has no rim either
-    if mechanism.name == "limit_surface_power" and mechanics.support is None:
-        return False  # the exact limit surface has no power
     speeds = len(np.unique(table.inputs[:, 0])) > 1
     return all(need in table.covariates for need in mechanism.needs) and (speeds or mechanism.name != "inertia")
 

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from push_predictor.models.effects.effect import mechanism_named
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
 from push_predictor.residuals.selection.cross_validation import Judged, fit, gains_of

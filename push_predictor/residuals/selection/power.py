@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.effects.effect import mechanism_named
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import HEADED, SIDES
 from push_predictor.residuals.evidence.drivers import CONSTANT

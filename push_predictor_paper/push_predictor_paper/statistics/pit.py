@@ -25,7 +25,7 @@ from push_predictor.evaluation.push_scores import PushScores, pooled, push_score
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.quadrature import exact_cdf
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable

@@ -23,9 +23,10 @@ import numpy as np
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, design_of, mechanism_named
+from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import joint, joint_shift
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.mechanisms import mechanism_named
+from push_predictor.models.push import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.standardised import evidence_of, mechanics_under
 from push_predictor.residuals.outcome import Trace
@@ -130,7 +131,7 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     if effect.exact:
         bare = joint(on, [effect], push).responses(effect)
     else:
-        bare = design_of(effect.mechanism, DriverBasis("constant"), on.physics, push, effect.outcome_scale)
+        bare = design_of(effect.mechanism, DriverBasis("constant"), on, push, effect.outcome_scale)
     return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
 
 

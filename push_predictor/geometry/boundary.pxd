@@ -1,0 +1,38 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# cython: language_level=3
+
+cdef struct Body:
+    # A polygon's edges, or else a smooth curve: an ellipse with a pose, and the table from arc length to its parameter.
+    double* edges  # per edge: x, y of its start, x, y along it, square of its length, outward normal, start, share
+    Py_ssize_t count  # of edges; 0 for a smooth curve
+    double a, b, x, y, cos_turn, sin_turn  # semi-axes and pose
+    double perimeter
+    double* arc
+    double* parameter
+    Py_ssize_t last  # index in both
+
+cdef struct Nearest:
+    double x, y, normal_x, normal_y, distance  # outward normal; the distance is negative inside
+    Py_ssize_t edge
+    double share  # of the edge, from its start; or the parameter of a smooth curve
+    bint corner  # whether a polygon's corner is nearest
+
+cdef struct Contact:
+    double x, y, normal_x, normal_y  # inward normal
+
+cdef Body body_of(double[:, ::1] edges, double[::1] axes, double[:, ::1] curve) noexcept
+cdef Nearest nearest_to(double x, double y, Body* body) noexcept nogil
+cdef Contact contact_at(double contact, Body* body) noexcept nogil

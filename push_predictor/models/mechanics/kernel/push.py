@@ -1,0 +1,173 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, nonecheck=False, initializedcheck=False
+"""Displacements of pushes, compiled: from what is recorded to what is true, and back."""
+
+import cython
+from cython.cimports.libc.math import atan2, cos, exp, sin
+from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Nearest, body_of, contact_at, nearest_to
+from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surface, root_of
+from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Values, swept
+
+CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
+
+
+def displacements(
+    values: cython.double[:, ::1],
+    pushes: cython.double[:, ::1],
+    low: cython.Py_ssize_t[::1],
+    share: cython.double[::1],
+    edges: cython.double[:, ::1],
+    axes: cython.double[::1],
+    curve: cython.double[:, ::1],
+    polar_moment: cython.double,
+    cells: cython.double[:, :, ::1],
+    slopes: cython.double[:, :, :, ::1],
+    quantities: cython.double[:, ::1],
+    power: cython.double,
+    pusher_radius: cython.double,
+    accuracy: cython.double,
+    found: cython.double[:, ::1],
+) -> None:
+    """Compute displacements (n, 3: dx, dy in m, dtheta in rad) of the recorded origin in the recorded push frame.
+
+    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 5): velocity m/s, contact, angle rad,
+    duration s, heading of the push in the world rad. low, share (n,), or (1,) for all: table of each push, and the
+    share of the next one. edges, axes, curve: see Outline.boundary; polar_moment: of its area, m^2. cells (T, 6912, 16),
+    slopes (T, 2, 6912, 16) or (0, 2, 0, 16) where no parameter needs them, quantities (T, 22): see load_map; power: of
+    the power law where there is no table, else 0. pusher_radius m. accuracy: relative. found (n, 3) is written; what
+    takes too many steps, or is not finite, is not a number.
+    """
+    body: Body = body_of(edges, axes, curve)
+    k: cython.Py_ssize_t
+    tables: _Tables
+    tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
+    tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+    tables.quantities = cython.address(quantities[0, 0])
+    tables.power = power
+    per_push: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
+    own_table: cython.Py_ssize_t = 1 if low.shape[0] > 1 else 0
+    with cython.nogil:
+        for k in range(pushes.shape[0]):
+            _displacement(
+                cython.cast(cython.pointer(Values), cython.address(values[k * per_push, 0])),
+                cython.address(pushes[k, 0]),
+                low[k * own_table],
+                share[k * own_table],
+                cython.address(body),
+                polar_moment,
+                cython.address(tables),
+                pusher_radius,
+                accuracy,
+                cython.address(found[k, 0]),
+            )
+
+
+_Tables = cython.struct(cells=cython.p_double, slopes=cython.p_double, quantities=cython.p_double, power=cython.double)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _displacement(
+    values: cython.pointer(Values),
+    given: cython.p_double,
+    low: cython.Py_ssize_t,
+    share: cython.double,
+    body: cython.pointer(Body),
+    polar_moment: cython.double,
+    tables: cython.pointer(_Tables),
+    pusher_radius: cython.double,
+    accuracy: cython.double,
+    found: cython.p_double,
+) -> cython.void:
+    """One row of `displacements`."""
+    velocity: cython.double = given[0]
+    contact: Contact = contact_at(given[1], body)
+    c: cython.double = cos(given[2])
+    s: cython.double = sin(given[2])
+    recorded_x: cython.double = c * contact.normal_x - s * contact.normal_y
+    recorded_y: cython.double = s * contact.normal_x + c * contact.normal_y
+    push: Push
+    push.values, push.body, push.polar_moment = values, body, polar_moment
+    surface: Surface = _surface(tables, low, share, cython.address(push))
+    push.surface = cython.address(surface)
+    push.radius = pusher_radius + values.radius_error
+    along: cython.double = values.tip_offset_along + velocity * values.clock_delay
+    across: cython.double = values.tip_offset_across
+    x: cython.double = contact.x - pusher_radius * contact.normal_x + along * recorded_x - across * recorded_y
+    y: cython.double = contact.y - pusher_radius * contact.normal_y + along * recorded_y + across * recorded_x
+    c, s = cos(values.tracker_rotation), sin(values.tracker_rotation)
+    shift_x: cython.double = values.outline_x
+    shift_y: cython.double = values.outline_y
+    push.tip_x, push.tip_y = c * (x - shift_x) + s * (y - shift_y), c * (y - shift_y) - s * (x - shift_x)
+    if along != 0.0 or across != 0.0 or shift_x != 0.0 or shift_y != 0.0 or s != 0.0 or values.radius_error != 0.0:
+        # A window begins in contact: the tip is moved along the outline's normal until it touches.
+        nearest: Nearest = nearest_to(push.tip_x, push.tip_y, body)
+        push.tip_x = nearest.x + push.radius * nearest.normal_x
+        push.tip_y = nearest.y + push.radius * nearest.normal_y
+    origin_x: cython.double = -c * shift_x - s * shift_y  # of the recorded body frame
+    origin_y: cython.double = s * shift_x - c * shift_y
+    recorded_x, recorded_y = c * recorded_x + s * recorded_y, c * recorded_y - s * recorded_x
+    c, s = cos(values.push_rotation), sin(values.push_rotation)
+    push.ahead_x, push.ahead_y = c * recorded_x - s * recorded_y, s * recorded_x + c * recorded_y
+    push.speed = velocity * (1.0 + values.travel_share)
+    push.travel = push.speed * given[3]
+    push.heading = given[4] - atan2(recorded_y, recorded_x)
+    pose: Pose = swept(cython.address(push), accuracy)
+    c, s = cos(pose.heading), sin(pose.heading)
+    pose.x += c * origin_x - s * origin_y - origin_x
+    pose.y += s * origin_x + c * origin_y - origin_y
+    found[0] = recorded_x * pose.x + recorded_y * pose.y
+    found[1] = recorded_x * pose.y - recorded_y * pose.x
+    found[2] = pose.heading
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _surface(
+    tables: cython.pointer(_Tables), low: cython.Py_ssize_t, share: cython.double, push: cython.pointer(Push)
+) -> Surface:
+    """The surface of a push; what of it acts alike all along the push is written into the push."""
+    values: cython.pointer(Values) = push.values
+    one: cython.p_double = tables.quantities + 22 * low
+    other: cython.p_double = one + 22 if share > 0.0 else one
+    spread: cython.double = exp(values.pressure_spread)  # about the centre: the surface keeps its shape
+    surface: Surface
+    surface.power, surface.share = tables.power, share
+    surface.length = (one[2] + share * (other[2] - one[2])) * spread
+    surface.reach_low, surface.reach_high = one + 6, other + 6
+    surface.low = surface.high = surface.slopes_low = surface.slopes_high = cython.NULL
+    if tables.cells != cython.NULL:
+        surface.low = surface.high = tables.cells + CELLS * low
+        if share > 0.0:
+            surface.high = surface.low + CELLS
+    if tables.slopes != cython.NULL:
+        surface.slopes_low = surface.slopes_high = tables.slopes + 2 * CELLS * low
+        if share > 0.0:
+            surface.slopes_high = surface.slopes_low + 2 * CELLS
+    push.centre_x = one[0] + share * (other[0] - one[0]) + values.centre_x
+    push.centre_y = one[1] + share * (other[1] - one[1]) + values.centre_y
+    square: cython.double = spread * spread
+    push.xx = (one[3] + share * (other[3] - one[3])) * square
+    push.xy = (one[4] + share * (other[4] - one[4])) * square
+    push.yy = (one[5] + share * (other[5] - one[5])) * square
+    push.acting.root.needed = False
+    if values.body_anisotropy != 0.0 or values.body_anisotropy_diagonal != 0.0:
+        push.acting.root = root_of(values.body_anisotropy, values.body_anisotropy_diagonal, cython.address(surface))
+    push.acting.pulled = values.slope_x != 0.0 or values.slope_y != 0.0 or values.inertia != 0.0
+    push.acting.height = values.pushing_height
+    return surface

@@ -1,0 +1,232 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, nonecheck=False, initializedcheck=False
+"""The limit surface of one push, compiled: from the pusher's load to the twist that it drives. Types: surface.pxd.
+
+A table has a cell for each azimuth of the force and elevation of the moment (see load_map). A load with a negative
+moment has the opposite twist of its opposite.
+
+Direction-dependent friction: a point at velocity u resists with W^-1 u over the root of u' W^-1 u, with
+W = [[1 + a, b], [b, 1 - a]]. With its root R, isotropic friction resists at the velocity R^-1 u, and the load f becomes
+R f. A body whose points have the arms r is then one with the arms R r / det R under the same moments.
+"""
+
+import cython
+from cython.cimports.libc.math import M_PI, atan2, cos, fabs, pow, sin, sqrt
+from cython.cimports.push_predictor.models.mechanics.kernel.surface import Acting, Answer, Root, Surface, Three
+
+AZIMUTHS = cython.declare(cython.int, 144)  # as in load_map, which a test compares
+ELEVATIONS = cython.declare(cython.int, 49)
+CELL = cython.declare(cython.int, 16)
+SLOPES = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # from the slopes by a to those by b
+DIRECTIONS = cython.declare(cython.int, 16)  # of arms, over half a turn
+MOST_STRETCH = cython.declare(cython.double, 0.95)  # of (a, b): at 1 the friction along one direction is infinite
+PULL_ROUNDS = cython.declare(cython.int, 4)  # the first is exact on an ellipsoid
+SMALLEST_MARGIN = cython.declare(cython.double, 1e-6)  # of a pull to the friction that it cannot overcome alone
+TINY = cython.declare(cython.double, 1e-300)
+
+COS = cython.declare(cython.double[16])  # of twice the direction of an arm
+SIN = cython.declare(cython.double[16])
+for _k in range(16):
+    COS[_k] = cos(2.0 * M_PI * _k / 16.0)
+    SIN[_k] = sin(2.0 * M_PI * _k / 16.0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def answer(load: Three, surface: cython.pointer(Surface), root: cython.pointer(Root)) -> Answer:
+    """Twist and gauge of a load, on a surface whose shape the root changes."""
+    if surface.power > 0.0:
+        return _of_power(load, surface.power)
+    sign: cython.double = -1.0 if load.m < 0.0 else 1.0
+    x: cython.double = sign * load.x
+    y: cython.double = sign * load.y
+    m: cython.double = sign * load.m
+    square: cython.double = x * x + y * y
+    turn: cython.double = atan2(y, x) * (AZIMUTHS / (2.0 * M_PI))
+    rise: cython.double = atan2(m, sqrt(square)) * ((ELEVATIONS - 1) / (0.5 * M_PI))
+    if turn < 0.0:
+        turn += AZIMUTHS
+    column: cython.int = cython.cast(cython.int, turn)
+    row: cython.int = cython.cast(cython.int, rise)
+    # What is not a number has no cell: any, since the answer is no number either.
+    column = 0 if column < 0 else (AZIMUTHS - 1 if column > AZIMUTHS - 1 else column)
+    row = 0 if row < 0 else (ELEVATIONS - 2 if row > ELEVATIONS - 2 else row)
+    place: cython.Py_ssize_t = CELL * (row * AZIMUTHS + column)
+    right: cython.double = turn - column
+    up: cython.double = rise - row
+    size: cython.double = sqrt(square + m * m)
+    found: Answer = _of_cell(surface.low + place, _slopes(surface.slopes_low, place, root), root, right, up)
+    found.gauge = size / found.gauge
+    if surface.share > 0.0:
+        other: Answer = _of_cell(surface.high + place, _slopes(surface.slopes_high, place, root), root, right, up)
+        found.twist.x += surface.share * (other.twist.x - found.twist.x)
+        found.twist.y += surface.share * (other.twist.y - found.twist.y)
+        found.twist.m += surface.share * (other.twist.m - found.twist.m)
+        found.gauge += surface.share * (size / other.gauge - found.gauge)
+    found.twist.x *= sign * size
+    found.twist.y *= sign * size
+    found.twist.m *= sign * size
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+@cython.inline
+def _slopes(slopes: cython.p_double, place: cython.Py_ssize_t, root: cython.pointer(Root)) -> cython.p_double:
+    return slopes + place if root.needed and slopes != cython.NULL else cython.NULL
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+@cython.inline
+def _of_cell(
+    cell: cython.p_double,
+    slopes: cython.p_double,
+    root: cython.pointer(Root),
+    right: cython.double,
+    up: cython.double,
+) -> Answer:
+    """Unit twist, and in place of the gauge the size of the load on the surface: bilinear polynomials of the cell."""
+    found: Answer
+    both: cython.double = right * up
+    found.twist.x = cell[0] + right * cell[3] + up * cell[6] + both * cell[9]
+    found.twist.y = cell[1] + right * cell[4] + up * cell[7] + both * cell[10]
+    found.twist.m = cell[2] + right * cell[5] + up * cell[8] + both * cell[11]
+    found.gauge = cell[12] + right * cell[13] + up * cell[14] + both * cell[15]
+    if slopes != cython.NULL:
+        nothing: Root
+        nothing.needed = False
+        by_a: Answer = _of_cell(slopes, cython.NULL, cython.address(nothing), right, up)
+        by_b: Answer = _of_cell(slopes + SLOPES, cython.NULL, cython.address(nothing), right, up)
+        found.twist.x += root.a * by_a.twist.x + root.b * by_b.twist.x
+        found.twist.y += root.a * by_a.twist.y + root.b * by_b.twist.y
+        found.twist.m += root.a * by_a.twist.m + root.b * by_b.twist.m
+        found.gauge += root.a * by_a.gauge + root.b * by_b.gauge
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _of_power(load: Three, power: cython.double) -> Answer:
+    """On the surface (f / fmax)^p + (m / mmax)^p = 1; p = 2 is the ellipsoid of Lynch et al. (1992)."""
+    found: Answer
+    force: cython.double = sqrt(load.x * load.x + load.y * load.y)
+    size: cython.double = sqrt(force * force + load.m * load.m)
+    if power == 2.0:
+        found.twist, found.gauge = load, size
+        return found
+    force = force if not force < TINY else TINY
+    scale: cython.double = pow(force / size, power - 2.0)
+    spin: cython.double = pow(fabs(load.m / size), power - 1.0) * size  # the twist is linear in the size of the load
+    found.twist.x, found.twist.y = scale * load.x, scale * load.y
+    found.twist.m = spin if load.m > 0.0 else -spin
+    found.gauge = pow(pow(force, power) + pow(fabs(load.m), power), 1.0 / power)
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def root_of(a: cython.double, b: cython.double, surface: cython.pointer(Surface)) -> Root:
+    """The root R for a stretch (a, b), at most MOST_STRETCH long; turn: by how much less the arms grow, as a factor."""
+    root: Root
+    length: cython.double = sqrt(a * a + b * b)
+    if length > MOST_STRETCH:
+        a, b = a * MOST_STRETCH / length, b * MOST_STRETCH / length
+    determinant: cython.double = sqrt(1.0 - a * a - b * b)
+    trace: cython.double = sqrt(2.0 + 2.0 * determinant)
+    arms: cython.double = 0.0
+    k: cython.int
+    for k in range(DIRECTIONS):
+        reach: cython.double = surface.reach_low[k]
+        reach += surface.share * (surface.reach_high[k] - reach)
+        arms += reach * sqrt(1.0 + a * COS[k] + b * SIN[k])
+    root.needed, root.a, root.b, root.turn = True, a, b, determinant / arms
+    root.xx, root.xy, root.yy = (1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace
+    return root
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+@cython.inline
+def stretched(vector: Three, root: cython.pointer(Root)) -> Three:
+    """R times a force or velocity; the moment or spin in units of the stretched arms."""
+    if not root.needed:
+        return vector
+    found: Three
+    found.x = root.xx * vector.x + root.xy * vector.y
+    found.y = root.xy * vector.x + root.yy * vector.y
+    found.m = root.turn * vector.m
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def driven_twist(pusher: Three, surface: cython.pointer(Surface), acting: cython.pointer(Acting)) -> Three:
+    """Twist of the centre of friction up to a positive factor, from the pusher's load and what else acts.
+
+    A push at a height moves the centre of pressure along the pusher's force, in proportion to it.
+    """
+    load: Three = stretched(pusher, cython.address(acting.root))
+    factor: cython.double = 0.0  # that brings the pusher's load onto the surface
+    if acting.pulled:
+        factor = _with_pull(cython.address(load), surface, acting)
+    found: Answer = answer(load, surface, cython.address(acting.root))
+    twist: Three = stretched(found.twist, cython.address(acting.root))
+    if acting.height != 0.0:
+        if not acting.pulled:
+            factor = 1.0 / found.gauge
+        shift: cython.double = acting.height * factor * twist.m / surface.length
+        twist.x += shift * pusher.y
+        twist.y -= shift * pusher.x
+    return twist
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _with_pull(
+    load: cython.pointer(Three), surface: cython.pointer(Surface), acting: cython.pointer(Acting)
+) -> cython.double:
+    """Add the pull to the load of a pusher such that both together lie on the surface; return the pusher's factor.
+
+    The load keeps its size: nothing but its direction counts.
+    """
+    pull: Three = acting.pull
+    given: cython.double = sqrt(load.x * load.x + load.y * load.y + load.m * load.m)
+    x: cython.double = load.x / given
+    y: cython.double = load.y / given
+    m: cython.double = load.m / given
+    dot: cython.double = x * pull.x + y * pull.y + m * pull.m
+    square: cython.double = pull.x * pull.x + pull.y * pull.y + pull.m * pull.m
+    radius: cython.double = 1.0
+    share: cython.double = 1.0
+    on: Three
+    k: cython.int
+    for k in range(PULL_ROUNDS):
+        margin: cython.double = dot * dot + radius * radius - square
+        share = -dot + sqrt(margin if not margin < SMALLEST_MARGIN else SMALLEST_MARGIN)
+        on.x, on.y, on.m = share * x + pull.x, share * y + pull.y, share * m + pull.m
+        size: cython.double = sqrt(on.x * on.x + on.y * on.y + on.m * on.m)
+        radius = size / answer(on, surface, cython.address(acting.root)).gauge
+    load.x, load.y, load.m = given * on.x, given * on.y, given * on.m
+    return share / given

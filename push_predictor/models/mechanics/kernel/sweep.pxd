@@ -1,0 +1,50 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# cython: language_level=3
+
+from push_predictor.geometry.boundary cimport Body
+from push_predictor.models.mechanics.kernel.contact cimport Start
+from push_predictor.models.mechanics.kernel.surface cimport Acting, Surface
+
+cdef struct Values:
+    # Of the parameters, in the order of parameters.PARAMETERS.
+    double contact_friction, friction_difference, friction_by_angle, friction_by_speed, friction_by_load
+    double rim_exponent, pressure_spread, centre_x, centre_y, pushing_height, body_anisotropy, body_anisotropy_diagonal
+    double tracker_rotation, push_rotation, outline_x, outline_y, radius_error, tip_offset_along, tip_offset_across
+    double clock_delay, travel_share
+    double grain_x, grain_diagonal, slope_x, slope_y, gradient_x, gradient_y, inertia
+
+cdef struct Push:
+    # One push as it was, in the frame of the slider's first pose.
+    double tip_x, tip_y, radius, ahead_x, ahead_y  # centre of the disc at the start, its radius, direction of its path
+    double travel, speed
+    double heading  # of the slider in the world at the start, rad
+    Values* values
+    Body* body
+    Surface* surface
+    double centre_x, centre_y, xx, xy, yy  # centre and mean squares of the pressure
+    double polar_moment  # of the slider's area, m^2
+    Acting acting  # what acts alike all along the push
+
+cdef struct Pose:
+    double x, y, heading
+
+cdef struct Rate:
+    Pose motion  # per distance of the path
+    double gap  # between disc and slider
+    double along  # above 0 where the disc comes closer
+    int kind  # of the contact: the same number while the rate is smooth, below 0 at a corner
+
+cdef Pose swept(Push* push, double accuracy) noexcept nogil

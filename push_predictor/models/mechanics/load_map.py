@@ -1,0 +1,156 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The inverse of the limit surface, tabulated: from the direction of a load to the twist that it drives.
+
+The compiled kernel (kernel/surface) interpolates these tables. Goyal, Ruina and Papadopoulos 1991 define the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.mechanics.point_friction import power_of_twist, twist_of_load
+from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.types import Array
+
+AZIMUTHS, ELEVATIONS = 144, 49  # of the force's direction, and of the moment from none to a pure one
+DIRECTIONS = 16  # of arms, over half a turn
+REFINED = 3  # a smooth surface is solved at every third node and interpolated by cubic splines
+SMOOTH_POINTS = 20  # with fewer points of support the surface has flats, and every node is solved
+BEYOND = 3  # coarse nodes beyond both ends of the elevation, for the splines
+STRETCH_STEP = 0.5  # of the friction's direction dependence: secants across it are right to 7 % of its effect
+STRETCH_REFINED = 2  # times fewer nodes for the secants
+
+
+@dataclass(frozen=True, eq=False)
+class LoadMap:
+    """The tabulated inverse of the limit surface of one pressure distribution, about its centre of pressure.
+
+    nodes (ELEVATIONS, AZIMUTHS + 1, 4): unit twists (vx, vy, w times length) of loads with that azimuth of their force
+    and that elevation of moment / length over force, and the size of the load on the surface. A load with a negative
+    moment has the opposite twist of its opposite. centred: the distribution about its centre.
+    quantities (22,): centre x, y (m), length c = mmax / fmax (m), mean squares xx, xy, yy (m^2) of the pressure, and its
+    reach; see `reach`.
+    """
+
+    nodes: Array
+    centred: PressureDistribution
+    quantities: Array
+
+    @cached_property
+    def cells(self) -> Array:
+        """Per cell of the table, bilinear polynomials (cells, 16): of the parts of the twist, and of the size."""
+        return _polynomials(self.nodes)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Change of `cells` per unit of a and of b of direction-dependent friction, (2, cells, 16); see kernel/surface.
+
+        Takes as long as `load_map`. Zero for few points of support: the flats and edges of their surfaces move, and a
+        blend would not be convex.
+        """
+        if _every(self.centred) == 1:
+            return np.zeros((2, *self.cells.shape))
+        every, h = _every(self.centred) * STRETCH_REFINED, STRETCH_STEP
+
+        def nodes(a: float, b: float) -> Array:
+            shape = stretched_arms(self.centred, a, b)
+            return _refined(_solved(shape, shape.length, every), every)
+
+        by_a, by_b = nodes(h, 0.0) - nodes(-h, 0.0), nodes(0.0, h) - nodes(0.0, -h)
+        return np.stack([_polynomials(slope / (2.0 * h)) for slope in (by_a, by_b)])
+
+
+def load_map(pressure: PressureDistribution) -> LoadMap:
+    """Tabulate a distribution; takes about a tenth of a second."""
+    centre, length = pressure.centre, pressure.length
+    centred = PressureDistribution(pressure.points - centre, pressure.shares, pressure.spread)
+    (x, y), shares = centred.points.T, centred.shares
+    square = np.array([shares @ (x * x), shares @ (x * y), shares @ (y * y)])
+    square += [pressure.spread**2, 0.0, pressure.spread**2]
+    every = _every(centred)
+    nodes = _refined(_solved(centred, length, every), every)
+    return LoadMap(nodes, centred, np.concatenate([centre, [length], square, reach(centred)]))
+
+
+def reach(centred: PressureDistribution) -> Array:
+    """Shares (DIRECTIONS,) of the mean distance of the load from the origin, by direction over half a turn.
+
+    Direction k is k pi / DIRECTIONS; an arm between two directions counts for both in proportion.
+    """
+    points = centred.points
+    distance = centred.shares * np.linalg.norm(points, axis=1)
+    place = np.arctan2(points[:, 1], points[:, 0]) % np.pi * (DIRECTIONS / np.pi)
+    below = place.astype(np.int64)
+    part, found = place - below, np.zeros(DIRECTIONS)
+    np.add.at(found, below % DIRECTIONS, (1.0 - part) * distance)
+    np.add.at(found, (below + 1) % DIRECTIONS, part * distance)
+    return np.asarray(found / distance.sum())
+
+
+def stretched_arms(centred: PressureDistribution, a: float, b: float) -> PressureDistribution:
+    """The distribution about its centre with the arms R r of direction-dependent friction; see kernel/surface.
+
+    The size of the arms does not change the shape of a surface.
+    """
+    determinant = np.sqrt(1.0 - a * a - b * b)
+    root = np.array([[1.0 + a + determinant, b], [b, 1.0 - a + determinant]]) / np.sqrt(2.0 + 2.0 * determinant)
+    return PressureDistribution(centred.points @ root, centred.shares, centred.spread)
+
+
+def _every(pressure: PressureDistribution) -> int:
+    return REFINED if len(pressure.points) >= SMOOTH_POINTS else 1
+
+
+def _polynomials(nodes: Array) -> Array:
+    """Per cell, the bilinear polynomials (cells, 16) of nodes: of the three parts of the twist, then of the size."""
+    low, right = nodes[:-1, :-1], nodes[:-1, 1:] - nodes[:-1, :-1]
+    up, both = nodes[1:, :-1] - low, nodes[1:, 1:] - nodes[1:, :-1] - right
+    parts = np.stack([low, right, up, both], axis=2).reshape(-1, 4, 4)
+    return np.concatenate([parts[:, :, :3].reshape(-1, 12), parts[:, :, 3]], axis=1)
+
+
+def _solved(pressure: PressureDistribution, length: float, every: int) -> Array:
+    """Unit twists and sizes of loads (rows, columns + 1, 4) at every n-th node; the last column is the first."""
+    turn = np.arange(0, AZIMUTHS, every) * 2.0 * np.pi / AZIMUTHS
+    rise = np.linspace(0.0, 0.5 * np.pi, (ELEVATIONS - 1) // every + 1)
+    rise_, turn_ = (grid.ravel() for grid in np.meshgrid(rise, turn, indexing="ij"))
+    load = np.column_stack([np.cos(rise_) * np.cos(turn_), np.cos(rise_) * np.sin(turn_), np.sin(rise_)])
+    twist = twist_of_load(pressure, load * [1.0, 1.0, length])
+    size = power_of_twist(pressure, twist)
+    twist = twist * [1.0, 1.0, length]
+    size = size / np.sum(load * twist, axis=1)
+    unit = twist / np.linalg.norm(twist, axis=1, keepdims=True)
+    nodes = np.column_stack([unit, size]).reshape(len(rise), len(turn), 4)
+    return np.concatenate([nodes, nodes[:, :1]], axis=1)
+
+
+def _refined(nodes: Array, every: int) -> Array:
+    """All nodes, by cubic splines over azimuth and elevation."""
+    if every == 1:
+        return nodes
+    from scipy.interpolate import CubicSpline  # its import takes 0.2 s, which no start of a node needs
+
+    turn = np.linspace(0.0, 1.0, nodes.shape[1])
+    fine = CubicSpline(turn, nodes, axis=1, bc_type="periodic")(np.linspace(0.0, 1.0, AZIMUTHS + 1))
+    around = fine[:, (np.arange(AZIMUTHS + 1) + AZIMUTHS // 2) % AZIMUTHS]
+    below = around[BEYOND:0:-1] * [-1.0, -1.0, -1.0, 1.0]  # elevation -a is the opposite of a, half a turn on
+    beyond = around[-2 : -BEYOND - 2 : -1]  # elevation 90 + a is 90 - a, half a turn on
+    rise = np.arange(-BEYOND, len(nodes) + BEYOND) / (len(nodes) - 1)
+    spline = CubicSpline(rise, np.concatenate([below, fine, beyond]), axis=0)
+    return np.asarray(spline(np.linspace(0.0, 1.0, ELEVATIONS)))

@@ -1,0 +1,180 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The limit surfaces of pushes, as the compiled kernel takes them: tables, or a power law without one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import numpy as np
+import scipy
+
+from push_predictor.errors import RigError
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.mechanics.load_map import DIRECTIONS, LoadMap, load_map
+from push_predictor.models.mechanics.pressure import PressureDistribution, patch
+from push_predictor.types import Array, IntArray
+
+EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
+SQUARE_OF_SPREAD = 9.0 / 16.0  # mean square of a coordinate over c squared, of an even disc
+_KNOTS = np.array(EXPONENT_KNOTS)
+_NO_CELLS, _NO_SLOPES = np.zeros((0, 0, 16)), np.zeros((0, 2, 0, 16))
+
+
+@dataclass(frozen=True, eq=False)
+class PowerSurface:
+    """The cheap approximation (f / fmax)^p + (m / mmax)^p = 1; p = 2 is the ellipsoid of Lynch et al. (1992).
+
+    centre (2,) of friction and length c = mmax / fmax, m, body frame. Raises RigError if a value is not finite or the
+    length is not positive.
+    """
+
+    centre: Array
+    length: float
+    power: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not (np.all(np.isfinite(self.centre)) and np.isfinite(self.length) and self.length > 0.0):
+            raise RigError(
+                f"support: centre {np.asarray(self.centre).tolist()} m, length {self.length} m is not accepted, "
+                "give finite numbers and a length above 0"
+            )
+
+
+def uniform_ellipsoid(outline: Outline) -> PowerSurface:
+    """The ellipsoid of a slider with uniform pressure: centre at the area centroid, c = mean |r|.
+
+    Exact: in closed form over the triangles that a polygon's edges make with the centroid, and through the complete
+    elliptic integral for a circle or an ellipse, whose mean |r| is 2 / 3 of the mean of |r| over the curve's parameter.
+    """
+    if outline.semi_axes is not None:
+        a, b = sorted(outline.semi_axes, reverse=True)
+        length = 4.0 / (3.0 * np.pi) * a * scipy.special.ellipe(1.0 - (b / a) ** 2)
+        return PowerSurface(np.array(outline.pose[:2]), float(length))
+    length = _integral_of_distance(outline.vertices - outline.centroid) / outline.area
+    return PowerSurface(outline.centroid, float(length))
+
+
+def _integral_of_distance(vertices: Array) -> float:
+    """Integral of |r| over a polygon (V, 2: m) in m^3: the sum over its edges' triangles with the origin.
+
+    In polar coordinates a triangle whose edge runs from s0 to s1 at the signed distance h gives the integral
+    of (h / cos phi)^3 / 3, which is [h s |r| + h^3 asinh(s / h)] / 6 between the ends.
+    """
+    ends = np.roll(vertices, -1, axis=0)
+    along = (ends - vertices) / np.linalg.norm(ends - vertices, axis=1, keepdims=True)
+    height = vertices[:, 0] * along[:, 1] - vertices[:, 1] * along[:, 0]
+    return float(np.sum(_antiderivative(ends, along, height) - _antiderivative(vertices, along, height)))
+
+
+def _antiderivative(points: Array, along: Array, height: Array) -> Array:
+    s, reach = np.sum(points * along, axis=1), np.linalg.norm(points, axis=1)
+    distance = np.where(height == 0.0, 1.0, np.abs(height))  # an edge towards the origin adds nothing
+    return np.asarray((height * s * reach + height**3 * np.arcsinh(s / distance)) / 6.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceTables:
+    """Surfaces that pushes are on or between: maps, or a power law. quantities (T, 22): see LoadMap."""
+
+    quantities: Array
+    maps: tuple[LoadMap, ...] = ()
+    power: float = 0.0
+
+    @cached_property
+    def cells(self) -> Array:
+        """Those of all maps, (T, cells, 16)."""
+        return np.stack([one.cells for one in self.maps]) if self.maps else _NO_CELLS
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Those of all maps, (T, 2, cells, 16)."""
+        return np.stack([one.slopes for one in self.maps]) if self.maps else _NO_SLOPES
+
+
+@dataclass(frozen=True, eq=False)
+class PushSurfaces:
+    """Which of the tables each of n pushes lies on or above: low (n,), share (n,) of the next; (1,) if all are alike."""
+
+    tables: SurfaceTables
+    low: IntArray
+    share: Array
+
+
+@dataclass(frozen=True)
+class _Patch:
+    """An outline and its pressure; equal for equal outlines, so that all models of a slider share a table."""
+
+    vertices: bytes
+    semi_axes: tuple[float, float] | None
+    exponent: float
+    outline: Outline = field(compare=False)
+
+
+@lru_cache(maxsize=64)
+def _patch_map(key: _Patch) -> LoadMap:
+    return load_map(patch(key.outline, key.exponent))
+
+
+@lru_cache(maxsize=64)
+def known_map(pressure: PressureDistribution) -> LoadMap:
+    """The table of a known distribution."""
+    return load_map(pressure)
+
+
+def same_surface(surface: PowerSurface | PressureDistribution) -> PushSurfaces:
+    """One surface for all pushes."""
+    if isinstance(surface, PressureDistribution):
+        return PushSurfaces(stacked((known_map(surface),)), np.zeros(1, np.int64), np.zeros(1))
+    c, spread = surface.length, SQUARE_OF_SPREAD * surface.length**2
+    reach = np.full(DIRECTIONS, 1.0 / DIRECTIONS)  # of a disc
+    quantities = np.concatenate([surface.centre, [c, spread, 0.0, spread], reach])[None]
+    return PushSurfaces(SurfaceTables(quantities, power=surface.power), np.zeros(1, np.int64), np.zeros(1))
+
+
+def patch_surfaces(outline: Outline, exponent: Array) -> PushSurfaces:
+    """Patches over an outline with rim exponents (n,), blended from those of EXPONENT_KNOTS next to them.
+
+    A knot that is used for the first time takes 0.1 s.
+    """
+    return mixed_surfaces(outline, exponent, np.full(len(exponent), -1), ())
+
+
+def mixed_surfaces(
+    outline: Outline, exponent: Array, support: IntArray, known: Sequence[PressureDistribution]
+) -> PushSurfaces:
+    """Surfaces on known distributions, by number (n,), and where that is negative on the outline's patch."""
+    on_patch = support < 0
+    exponent = np.clip(exponent, _KNOTS[0], _KNOTS[-1])
+    below = np.minimum(np.searchsorted(_KNOTS, exponent, side="right") - 1, len(_KNOTS) - 2)
+    share = np.where(on_patch, (exponent - _KNOTS[below]) / (_KNOTS[below + 1] - _KNOTS[below]), 0.0)
+    first, last = 0, -1
+    if on_patch.any():
+        first, last = int(below[on_patch].min()), int((below + (share > 0.0))[on_patch].max())
+    maps = tuple(known_map(one) for one in known) + _patch_maps(outline, EXPONENT_KNOTS[first : last + 1])
+    return PushSurfaces(stacked(maps), np.where(on_patch, len(known) + below - first, support), share)
+
+
+def _patch_maps(outline: Outline, exponents: Sequence[float]) -> tuple[LoadMap, ...]:
+    vertices = outline.vertices.tobytes()
+    return tuple(_patch_map(_Patch(vertices, outline.semi_axes, exponent, outline)) for exponent in exponents)
+
+
+@lru_cache(maxsize=16)
+def stacked(maps: tuple[LoadMap, ...]) -> SurfaceTables:
+    """The tables of some maps, together."""
+    return SurfaceTables(np.stack([one.quantities for one in maps]), maps)
