@@ -156,8 +156,7 @@ class PushModel:
             return own.contain(inputs)
         low, high = self._feature_range
         features = push_features(self.rig.outline, inputs)
-        margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
-        return np.asarray(np.all((features >= low - margin) & (features <= high + margin), axis=1))
+        return np.asarray(((features >= low) & (features <= high)).all(axis=1))
 
     def covariates_seen(self, push: Push) -> BoolArray:
         """Whether the covariates of each of n pushes lie in the range on which the effects were fitted, (n,).
@@ -226,4 +225,6 @@ class PushModel:
     @cached_property
     def _feature_range(self) -> tuple[Array, Array]:
         features = push_features(self.rig.outline, self.training.inputs)
-        return features.min(axis=0), features.max(axis=0)
+        low, high = features.min(axis=0), features.max(axis=0)
+        margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
+        return low - margin, high + margin

@@ -52,7 +52,7 @@ class FittedMechanics:
     values: dict[str, float] = field(default_factory=dict)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
-    @property
+    @cached_property
     def needs(self) -> tuple[str, ...]:
         """Names of the covariates that every push must bring."""
         names = [RECORDING] if self.mechanics.supports else []

@@ -42,9 +42,9 @@ from push_predictor.types import Array
 RECORDING = "recording"  # the covariate that numbers recordings with different supports
 COLUMN = {parameter.name: k for k, parameter in enumerate(PARAMETERS)}  # of a matrix of values
 TEXTBOOK = np.array([parameter.textbook for parameter in PARAMETERS])
-_IN_WORLD = [k for k, parameter in enumerate(PARAMETERS) if parameter.needs]
-_STRETCHING = [COLUMN[f"{name}{end}"] for name in ("body_anisotropy",) for end in ("", "_diagonal")]
-_STRETCHING += [COLUMN["grain_x"], COLUMN["grain_diagonal"]]
+_IN_WORLD = slice(COLUMN["grain_x"], COLUMN["gradient_y"] + 1)  # what needs the heading of a push
+_STRETCHING = slice(COLUMN["body_anisotropy"], COLUMN["body_anisotropy_diagonal"] + 1)
+_GRAIN = slice(COLUMN["grain_x"], COLUMN["grain_diagonal"] + 1)
 _RIM = COLUMN["rim_exponent"]
 _NO_SLOPES = np.zeros((0, 2, 0, 16))
 
@@ -91,10 +91,12 @@ class PushMechanics:
         given = covariates or {}
         pushes = np.empty((n, 5))
         pushes[:, :3], pushes[:, 3] = inputs, duration
-        pushes[:, 4] = given["push_heading"] if values[:, _IN_WORLD].any() else 0.0
+        in_world = values[:, _IN_WORLD].any()
+        pushes[:, 4] = given["push_heading"] if in_world else 0.0
         surfaces = self._surfaces(values, n, given)
         tables = surfaces.tables
-        slopes = tables.slopes if values[:, _STRETCHING].any() else _NO_SLOPES
+        stretched = values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any())
+        slopes = tables.slopes if stretched else _NO_SLOPES
         displacements(
             np.require(values, np.float64, ["C", "W"]),
             pushes,

@@ -40,7 +40,7 @@ def spline_values(
     place: cython.Py_ssize_t[3]
     stride: cython.Py_ssize_t[3]
     weights: cython.double[12]
-    sums: cython.double[16]
+    sums: cython.float[16]
     whole: cython.Py_ssize_t = 1
     n: cython.Py_ssize_t
     d: cython.Py_ssize_t
@@ -72,13 +72,13 @@ def spline_values(
                 for j in range(4 if axes > 1 else 1):
                     for m in range(4 if axes > 2 else 1):
                         row = first + (place[0] + i) * stride[0]
-                        weight: cython.double = weights[i]
+                        weight: cython.float = weights[i]
                         if axes > 1:
                             row += (place[1] + j) * stride[1]
-                            weight *= weights[4 + j]
+                            weight *= cython.cast(cython.float, weights[4 + j])
                         if axes > 2:
                             row += (place[2] + m) * stride[2]
-                            weight *= weights[8 + m]
+                            weight *= cython.cast(cython.float, weights[8 + m])
                         for k in range(count):
                             sums[k] += weight * coefficients[row, k]
             for k in range(count):
