@@ -38,16 +38,15 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from server_bench import Server, hosted_server_of
 from std_msgs.msg import Header
-from synthetic import noisy_pushes, square_rig
+from synthetic import square_rig
 
 from msg_adapters.predictions import PushQuery, query_to_batch_request, query_to_request
 from push_predictor.errors import PushPredictorError, RequestError
-from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import FARTHEST, PushRequest, check_request, check_requests
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train import train_model
 from push_predictor.nodes.parameters import Param, declare
 from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
@@ -70,12 +69,8 @@ TABLES = {
 def models() -> dict[str, PushModel]:
     rows, rig = pushes(25), square_rig()
     found = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "vhgp")}
-    matern = train_model(
-        noisy_pushes(60), rig, "gp", name="matern", options=TrainingOptions(kernels=KernelChoice("matern52"))
-    )
     return {
         **found,
-        "matern": matern,
         "drifting": replace(extended(found["vhgp"], slippery(0.1, 0.05)), name="drifting"),
     }
 
