@@ -155,3 +155,21 @@ def test_selection_stops_when_few_rows_determine_all_others() -> None:
     chosen = inducing_rows(PARAMETERS.signal, inputs, 100)
     assert len(chosen) == 9
     assert len(np.unique(inputs[chosen], axis=0)) == 9
+
+
+def test_held_out_prediction_is_that_of_the_dense_matrices_and_has_what_is_unexplained() -> None:
+    n, block = 60, np.arange(60) // 7
+    found, sites = problem(n, 12, 9), np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
+    bound = Bound.tied(found, sites)
+    held_out = bound.held_out(block)
+    level = bound.noise_level
+    kernels = (found.signal, 1.0 / (level + PARAMETERS.jitter), level), (found.noise, sites, 1.0 / sites)
+    for (kernel, weights, own), variance in zip(kernels, (held_out.variance, held_out.log_noise_variance), strict=True):
+        explained = np.column_stack([kernel.times(column) for column in np.eye(n)])
+        precision = np.linalg.inv(explained + np.diag(1.0 / weights))
+        assert np.max(kernel.unexplained) > 1e-3
+        for number in range(9):
+            rows_of = np.flatnonzero(block == number)
+            expected = np.diagonal(np.linalg.inv(precision[np.ix_(rows_of, rows_of)])) - own[rows_of]
+            unexplained = np.broadcast_to(kernel.unexplained, n)[rows_of]
+            np.testing.assert_allclose(variance[rows_of], expected + unexplained, rtol=1e-5)

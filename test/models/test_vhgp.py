@@ -25,6 +25,8 @@ from likelihoods import bound_and_gradient, log_marginal_likelihood
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.fit import Found
+from push_predictor.models.gaussian_process.fit import _noise_at as noise_at
 from push_predictor.models.gaussian_process.fit import _search as search_of
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp
@@ -277,3 +279,13 @@ def test_vector_of_parameters_round_trips() -> None:
     np.testing.assert_array_equal(VhgpParameters.from_vector(vector).to_vector(), vector)
     assert vector.tolist() == [0.1, -0.2, 0.2, 0.3, 0.1, -0.1, -1.0, -0.8]
     assert PARAMETERS.count == 8
+
+
+def test_noise_at_other_rows_to_begin_with_is_what_a_model_of_the_few_predicts() -> None:
+    few, outputs = rows(60)
+    best = maximise_over_noise(VhgpProblem.of(few, outputs, PARAMETERS), None, 1e-13)
+    new = rows(20, seed=1)[0]
+    mean, variance = noise_at(new, few, Found(PARAMETERS, best.sites, 0.0))
+    prediction = VHGP(few, outputs, PARAMETERS, best.tied_precisions).predict(new)
+    np.testing.assert_allclose(mean, prediction.log_noise_mean, atol=1e-4)
+    np.testing.assert_allclose(variance, prediction.log_noise_variance, rtol=1e-4)
