@@ -34,8 +34,8 @@ import numpy as np
 from benchmarks.models.peers import Measured, square_rows
 from benchmarks.models.training import cpu_seconds
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.models.gaussian_process.quadrature import exact_log_density
-from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.prediction import exact_log_density
+from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.types import Array
 

@@ -42,9 +42,8 @@ from benchmarks.measured.square import imported_square
 from benchmarks.models.training import cpu_seconds, fit_reference, made_up_pushes
 from push_predictor.evaluation.splits import random_split, split_by_push
 from push_predictor.models.gaussian_process.gp import fit_gp
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
-from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density, gaussian_log_density
+from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.train_learnt import fitted_mean

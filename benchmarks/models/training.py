@@ -17,10 +17,9 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.training [n ...] [--data FOLDER]
 
 Rows are made up, with two inputs and with three, and those of simulated pushes with the speed as an input: three slow
-speeds, and the ten of the paper. With --data also those of FOLDER/mit_square. For each choice of kernels: CPU seconds
-for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the peak memory of one fit
-in dense matrices of n x n doubles. Last: the time to rebuild three VHGPs from their parameters, and to predict one
-input and a thousand.
+speeds, and the ten of the paper. With --data also those of FOLDER/mit_square. CPU seconds for three outputs, ratios to
+scikit-learn's homoscedastic GP, and the peak memory of one fit in dense matrices of n x n doubles. Last: the time to
+rebuild three VHGPs from their parameters, and to predict one input and a thousand.
 """
 
 from __future__ import annotations
@@ -41,7 +40,6 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.features import push_features
 from push_predictor.models.gaussian_process.gp import fit_gp
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import random_pushes
@@ -53,24 +51,20 @@ ALL_SPEEDS = (0.01, 0.02, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # m/s, th
 WINDOW, WINDOWS = 0.2, 2  # s; of a push at least
 BEFORE = 0.025  # m: to accelerate and decelerate
 SHORTEST_PUSH, LONGEST_PUSH = 0.02, 0.2  # m: travel of slow pushes, and of the fastest, which have one window
-CHOICES = {"SE": DEFAULT_CHOICE, "Matern + nugget": KernelChoice("matern52", noise_nugget=True)}
 
 
 def main() -> None:
-    """Print one line of costs for each set of rows and choice of kernels."""
+    """Print one line of costs for each set of rows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sizes", nargs="*", type=int, default=[100, 200, 500, 1000])
     parser.add_argument("--data", type=Path, help="folder that holds mit_square")
     arguments = parser.parse_args()
-    print("                             CPU s                      / sklearn      matrices  ms         us      ms")
-    print("rows          n  kernels          sklearn    GP   VHGP    GP   VHGP    peak      rebuild  1 push  1000")
+    print("                 CPU s                   / sklearn    matrices  ms         us      ms")
+    print("rows          n  sklearn    GP   VHGP    GP   VHGP    peak      rebuild  1 push  1000")
     for n in arguments.sizes:
         for title, inputs, outputs in rows(n, arguments.data):
             reference, _ = cpu_seconds(partial(fit_references, inputs, outputs))
-            for name, choice in CHOICES.items():
-                print(
-                    f"{title:10s} {len(inputs):5d}  {name:16s} {costs(inputs, outputs, choice, reference)}", flush=True
-                )
+            print(f"{title:10s} {len(inputs):5d} {costs(inputs, outputs, reference)}", flush=True)
 
 
 def rows(n: int, data: Path | None) -> Iterator[tuple[str, Array, Array]]:
@@ -83,13 +77,13 @@ def rows(n: int, data: Path | None) -> Iterator[tuple[str, Array, Array]]:
         yield "mit_square", *measured_pushes(data / "mit_square" / "pushes_3500.npz", n)
 
 
-def costs(inputs: Array, outputs: Array, choice: KernelChoice, reference: float) -> str:
+def costs(inputs: Array, outputs: Array, reference: float) -> str:
     """One line of the table; reference: CPU seconds of scikit-learn's fits."""
-    gp, processes = cpu_seconds(lambda: [fit_gp(inputs, column, choice) for column in outputs.T])
+    gp, processes = cpu_seconds(lambda: [fit_gp(inputs, column) for column in outputs.T])
     starts = [(process.outputs, process.parameters) for process in processes]
-    vhgp, models = cpu_seconds(lambda: [fit_vhgp(inputs, column, choice, start=start) for column, start in starts])
+    vhgp, models = cpu_seconds(lambda: [fit_vhgp(inputs, column, start=start) for column, start in starts])
     vhgp += gp
-    peak = peak_bytes(lambda: fit_vhgp(inputs, outputs[:, 0], choice)) / (8.0 * len(inputs) ** 2)
+    peak = peak_bytes(lambda: fit_vhgp(inputs, outputs[:, 0])) / (8.0 * len(inputs) ** 2)
     rebuild = fastest(lambda: [VHGP(v.inputs, v.outputs, v.parameters, v.site_precisions) for v in models])
     new = np.random.default_rng(1).uniform(-1.7, 1.7, size=(1000, inputs.shape[1]))
     one = fastest(lambda: [v.predict(new[:1]) for v in models], repeats=50)

@@ -24,8 +24,7 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING
+from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
@@ -61,9 +60,9 @@ class TrainingOptions:
     n_train: draw this many rows at random with default_rng(seed). None takes all rows up to 1000; of more, it draws
     1000 evenly over the pushes (MOST_FITTED_ROWS with fit). fit: choose and estimate the mechanics' parameters of an
     analytical model; otherwise the textbook's values are used. supports: support points (k, 3) as in Rig, by the
-    covariate `recording`, where recordings had others than the rig; used with fit. kernels: of a learnt model.
+    covariate `recording`, where recordings had others than the rig; used with fit.
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
-    that, with the default kernels, a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about
+    that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about
     which the residual is learnt, zero, or auto for the better of both by held-out pushes (what the command and the
     front door take). about: mechanics to learn about, as they are; mean is then not used. tails: of a learnt model:
     whether to fit the distribution of new pushes (predictors/tails.py); without it, windows of a push are taken for
@@ -73,7 +72,6 @@ class TrainingOptions:
     n_train: int | None = None
     seed: int = 0
     fit: bool = False
-    kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
     mean: MeanChoice = "zero"
     about: MechanicsMean | None = None
@@ -135,13 +133,12 @@ def train_with_ladder(
 def _predictor(
     rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
 ) -> tuple[Predictor, list[Rung]]:
-    automatic = options.inducing is None and options.kernels != DEFAULT_CHOICE  # a sparse model has no other kernels
-    inducing = None if automatic else inducing_inputs(kind, len(rows), options.inducing)
+    inducing = inducing_inputs(kind, len(rows), options.inducing)
     if kind == "prior":
         watch("train prior", 0.1)
         return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
-        learnt = LearntOptions(kind, options.kernels, inducing, options.mean, options.tails)
+        learnt = LearntOptions(kind, inducing, options.mean, options.tails)
         if options.about is not None:
             return train_about(options.about, rows, rig, learnt), []
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
@@ -165,7 +162,7 @@ def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. Mechanics keep their
+    A learnt one is refitted on at most 1000 rows drawn evenly over the pushes. Mechanics keep their
     parameters, alone and as the mean of a learnt model: a change of these is what a trace looks for. The covariance of
     an analytical model is estimated again. The priors of a prior model are updated by the table. Raises TrainingError
     for too few rows.
@@ -173,7 +170,7 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
         tails = predictor.tails is not None
-        options = TrainingOptions(seed=seed, kernels=predictor.kernels, about=predictor.mean, tails=tails)
+        options = TrainingOptions(seed=seed, about=predictor.mean, tails=tails)
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor

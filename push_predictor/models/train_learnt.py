@@ -23,11 +23,9 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.features import push_features
-from push_predictor.models.gaussian_process.constant import fit_constant
 from push_predictor.models.gaussian_process.gp import SHORTEST, fit_gp
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.gaussian_process.regression import Regression, best_held_out, held_out_score
-from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant, held_out_score
+from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.fit import fit_jointly, held_out_residuals
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -63,7 +61,6 @@ class LearntOptions:
     """
 
     kind: str
-    kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
     mean: MeanChoice = "zero"
     tails: bool = True
@@ -193,11 +190,9 @@ def _blocks(rows: PushTable) -> IntArray:
 
 def _learnt(features: Array, column: Array, options: LearntOptions, shortest: float) -> Regression:
     if options.kind == "gp":
-        return fit_gp(features, column, options.kernels, shortest=shortest)
+        return fit_gp(features, column, shortest=shortest)
     if options.inducing is None:
-        return fit_vhgp(features, column, options.kernels, shortest=shortest)
-    if options.kernels != DEFAULT_CHOICE:
-        raise TrainingError(f"{options.kernels}: a sparse VHGP has squared exponential kernels and no nugget")
+        return fit_vhgp(features, column, shortest=shortest)
     return fit_sparse_vhgp(features, column, options.inducing)
 
 

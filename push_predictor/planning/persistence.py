@@ -22,7 +22,7 @@ windows. The correlation of standardised residuals over a distance s of the tip 
 
 and the rest of the variance is independent from window to window. The three parameters are fitted by least squares to
 the products of all pairs of windows of a push that are at most LAGS windows apart. For a learnt model the residuals are
-leave-one-push-out (models/gaussian_process/cross_validation.py). They are replaced by their normal scores, because the
+leave-one-push-out (models/gaussian_process/ridge.py). They are replaced by their normal scores, because the
 few largest would otherwise decide. With few pushes the two fractions are shrunk by pushes / (pushes + FEW) towards
 independent windows.
 """

@@ -34,7 +34,7 @@ from push_predictor_paper.claims.calibration import section as calibration
 from push_predictor_paper.claims.comparison import mean_gain, speed_error
 from push_predictor_paper.claims.comparison import section as comparison
 from push_predictor_paper.claims.divergence import section as divergence
-from push_predictor_paper.claims.learning import learning_curves, variants
+from push_predictor_paper.claims.learning import learning_curves
 from push_predictor_paper.claims.maps import section as maps
 from push_predictor_paper.claims.noise import section as noise
 from push_predictor_paper.claims.quasi_static import section as quasi_static
@@ -66,7 +66,6 @@ CLAIMS: Mapping[str, Callable[[Study], Section]] = {  # by what the progress bar
     "modality": modality.section,
     "quasi-static": quasi_static.section,
     "calibration": calibration.section,
-    "variants": variants.section,
 }
 HOW_TO_READ = (
     "Each verdict follows from the numbers by a rule that its finding states. Intervals are 95 %.",

@@ -26,7 +26,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
-from push_predictor.models.gaussian_process.quadrature import gaussian_log_density
+from push_predictor.models.gaussian_process.prediction import gaussian_log_density
 
 
 @pytest.mark.long

@@ -29,11 +29,10 @@ import pytest
 from mit_square_fits import fit_scaled, load_square
 from scipy.interpolate import RBFInterpolator
 
-from push_predictor.models.gaussian_process.kernels import SquaredExponential
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.parameters import JITTER
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.quadrature import exact_log_density
-from push_predictor.models.gaussian_process.vhgp_parameters import JITTER
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
 from push_predictor.types import Array
 
 OUTPUTS = ("dx", "dy", "dtheta")
@@ -48,8 +47,8 @@ class Reference:
     train_y: Array
 
     @property
-    def kernel(self) -> SquaredExponential:
-        return SquaredExponential(self.fields["theta1"][:2], float(self.fields["theta1"][2]))
+    def kernel(self) -> ArdKernel:
+        return ArdKernel(self.fields["theta1"][:2], float(self.fields["theta1"][2]))
 
     @property
     def constant(self) -> float:

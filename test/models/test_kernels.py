@@ -16,17 +16,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_predictor.models.gaussian_process.kernels import SquaredExponential
-from push_predictor.models.gaussian_process.matrices.ridge import RegularisableKernel, factorise
+from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel
 from push_predictor.types import Array
 
-KERNEL = SquaredExponential(np.array([0.3, -0.4, 1.0]), 0.2)
+KERNEL = ArdKernel(np.array([0.3, -0.4, 1.0]), 0.2)
 
 
 def normal(*shape: int, seed: int = 0) -> Array:
@@ -48,7 +50,7 @@ def test_one_row_equals_that_of_many() -> None:
 
 @given(st.integers(0, 10_000), st.floats(-3.0, 3.0), st.floats(-3.0, 1.5))
 def test_matrix_is_symmetric_positive_and_at_most_its_diagonal(seed: int, log_scale: float, log_sd: float) -> None:
-    kernel = SquaredExponential(np.full(2, log_scale), log_sd)
+    kernel = ArdKernel(np.full(2, log_scale), log_sd)
     matrix = kernel.matrix(normal(30, 2, seed=seed))
     assert (matrix == matrix.T).all()
     assert matrix.max() <= kernel.variance * (1.0 + 1e-14)
@@ -64,8 +66,8 @@ def test_only_differences_of_inputs_matter(shift: float) -> None:
 
 def test_infinite_lengthscale_removes_its_input() -> None:
     inputs = normal(20, 3)
-    blind = SquaredExponential(np.array([0.3, -0.4, 20.0]), 0.2)
-    pair = SquaredExponential(np.array([0.3, -0.4]), 0.2)
+    blind = ArdKernel(np.array([0.3, -0.4, 20.0]), 0.2)
+    pair = ArdKernel(np.array([0.3, -0.4]), 0.2)
     np.testing.assert_allclose(blind.matrix(inputs), pair.matrix(inputs[:, :2]), rtol=1e-12)
 
 
@@ -74,7 +76,7 @@ def test_gradient_equals_finite_differences() -> None:
     weights = weights + weights.T
 
     def contracted(vector: Array) -> float:
-        return float((weights * SquaredExponential(vector[:3], vector[3]).matrix(inputs)).sum())
+        return float((weights * ArdKernel(vector[:3], vector[3]).matrix(inputs)).sum())
 
     at = np.append(KERNEL.log_lengthscales, KERNEL.log_sd)
     gradient = KERNEL.gradient(inputs, KERNEL.matrix(inputs), weights.copy())
@@ -88,9 +90,10 @@ def test_gradient_equals_finite_differences() -> None:
 
 @pytest.mark.parametrize("n", [50, 300])
 def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
-    matrix = SquaredExponential(np.array([0.5, 0.5]), 0.1).matrix(normal(n, 2))
+    factorised = DenseKernel.of(ArdKernel(np.array([0.5, 0.5]), 0.1), normal(n, 2))
+    matrix = factorised.matrix
     diagonal = np.exp(normal(n, seed=2))
-    ridge = factorise(matrix).regularise(1.0 / diagonal)
+    ridge = factorised.regularise(1.0 / diagonal)
     inverse = np.linalg.inv(matrix + np.diag(diagonal))
     values = normal(n, seed=3)
     np.testing.assert_allclose(ridge.precision(), inverse, atol=1e-11)
@@ -102,17 +105,30 @@ def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
 
 def test_a_smooth_kernel_of_many_rows_is_factorised_and_a_rough_one_is_not() -> None:
     inputs = normal(600, 2)
-    smooth, rough = SquaredExponential(np.zeros(2), 0.0), SquaredExponential(np.full(2, -4.0), 0.0)
-    assert factorise(smooth.matrix(inputs)).root is not None
-    assert factorise(rough.matrix(inputs)).root is None
+    smooth, rough = ArdKernel(np.zeros(2), 0.0), ArdKernel(np.full(2, -4.0), 0.0)
+    assert DenseKernel.of(smooth, inputs).root is not None
+    assert DenseKernel.of(rough, inputs).root is None
+
+
+@pytest.mark.parametrize("n", [50, 300])
+def test_separate_nugget_equals_nugget_in_the_matrix(n: int) -> None:
+    smooth = DenseKernel.of(ArdKernel(np.full(2, 0.5), 0.1), normal(n, 2))
+    weights, values, block = np.exp(normal(n, seed=2)), normal(n, seed=3), np.arange(n) // 7
+    apart = NuggetKernel(smooth, 0.3).regularise(weights)
+    inside = replace(smooth, matrix=smooth.matrix + 0.3 * np.eye(n), root=None)
+    ridge = inside.regularise(weights)
+    np.testing.assert_allclose(NuggetKernel(smooth, 0.3).times(values), inside.times(values), rtol=1e-12)
+    np.testing.assert_allclose(apart.residual(values), ridge.residual(values), atol=1e-10)
+    np.testing.assert_allclose(apart.posterior_diagonal, ridge.posterior_diagonal, rtol=1e-8)
+    np.testing.assert_allclose(apart.held_out_errors(values, block), ridge.held_out_errors(values, block), rtol=1e-7)
+    assert apart.log_determinant == pytest.approx(ridge.log_determinant, abs=1e-8)
 
 
 def test_low_rank_equals_dense_for_diagonal_over_many_decades() -> None:
-    matrix = SquaredExponential(np.zeros(2), 0.0).matrix(normal(600, 2))
+    factorised = DenseKernel.of(ArdKernel(np.zeros(2), 0.0), normal(600, 2))
     weights = 10.0 ** np.random.default_rng(1).uniform(-3, 3, 600)
-    factorised = factorise(matrix)
     assert factorised.root is not None
-    low, dense = factorised.regularise(weights), RegularisableKernel(matrix, None).regularise(weights)
+    low, dense = factorised.regularise(weights), replace(factorised, root=None).regularise(weights)
     np.testing.assert_allclose(low.posterior_diagonal, dense.posterior_diagonal, rtol=1e-5, atol=1e-10)
     assert low.log_determinant == pytest.approx(dense.log_determinant, abs=1e-6)
 

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from push_predictor.errors import ModelFileError
 from push_predictor.models.mechanics.analytical import ACCURACY
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
@@ -36,13 +37,12 @@ from push_predictor.models.predictors import (
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
 
 FILES = Path(__file__).parent / "model_files"
-FORMATS = range(1, FORMAT_VERSION + 1)
+FORMATS = [version for version in range(1, FORMAT_VERSION + 1) if version != 2]  # 2 has kernels that are gone
 INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5]])
 DURATION = np.full(3, 0.2)
 COVARIATES = {"elapsed_time": np.array([0.0, 10.0, 20.0])}
 PREDICTORS = {
     1: GaussianProcessPredictor,
-    2: GaussianProcessPredictor,
     3: ExtendedPredictor,
     4: ExtendedPredictor,
     5: GaussianProcessPredictor,
@@ -88,9 +88,7 @@ def test_model_is_saved_in_the_format_it_was_loaded_from(version: int, tmp_path:
 
 
 def test_parts_of_each_format_are_loaded() -> None:
-    second, third, fourth, fifth, sixth, seventh, eighth = (load_model(file_of(v)).predictor for v in range(2, 9))
-    assert isinstance(second, GaussianProcessPredictor)
-    assert {regression.parameters.choice.family for regression in second.regressions} == {"matern52"}
+    third, fourth, fifth, sixth, seventh, eighth = (load_model(file_of(v)).predictor for v in range(3, 9))
     assert isinstance(third.base, AnalyticalPredictor)
     assert [effect.mechanism for effect in third.effects] == ["contact_friction"] and not third.cross
     assert [effect.mechanism for effect in fourth.effects] == ["contact_friction", "pusher_radius"]
@@ -100,3 +98,8 @@ def test_parts_of_each_format_are_loaded() -> None:
     assert not any(effect.exact for effect in (*third.effects, *fourth.effects))
     assert isinstance(seventh.base, MechanicsPredictor) and all(effect.exact for effect in seventh.effects)
     assert fifth.tails is None and eighth.tails is not None
+
+
+def test_model_with_kernels_that_are_gone_is_refused() -> None:
+    with pytest.raises(ModelFileError, match="kernel family 'matern52' is not accepted, train the model again"):
+        load_model(file_of(2))

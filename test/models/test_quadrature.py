@@ -21,8 +21,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.quadrature import exact_cdf, exact_log_density, gaussian_log_density
+from push_predictor.models.gaussian_process.prediction import (
+    LatentPrediction,
+    exact_cdf,
+    exact_log_density,
+    gaussian_log_density,
+)
 from push_predictor.types import Array
 
 

@@ -20,65 +20,65 @@ import numpy as np
 import pytest
 from sparse_rows import PARAMETERS, rows
 
-from push_predictor.models.gaussian_process.sparse.bound import SparseBound, SparseProblem
-from push_predictor.models.gaussian_process.sparse.fit import maximise_over_noise, noise_penalty
-from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
-from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel
-from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
-from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise as dense_maximum
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.inner import maximise_over_noise
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel, inducing_rows
+from push_predictor.models.gaussian_process.sparse.vhgp import noise_prior
 from push_predictor.types import Array
 
 
-def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAMETERS) -> SparseProblem:
+def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAMETERS) -> VhgpProblem:
     """With the first `signal` rows for inducing inputs of f, the last `noise` for those of g."""
     inputs, outputs = rows(n)
-    return SparseProblem.of(inputs, outputs, parameters, inputs[:signal], inputs[n - noise :])
+    of_signal = InducedKernel.of(parameters.signal, inputs, inputs[:signal])
+    of_noise = InducedKernel.of(parameters.noise, inputs, inputs[n - noise :])
+    return VhgpProblem.about(outputs, parameters, of_signal, of_noise)
 
 
 def test_bound_equals_dense_one_if_every_row_is_inducing() -> None:
     inputs, outputs = rows(60)
     sites = np.exp(0.5 * np.random.default_rng(1).normal(size=60) - 0.7)
     dense = Bound.tied(VhgpProblem.of(inputs, outputs, PARAMETERS), sites)
-    sparse = SparseBound.tied(problem(60, 60, 60), sites)
+    sparse = Bound.tied(problem(60, 60, 60), sites)
     assert sparse.value == pytest.approx(dense.value, abs=1e-6)
-    np.testing.assert_allclose(sparse.signal.optimal_precisions, dense.optimal_precisions, atol=1e-6)
+    np.testing.assert_allclose(sparse.optimal_precisions, dense.optimal_precisions, atol=1e-6)
 
 
 def test_maximum_over_q_equals_that_of_the_dense_bound() -> None:
-    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-13)
-    sparse = maximise_over_noise(problem(60, 60, 60), [], 1e-13)
+    dense = maximise_over_noise(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-13)
+    sparse = maximise_over_noise(problem(60, 60, 60), None, 1e-13)
     assert sparse.value == pytest.approx(dense.value, abs=1e-6)
     np.testing.assert_allclose(sparse.hyperparameter_gradient(), dense.hyperparameter_gradient(), atol=1e-5)
 
 
 def test_fewer_inducing_inputs_never_give_a_higher_bound() -> None:
-    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-10).value
-    values = [maximise_over_noise(problem(60, m, m), [], 1e-10).value for m in (60, 40, 20, 10)]
+    dense = maximise_over_noise(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-10).value
+    values = [maximise_over_noise(problem(60, m, m), None, 1e-10).value for m in (60, 40, 20, 10)]
     assert values[0] == pytest.approx(dense, abs=1e-6)
     assert dense > values[1] > values[2] > values[3]
 
 
-def settled(bound: SparseBound) -> SparseBound:
+def settled(bound: Bound) -> Bound:
     """The bound is flat at its maximum, to rounding: only further steps bring the sites there, and with them the
     gradient, which feels them in the first order.
     """
     for _ in range(6):
-        bound = SparseBound.at(bound.problem, bound.optimal_sites)
+        bound = Bound.at(bound.problem, bound.optimal_sites)
     return bound
 
 
-ACROSS = np.random.default_rng(6).normal(size=(1, 7))  # a direction in which all hyperparameters change
+ACROSS = np.random.default_rng(6).normal(size=(1, 8))  # a direction in which all hyperparameters change
 
 
-@pytest.mark.parametrize(("n", "signal", "noise", "directions"), [(60, 20, 30, np.eye(7)), (4500, 12, 9, ACROSS)])
+@pytest.mark.parametrize(("n", "signal", "noise", "directions"), [(60, 20, 30, np.eye(8)), (4500, 12, 9, ACROSS)])
 def test_gradient_of_every_hyperparameter_equals_finite_differences(
     n: int, signal: int, noise: int, directions: Array
 ) -> None:
     """Also across several blocks of rows."""
 
-    def maximum(vector: Array) -> SparseBound:
-        return settled(maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), [], 0.0))
+    def maximum(vector: Array) -> Bound:
+        return settled(maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), None, 0.0))
 
     at, h = PARAMETERS.to_vector(), 1e-3
     gradient = maximum(at).hyperparameter_gradient()
@@ -91,35 +91,36 @@ def test_gradient_of_every_hyperparameter_equals_finite_differences(
 
 def test_the_prior_is_for_the_noise_alone_and_has_its_gradient() -> None:
     vector, h = PARAMETERS.to_vector(), 1e-4
-    steps = h * np.eye(7)
-    numbers = [(noise_penalty(vector + s, 300)[0] - noise_penalty(vector - s, 300)[0]) / (2.0 * h) for s in steps]
-    slope = noise_penalty(vector, 300)[1]
+    prior, twice = noise_prior(2, 300), noise_prior(2, 600)
+    numbers = [(prior.penalty(vector + s)[0] - prior.penalty(vector - s)[0]) / (2.0 * h) for s in h * np.eye(8)]
+    slope = prior.penalty(vector)[1]
     np.testing.assert_allclose(slope, numbers, atol=1e-7)
-    assert np.flatnonzero(slope).tolist() == [3, 4, 5]
-    assert noise_penalty(vector, 600)[0] == pytest.approx(2.0 * noise_penalty(vector, 300)[0])
+    assert np.flatnonzero(slope).tolist() == [3, 4, 5, 7]
+    np.testing.assert_allclose(twice.penalty(vector)[1][3:6], 2.0 * slope[3:6])
+    assert twice.penalty(vector)[1][7] == slope[7]
 
 
 def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
     found = problem(200, 20, 15)
-    best = maximise_over_noise(found, [], 1e-12)
+    best = maximise_over_noise(found, None, 1e-12)
     rng = np.random.default_rng(3)
     for size in (1e-2, 1e-1, 1.0):
         precisions = best.sites.precisions * np.exp(size * rng.normal(size=200))
         potentials = best.sites.potentials + size * rng.normal(size=200)
-        assert SparseBound.at(found, Sites(precisions, potentials)).value < best.value
+        assert Bound.at(found, Sites(precisions, potentials)).value < best.value
 
 
 def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
     found = problem(200, 20, 15)
-    best = maximise_over_noise(found, [], 1e-12)
+    best = maximise_over_noise(found, None, 1e-12)
     np.testing.assert_allclose(best.tied_precisions, best.sites.precisions, atol=1e-5)
-    assert SparseBound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
+    assert Bound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
 def test_search_for_q_converges_from_any_start() -> None:
-    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
-    start = maximise_over_noise(problem(200, 20, 15, elsewhere), [], 1e-3).sites
-    fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in ([], [start]))
+    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5, 0.2)
+    start = maximise_over_noise(problem(200, 20, 15, elsewhere), None, 1e-3).sites
+    fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in (None, start))
     assert warm == pytest.approx(fresh, abs=1e-7)
 
 
@@ -154,3 +155,21 @@ def test_selection_stops_when_few_rows_determine_all_others() -> None:
     chosen = inducing_rows(PARAMETERS.signal, inputs, 100)
     assert len(chosen) == 9
     assert len(np.unique(inputs[chosen], axis=0)) == 9
+
+
+def test_held_out_prediction_is_that_of_the_dense_matrices_and_has_what_is_unexplained() -> None:
+    n, block = 60, np.arange(60) // 7
+    found, sites = problem(n, 12, 9), np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
+    bound = Bound.tied(found, sites)
+    held_out = bound.held_out(block)
+    level = bound.noise_level
+    kernels = (found.signal, 1.0 / (level + PARAMETERS.jitter), level), (found.noise, sites, 1.0 / sites)
+    for (kernel, weights, own), variance in zip(kernels, (held_out.variance, held_out.log_noise_variance), strict=True):
+        explained = np.column_stack([kernel.times(column) for column in np.eye(n)])
+        precision = np.linalg.inv(explained + np.diag(1.0 / weights))
+        assert np.max(kernel.unexplained) > 1e-3
+        for number in range(9):
+            rows_of = np.flatnonzero(block == number)
+            expected = np.diagonal(np.linalg.inv(precision[np.ix_(rows_of, rows_of)])) - own[rows_of]
+            unexplained = np.broadcast_to(kernel.unexplained, n)[rows_of]
+            np.testing.assert_allclose(variance[rows_of], expected + unexplained, rtol=1e-5)

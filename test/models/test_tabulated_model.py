@@ -28,7 +28,7 @@ from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.gaussian_process.constant import fit_constant
+from push_predictor.models.gaussian_process.regression import fit_constant
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor

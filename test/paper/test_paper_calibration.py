@@ -49,7 +49,7 @@ from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.gaussian_process.quadrature import exact_log_density
+from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

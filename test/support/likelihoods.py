@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.types import Array
 
 
@@ -37,26 +37,24 @@ def bound_and_gradient(
 ) -> tuple[float, Array, Array]:
     """F with b = Lambda - 1/2, dF/d(site_precisions) (n,) and dF/d(parameters.to_vector())."""
     bound = Bound.tied(VhgpProblem.of(inputs, outputs, parameters), site_precisions)
-    return bound.value, _site_gradient(bound), _tied_gradient(bound)
+    matrix = parameters.noise.matrix(inputs)
+    kernel = matrix + parameters.nugget * np.eye(len(matrix))
+    precision = np.linalg.inv(kernel + np.diag(1.0 / site_precisions))
+    return bound.value, _site_gradient(bound, kernel, precision), _tied_gradient(bound, inputs, matrix, precision)
 
 
-def _site_gradient(bound: Bound) -> Array:
+def _site_gradient(bound: Bound, kernel: Array, precision: Array) -> Array:
     """dF/dLambda with b = Lambda - 1/2 tied to it: -(K_g + 1/2 S o S)(Lambda - optimal), shape (n,)."""
-    matrix = bound.problem.noise_kernel.matrix
-    kernel = matrix + bound.problem.parameters.nugget * np.eye(len(matrix))
-    posterior = kernel - kernel @ bound.noise_ridge.precision() @ kernel
+    posterior = kernel - kernel @ precision @ kernel
     return np.asarray(-(kernel + 0.5 * posterior**2) @ (bound.site_precisions - bound.optimal_precisions))
 
 
-def _tied_gradient(bound: Bound) -> Array:
+def _tied_gradient(bound: Bound, inputs: Array, matrix: Array, precision: Array) -> Array:
     """dF/d(parameters) with b tied to Lambda: the product's gradient and a term that vanishes at a maximum."""
-    problem, gradient = bound.problem, bound.hyperparameter_gradient()
-    parameters, precision = problem.parameters, bound.noise_ridge.precision()
+    parameters, gradient = bound.problem.parameters, bound.hyperparameter_gradient()
     unbalance = (bound.optimal_precisions - bound.site_precisions) / bound.site_precisions**2
     weights = (precision * unbalance) @ precision
     size = len(parameters.log_lengthscales) + 1
-    of_noise = slice(size, 2 * size)
-    gradient[of_noise] -= 0.5 * parameters.noise.gradient(problem.inputs, problem.noise_kernel.matrix, weights)
-    if parameters.log_nugget_sd is not None:
-        gradient[-1] -= parameters.nugget * float(np.trace(weights))
+    gradient[size : 2 * size] -= 0.5 * parameters.noise.gradient(inputs, matrix, weights)
+    gradient[-1] -= parameters.nugget * float(np.trace(weights))
     return gradient

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.types import Array
 
-PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0)
+PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0, -0.8)
 
 
 def rows(n: int, seed: int = 0) -> tuple[Array, Array]:

@@ -14,5 +14,5 @@
 
 """Gaussian process regression of one output: standard (`gp`) and variational heteroscedastic (`vhgp`).
 
-Import `gp`, `vhgp`, `kernels`, `prediction` and `cross_validation`; the other modules are steps of their fits.
+Import `gp`, `vhgp`, `sparse.vhgp`, `regression`, `prediction` and `kernels`; the other modules are steps of their fits.
 """

@@ -49,24 +49,23 @@ class Descent:
     most_iterations: int
     stop: float
 
-    def run(self, cost: Cost, first: Array) -> Minimum:
-        """The local minimum reached from a point of the box."""
+    def run(self, cost: Cost, first: Array, unit: Array | float = 1.0) -> Minimum:
+        """The local minimum reached from a point of the box; unit: about the length of the first step."""
         from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
-
-        options = {"maxiter": self.most_iterations, "ftol": self.stop}
-        found = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options)
-        return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())), float(found.fun))
-
-    def refine(self, cost: Cost, rough: Minimum) -> Minimum:
-        """The local minimum reached from that of a third of the rows, in units that suit the first steps."""
-        unit = rough.width / np.sqrt(_PART)
 
         def scaled(point: Array) -> tuple[float, Array]:
             value, gradient = cost(point * unit)
             return value, gradient * unit
 
-        found = Descent(self.box / unit[:, None], self.most_iterations, self.stop).run(scaled, rough.point / unit)
-        return Minimum(found.point * unit, found.width * unit, found.cost)
+        options = {"maxiter": self.most_iterations, "ftol": self.stop}
+        box = (self.box.T / unit).T
+        found = minimize(scaled, first / unit, jac=True, method="L-BFGS-B", bounds=box, options=options)
+        width = np.sqrt(np.diagonal(found.hess_inv.todense()))
+        return Minimum(found.x * unit, width * unit, float(found.fun))
+
+    def refine(self, cost: Cost, rough: Minimum) -> Minimum:
+        """The local minimum reached from that of a third of the rows, in units that suit the first steps."""
+        return self.run(cost, rough.point, rough.width / np.sqrt(_PART))
 
 
 def part_of_rows(n: int) -> IntArray | None:

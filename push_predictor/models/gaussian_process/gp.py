@@ -19,21 +19,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.cross_validation import held_out_errors
 from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum, part_of_rows
-from push_predictor.models.gaussian_process.kernels import (
-    DEFAULT_CHOICE,
-    ArdKernel,
-    KernelChoice,
-    KernelFamily,
-    ard_kernel,
-)
-from push_predictor.models.gaussian_process.matrices.ridge import factorise
-from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.posterior import KernelPosterior, Likelihood
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.
@@ -51,17 +43,11 @@ _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscal
 
 @dataclass(frozen=True)
 class GpParameters:
-    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation; the kernel's family."""
+    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation."""
 
     log_lengthscales: Array
     log_signal_sd: float
     log_noise_sd: float
-    family: KernelFamily = "squared_exponential"
-
-    @property
-    def choice(self) -> KernelChoice:
-        """The kernels that these are hyperparameters of."""
-        return KernelChoice(self.family)
 
     @property
     def count(self) -> int:
@@ -71,7 +57,7 @@ class GpParameters:
     @property
     def kernel(self) -> ArdKernel:
         """Kernel of f."""
-        return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)
+        return ArdKernel(self.log_lengthscales, self.log_signal_sd)
 
     @property
     def noise_variance(self) -> float:
@@ -110,50 +96,40 @@ class GaussianProcess:
 
         block (n,): number of each row's block.
         """
-        kernel, noise, n = self.parameters.kernel, self.parameters.noise_variance, len(self.outputs)
-        ridge = factorise(kernel.matrix(self.inputs), smooth=kernel.smooth).regularise(np.full(n, 1.0 / noise))
-        errors, variance = held_out_errors(ridge.precision(), ridge.residual(self.outputs / noise), block)
-        smallest = np.finfo(float).eps * kernel.variance
-        log_noise = np.full(n, 2.0 * self.parameters.log_noise_sd)
-        return LatentPrediction(self.outputs - errors, np.maximum(variance - noise, smallest), log_noise, np.zeros(n))
+        kernel, noise = self.parameters.kernel, np.full(len(self.outputs), self.parameters.noise_variance)
+        likelihood = Likelihood.of(DenseKernel.of(kernel, self.inputs), self.outputs, noise)
+        errors, variance = likelihood.ridge.held_out_errors(likelihood.alpha, block)
+        variance = np.maximum(variance - noise, np.finfo(float).eps * kernel.variance)
+        return LatentPrediction(self.outputs - errors, variance, np.log(noise), np.zeros(len(noise)))
 
 
-def fit_gp(
-    inputs: Array,
-    outputs: Array,
-    choice: KernelChoice = DEFAULT_CHOICE,
-    *,
-    most_iterations: int = 100,
-    shortest: float = SHORTEST,
-) -> GaussianProcess:
+def fit_gp(inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. choice: only its family is used. shortest: lengthscale. Raises
-    TrainingError when the rows do not match or are not finite.
+    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. Raises TrainingError when the rows
+    do not match or are not finite.
     """
     check_rows(inputs, outputs)
     d = inputs.shape[1]
     box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    descent, cost = Descent(box, most_iterations, _STOP), _cost(inputs, outputs, choice.family)
+    descent, cost = Descent(box, most_iterations, _STOP), _cost(inputs, outputs)
     rows = part_of_rows(len(outputs))
-    start, rough = _first(inputs, outputs, rows, choice.family, replace(descent, stop=_ROUGH_STOP))
+    start, rough = _first(inputs, outputs, rows, replace(descent, stop=_ROUGH_STOP))
     if rows is None or len(rows) >= _FEWEST_TO_BEGIN_FROM:
         found = descent.refine(cost, rough)
     else:
         found = descent.run(cost, start)
-    return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
+    return GaussianProcess(inputs, outputs, _parameters(found.point))
 
 
-def _first(
-    inputs: Array, outputs: Array, rows: IntArray | None, family: KernelFamily, descent: Descent
-) -> tuple[Array, Minimum]:
+def _first(inputs: Array, outputs: Array, rows: IntArray | None, descent: Descent) -> tuple[Array, Minimum]:
     """Where to begin, and the minimum of these rows that is reached from there; None for all rows.
 
     Unit lengthscales, or one of them short if that is clearly better. On a polygon the outcome jumps from side to side.
     From a long lengthscale the search may take the jumps for noise.
     """
     d, part = inputs.shape[1], slice(None) if rows is None else rows
-    usual, cost = np.append(np.zeros(d + 1), np.log(0.3)), _cost(inputs[part], outputs[part], family)
+    usual, cost = np.append(np.zeros(d + 1), np.log(0.3)), _cost(inputs[part], outputs[part])
     short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)] if len(outputs) >= _FEWEST_FOR_SHORT else []
     reached = [(start, descent.run(cost, start)) for start in (usual, *short)]
     best = min(reached, key=lambda pair: pair[1].cost)
@@ -165,16 +141,9 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
 
     Raises LinAlgError where the kernel matrix plus noise is not positive definite.
     """
-    kernel, noise = parameters.kernel, parameters.noise_variance
-    factorised = factorise(kernel.matrix(inputs), smooth=kernel.smooth)
-    ridge = factorised.regularise(np.full(len(outputs), 1.0 / noise))
-    alpha = ridge.residual(outputs / noise)
-    constant = len(outputs) * np.log(2.0 * np.pi * noise)
-    value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
-    weights = ridge.upper_precision()
-    scipy.linalg.blas.dsyr(-1.0, alpha, lower=1, a=weights.T, overwrite_a=1)
-    of_noise = -noise * np.trace(weights)
-    return value, np.append(-0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
+    noise = parameters.noise_variance
+    likelihood = Likelihood.of(DenseKernel.of(parameters.kernel, inputs), outputs, np.full(len(outputs), noise))
+    return likelihood.value, np.append(likelihood.gradient(), 2.0 * noise * likelihood.slopes.sum())
 
 
 def check_rows(inputs: Array, outputs: Array) -> Array:
@@ -188,14 +157,14 @@ def check_rows(inputs: Array, outputs: Array) -> Array:
     return inputs
 
 
-def _parameters(vector: Array, family: KernelFamily) -> GpParameters:
-    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]), family)
+def _parameters(vector: Array) -> GpParameters:
+    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]))
 
 
-def _cost(inputs: Array, outputs: Array, family: KernelFamily) -> Cost:
+def _cost(inputs: Array, outputs: Array) -> Cost:
     def negative_log_likelihood(vector: Array) -> tuple[float, Array]:
         try:
-            value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector, family))
+            value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector))
         except np.linalg.LinAlgError:
             return _REFUSED, np.zeros_like(vector)
         return -value, -gradient

@@ -12,14 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The posterior of a zero-mean Gaussian process seen through independent noise, at new inputs."""
+"""A zero-mean Gaussian process seen through independent noise: its likelihood, and its posterior at new inputs."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.matrices.ridge import cholesky_in_place
+from push_predictor.models.gaussian_process.ridge import Regularisable, Ridge, cholesky_in_place
 from push_predictor.types import Array
 
 
@@ -56,3 +59,32 @@ class KernelPosterior:
         """By how much the observations reduce the prior covariance between m inputs, (m, m); cross (m, n) as above."""
         half = scipy.linalg.blas.dtrsm(1.0, self._factor, cross.T, lower=1)
         return np.asarray(half.T @ half)
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """log N(y | 0, K + D) - 1/2 sum_i unexplained_i / D_i, and its derivatives."""
+
+    kernel: Regularisable
+    ridge: Ridge
+    alpha: Array  # (K + D)^-1 y
+    value: float
+
+    @classmethod
+    def of(cls, kernel: Regularisable, outputs: Array, noise: Array) -> Likelihood:
+        """For outputs y (n,) and noise variances D (n,). Raises LinAlgError."""
+        weights = 1.0 / noise
+        ridge = kernel.regularise(weights)
+        alpha = ridge.residual(weights * outputs)
+        fit = outputs @ alpha + ridge.log_determinant + np.log(2.0 * np.pi * noise).sum()
+        return cls(kernel, ridge, alpha, -0.5 * float(fit + (weights * kernel.unexplained).sum()))
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Derivative of the value by D, shape (n,)."""
+        weights, uncertainty = self.ridge.weights, self.ridge.posterior_diagonal + self.kernel.unexplained
+        return np.asarray(0.5 * (self.alpha**2 - weights + uncertainty * weights**2))
+
+    def gradient(self) -> Array:
+        """Derivative of the value by (log_lengthscales, log_sd) of the kernel at fixed D, shape (D + 1,)."""
+        return self.ridge.gradient(self.alpha)

@@ -12,15 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The prediction of one output at m inputs, before noise and function are combined."""
+"""The prediction of one output at m inputs, before noise and function are combined, and the densities of an outcome.
+
+The exact predictive of a VHGP, int N(y | a, c^2 + e^g) N(g | b, d^2) dg (Lazaro-Gredilla and Titsias 2011,
+section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from push_predictor.types import Array
+
+_NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
+# With a hundred nodes the density is accurate to 1e-6 up to a standard deviation of g of 1.5.
+_LOG_WEIGHTS = np.log(_NODE_WEIGHTS) - 0.5 * np.log(2.0 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -44,3 +53,33 @@ class LatentPrediction:
     def outcome_variance(self) -> Array:
         """Variance of an observed outcome: of the process plus that of f, (m,)."""
         return self.variance + self.process_variance
+
+
+def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
+    """Log p(outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
+    variances = _variances_at_nodes(prediction)
+    return np.asarray(
+        scipy.special.logsumexp(
+            _log_normal(outcomes[:, None], prediction.mean[:, None], variances) + _LOG_WEIGHTS, axis=1
+        )
+    )
+
+
+def gaussian_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
+    """Log N(outcomes | mean, outcome_variance), the Gaussian of the same mean and variance, shape (m,)."""
+    return _log_normal(outcomes, prediction.mean, prediction.outcome_variance)
+
+
+def exact_cdf(prediction: LatentPrediction, outcomes: Array) -> Array:
+    """P(y <= outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
+    deviations = (outcomes - prediction.mean)[:, None] / np.sqrt(_variances_at_nodes(prediction))
+    return np.asarray(scipy.special.ndtr(deviations) @ np.exp(_LOG_WEIGHTS))
+
+
+def _variances_at_nodes(prediction: LatentPrediction) -> Array:
+    spread = np.sqrt(prediction.log_noise_variance)[:, None] * _NODES
+    return np.asarray(prediction.variance[:, None] + np.exp(prediction.log_noise_mean[:, None] + spread))
+
+
+def _log_normal(values: Array, mean: Array, variance: Array) -> Array:
+    return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + (values - mean) ** 2 / variance))

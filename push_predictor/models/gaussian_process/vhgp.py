@@ -28,14 +28,13 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
-from push_predictor.models.gaussian_process.cross_validation import held_out_errors
+from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.fit import maximise_bound
 from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
-from push_predictor.models.gaussian_process.vhgp_fit import maximise_bound
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
 
@@ -51,7 +50,7 @@ class _Posterior:
 
 
 class VHGP:
-    """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound.
+    """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of bound.py.
 
     Its matrices are computed at the first prediction: a server that predicts from a table may never need them.
     """
@@ -74,14 +73,14 @@ class VHGP:
     @cached_property
     def _posterior(self) -> _Posterior:
         with one_blas_thread():
-            problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
-            bound = Bound.tied(problem, self.site_precisions)
+            parameters = self.parameters
+            signal, noise = (DenseKernel.of(kernel, self.inputs) for kernel in (parameters.signal, parameters.noise))
+            bound = Bound.tied(VhgpProblem.about(self.outputs, parameters, signal, noise), self.site_precisions)
             value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
             del bound  # frees its matrices before the factors are computed
-            seen_through = self.parameters.nugget + 1.0 / self.site_precisions
-            signal = KernelPosterior(problem.signal_kernel.matrix, noise_level + self.parameters.jitter)
-            noise = KernelPosterior(problem.noise_kernel.matrix, seen_through)
-            return _Posterior(value, signal, signal.weights(self.outputs), noise, noise_weights)
+            of_signal = KernelPosterior(signal.matrix, noise_level + parameters.jitter)
+            of_noise = KernelPosterior(noise.matrix, parameters.nugget + 1.0 / self.site_precisions)
+            return _Posterior(value, of_signal, of_signal.weights(self.outputs), of_noise, noise_weights)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
@@ -89,8 +88,7 @@ class VHGP:
         of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
         # The jitter is independent of the data, so the variance of f cannot fall below it.
         variance = signal.variance + self.parameters.jitter - posterior.signal.explained_variance(of_signal)
-        prior = noise.variance + self.parameters.nugget
-        log_noise_variance = prior - posterior.noise.explained_variance(of_noise)
+        log_noise_variance = noise.variance + self.parameters.nugget - posterior.noise.explained_variance(of_noise)
         return LatentPrediction(
             of_signal @ posterior.signal_weights,
             np.maximum(variance, self.parameters.jitter),
@@ -108,34 +106,24 @@ class VHGP:
 
         block (n,): number of each row's block.
         """
-        bound = Bound.tied(VhgpProblem.of(self.inputs, self.outputs, self.parameters), self.site_precisions)
-        errors, variance = held_out_errors(bound.signal.ridge.precision(), bound.alpha, block)
-        of_noise, noise_variance = held_out_errors(bound.noise_ridge.precision(), bound.mean_weights, block)
-        site_variance = 1.0 / bound.site_precisions
-        smallest = self.parameters.nugget + np.finfo(float).eps * self.parameters.noise.variance
-        return LatentPrediction(
-            self.outputs - errors,
-            np.maximum(variance - bound.noise_level, self.parameters.jitter),
-            bound.noise_mean + bound.mean_weights * site_variance - of_noise,
-            np.maximum(noise_variance - site_variance, smallest),
-        )
+        problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
+        return Bound.tied(problem, self.site_precisions).held_out(block)
 
 
 def fit_vhgp(
     inputs: Array,
     outputs: Array,
-    choice: KernelChoice = DEFAULT_CHOICE,
     *,
     start: GpParameters | None = None,
     most_iterations: int = 40,
     shortest: float = SHORTEST,
 ) -> VHGP:
-    """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
+    """Maximise the variational bound (plus weak priors, see fit.py) over hyperparameters and site precisions.
 
-    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows and family; None
-    computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
+    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows; None computes it
+    first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
     finite.
     """
     check_rows(inputs, outputs)
-    near = start or fit_gp(inputs, outputs, choice, shortest=shortest).parameters
-    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations, shortest))
+    near = start or fit_gp(inputs, outputs, shortest=shortest).parameters
+    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, most_iterations, shortest))

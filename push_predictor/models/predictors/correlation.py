@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.types import Array, IntArray
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
@@ -68,7 +68,7 @@ class Correlation:
     def kernel(self) -> ArdKernel:
         """The weights of the rows as a kernel of the features."""
         size = self.features.shape[1]
-        return SquaredExponential(np.full(size, np.log(self.bandwidth)), 0.0)
+        return ArdKernel(np.full(size, np.log(self.bandwidth)), 0.0)
 
     @cached_property
     def products(self) -> Array:

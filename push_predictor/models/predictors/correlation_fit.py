@@ -14,7 +14,7 @@
 
 """Learning the correlation of the outputs from held-out pushes; the same pushes decide whether there is one.
 
-The regressions predict each push without its windows (gaussian_process/cross_validation.py), and the correlation at a
+The regressions predict each push without its windows (gaussian_process/ridge.py), and the correlation at a
 push is smoothed over all others. Residuals have heavy tails, and a single outlier would determine the correlation of
 its whole neighbourhood. So none counts for more than its expected length, 3^1/2 standard deviations.
 """

@@ -22,10 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.constant import ConstantNoise
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.quadrature import exact_log_density
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
@@ -93,12 +90,6 @@ class GaussianProcessPredictor(WithoutEffects):
     def covariates(self) -> tuple[str, ...]:
         """See Predictor: those that the mean depends on."""
         return self.needs
-
-    @property
-    def kernels(self) -> KernelChoice:
-        """The kernels of its regressions; the default where all have constant noise."""
-        learnt = [r.parameters.choice for r in self.regressions if not isinstance(r, ConstantNoise)]
-        return learnt[0] if learnt else DEFAULT_CHOICE
 
     @cached_property
     def reported_sd(self) -> Array:

@@ -24,27 +24,23 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.constant import ConstantNoise, ConstantParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
-from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, FAMILIES
-from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters, Regression
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
 from push_predictor.types import Array
 
 CONSTANT = "noise_spread"  # only constant noise has this hyperparameter
 LARGEST_SPREAD = 10.0
+NUGGET, NO_NUGGET = "log_nugget_sd", -12.0  # of files that lack it: so small that it changes no prediction
 
 
 def regression_record(regression: Regression) -> dict[str, Any]:
-    """The hyperparameters; those that format 1 lacks are omitted if they have the values it took for granted."""
-    values = dict(vars(regression.parameters))
-    if values.get("family") == DEFAULT_CHOICE.family:
-        del values["family"]
-    chosen = {key: value for key, value in values.items() if value is not None}
-    return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
+    """The hyperparameters; without the nugget if the file that they are from lacked it."""
+    values = {key: np.asarray(value).tolist() for key, value in vars(regression.parameters).items()}
+    return {key: value for key, value in values.items() if (key, value) != (NUGGET, NO_NUGGET)}
 
 
 def put_regression(regression: Regression, output: int, arrays: dict[str, np.ndarray]) -> None:
@@ -67,8 +63,10 @@ def regression_of(
     if sites is None or sites.shape != outcomes.shape or not np.all(np.isfinite(sites)) or np.any(sites < 0.0):
         raise ValueError(f"site precisions are missing or not {len(outcomes)} finite numbers from 0 on")
     if has_inducing(output, arrays):
-        return sparse_regression(features, outcomes, VhgpParameters(**values), sites, output, arrays)
-    return VHGP(features, outcomes, VhgpParameters(**values), sites)
+        return sparse_regression(
+            features, outcomes, VhgpParameters(**{NUGGET: NO_NUGGET, **values}), sites, output, arrays
+        )
+    return VHGP(features, outcomes, VhgpParameters(**{NUGGET: NO_NUGGET, **values}), sites)
 
 
 def _constant(record: dict[str, Any]) -> ConstantParameters:
@@ -79,11 +77,9 @@ def _constant(record: dict[str, Any]) -> ConstantParameters:
 
 
 def _hyperparameters(record: dict[str, Any]) -> dict[str, Any]:
-    values: dict[str, Any] = dict(record)
-    family = values.pop("family", DEFAULT_CHOICE.family)
-    if family not in FAMILIES:
-        raise ValueError(f"kernel family {family!r} is not accepted, give one of {', '.join(FAMILIES)}")
-    values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in values.items()}
+    if "family" in record:
+        raise ValueError(f"kernel family {record['family']!r} is not accepted, train the model again")
+    values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in record.items()}
     if not all(np.all(np.isfinite(value)) for value in values.values()):
         raise ValueError("a hyperparameter is not finite")
-    return {**values, "family": family}
+    return values

@@ -23,8 +23,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
-from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array, IntArray
 
 _CHOSEN = ("inducing_signal", "inducing_noise")

@@ -30,11 +30,11 @@ from functools import cached_property, reduce
 import numpy as np
 import scipy
 
+from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.matrices.ridge import factorise
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.models.gaussian_process.vhgp import VHGP
-from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.types import Array, IntArray
 
 _DROPPED = 1e-4  # of the smallest noise variance: a prior variance that is negligible next to the noise
@@ -109,7 +109,7 @@ def grid_regression(regression: GaussianProcess | VHGP) -> GridRegression:
 def _of_gp(regression: GaussianProcess) -> GridRegression:
     kernel, noise = regression.parameters.kernel, regression.parameters.noise_variance
     noises = np.full(len(regression.outputs), noise)
-    ridge = factorise(kernel.matrix(regression.inputs)).regularise(1.0 / noises)
+    ridge = DenseKernel.of(kernel, regression.inputs).regularise(1.0 / noises)
     weights, prior = ridge.residual(regression.outputs / noise), kernel.variance
     signal = GridPosterior(kernel, regression.inputs, noises, weights, prior, _EPSILON * prior)
     return GridRegression(signal, float(np.log(noise)), None)

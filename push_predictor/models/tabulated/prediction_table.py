@@ -32,9 +32,8 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.models.gaussian_process.constant import ConstantNoise
-from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
-from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.regression import ConstantNoise, Regression
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.predictors import GaussianProcessPredictor, Moments
 from push_predictor.models.predictors.correlation import Correlation, correlations
@@ -130,10 +129,8 @@ def tabulate(
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
     posteriors: of the predictor's regressions, see on_grid. refinement: factor on the usual number of nodes and knots
-    along each axis. Raises TooFineError, also for kernels that are not products over the axes.
+    along each axis. Raises TooFineError.
     """
-    if not all(isinstance(kernel, SquaredExponential) for kernel, _ in _resolved(posteriors, None)):
-        raise TooFineError("only squared exponential kernels are products over the axes of a table")
     sides = table_sides(predictor.scaling, chart, low, high)
     resolved, correlation = _resolved(posteriors, predictor.correlation), predictor.correlation
     cells = [_cells(side, resolved, refinement) for side in sides]

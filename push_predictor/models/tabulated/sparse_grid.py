@@ -42,9 +42,10 @@ class InducedGridPosterior(GridPosterior):
 def sparse_grid_regression(regression: SparseVHGP) -> GridRegression:
     """See grid_posterior.grid_regression."""
     parameters = regression.parameters
-    jitter, of_noise = parameters.jitter, parameters.noise.variance
+    jitter, of_noise, nugget = parameters.jitter, parameters.noise.variance, parameters.nugget
     signal = _on_grid(regression.signal, parameters.signal.variance + jitter, jitter)
-    return GridRegression(signal, parameters.noise_mean, _on_grid(regression.noise, of_noise, _EPSILON * of_noise))
+    noise = _on_grid(regression.noise, of_noise + nugget, nugget + _EPSILON * of_noise)
+    return GridRegression(signal, parameters.noise_mean, noise)
 
 
 def _on_grid(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> InducedGridPosterior:

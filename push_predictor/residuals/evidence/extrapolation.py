@@ -37,7 +37,7 @@ def about_mechanics(model: PushModel) -> PushModel:
     predictor = model.predictor
     if not (isinstance(predictor, GaussianProcessPredictor) and predictor.absorbs):
         return model
-    options = TrainingOptions(seed=model.provenance.seed, kernels=predictor.kernels, mean="mechanics")
+    options = TrainingOptions(seed=model.provenance.seed, mean="mechanics")
     sources = model.provenance.sources
     return train_model(model.training, model.rig, model.kind, name=model.name, sources=sources, options=options)
 

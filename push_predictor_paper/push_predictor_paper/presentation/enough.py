@@ -67,5 +67,4 @@ REASONS: Mapping[str, Callable[[Plan], str]] = {
     "divergence": _repetitions,
     "modality": _repetitions,
     "quasi_static": _pushes,
-    "variants": _windows,
 }

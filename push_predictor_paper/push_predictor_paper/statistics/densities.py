@@ -22,7 +22,7 @@ import numpy as np
 from scipy.stats import shapiro
 
 from push_predictor.evaluation.metrics import gaussian_nlpd
-from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
+from push_predictor.models.gaussian_process.prediction import exact_log_density, gaussian_log_density
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet

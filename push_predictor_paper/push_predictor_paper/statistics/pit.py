@@ -24,7 +24,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
-from push_predictor.models.gaussian_process.quadrature import exact_cdf
+from push_predictor.models.gaussian_process.prediction import exact_cdf
 from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel

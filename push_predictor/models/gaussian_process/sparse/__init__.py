@@ -14,5 +14,5 @@
 
 """The VHGP for thousands of rows: variational inference with inducing inputs.
 
-Import `vhgp` and `fit`; the other modules are steps of them.
+Import `vhgp`; `kernel` is a step of its fit.
 """

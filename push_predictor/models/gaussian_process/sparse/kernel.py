@@ -18,6 +18,10 @@
 
 Everything costs O(n m^2) and goes over the rows in blocks: apart from V nothing larger than (n,) or (m, m) is kept.
 The jitter only makes Z explain a little less, so a bound computed with Q is still a bound.
+
+Z are rows of the inputs, each the one with the largest conditional variance given those before: a pivoted Cholesky
+factorisation of the kernel matrix ("greedy conditional variance" of Burt, Rasmussen and van der Wilk 2020, "Convergence
+of sparse variational inference in Gaussian processes regression").
 """
 
 from __future__ import annotations
@@ -29,20 +33,42 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
-from push_predictor.models.gaussian_process.matrices.ridge import cholesky_in_place
-from push_predictor.types import Array
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.types import Array, IntArray
 
 _BLOCK = 2048
 _JITTER = 1e-9  # of the kernel's variance
+_CANDIDATES = 10_000
+_NEGLIGIBLE = 1e-6  # of the prior variance; with a smaller conditional variance one more inducing input adds nothing
+
+
+def inducing_rows(kernel: ArdKernel, inputs: Array, most: int) -> IntArray:
+    """At most `most` rows of inputs (n, D), in their order; fewer if these determine all others.
+
+    They depend on the kernel's hyperparameters. Of many rows a random choice, always the same, is searched.
+    """
+    candidates = np.sort(np.random.default_rng(0).permutation(len(inputs))[:_CANDIDATES])
+    found = inputs[candidates]
+    most = min(most, len(found))
+    unknown, root, chosen = np.full(len(found), kernel.variance), np.empty((most, len(found))), []
+    for k in range(most):
+        row = int(np.argmax(unknown))
+        if unknown[row] < _NEGLIGIBLE * kernel.variance:
+            break
+        known = kernel.cross(found[row : row + 1], found)[0] - root[:k, row] @ root[:k]
+        root[k] = known / np.sqrt(unknown[row])
+        unknown = np.maximum(unknown - root[k] ** 2, 0.0)
+        unknown[row] = 0.0
+        chosen.append(row)
+    return np.sort(candidates[chosen])
 
 
 @dataclass(frozen=True, eq=False)
 class InducedKernel:
     """Inputs (n, D); inducing Z (m, D); factor L (m, m); features V (n, m); unexplained (n,) by Z."""
 
-    kernel: SquaredExponential
+    kernel: ArdKernel
     inputs: Array
     inducing: Array
     factor: Array
@@ -51,9 +77,7 @@ class InducedKernel:
 
     @classmethod
     def of(cls, kernel: ArdKernel, inputs: Array, inducing: Array) -> InducedKernel:
-        """The kernel of these inputs. Raises LinAlgError if inducing inputs coincide, TrainingError for a Matern."""
-        if not isinstance(kernel, SquaredExponential):
-            raise TrainingError(f"{type(kernel).__name__}: a sparse VHGP has squared exponential kernels only")
+        """The kernel of these inputs. Raises LinAlgError if inducing inputs coincide."""
         factor = _inducing_factor(kernel, inducing)
         features = np.empty((len(inputs), len(inducing)))
         unexplained = np.empty(len(inputs))
@@ -112,38 +136,57 @@ class InducedRidge:
         identity = np.eye(len(self.inner))
         return np.asarray(identity - scipy.linalg.cho_solve((self.factor, True), identity))
 
-    def gradient(self, added: Array, removed: Array | None = None) -> Array:
-        """Derivative of tr(H Q) - 1/2 sum weights k(x, x), at H fixed, by (log_lengthscales, log_sd), (D + 1,).
-
-        H = 1/2 (W - P + added added' - removed removed'), vectors (n,).
-        """
-        induced, kernel = self.induced, self.induced.kernel
+    def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
+        """See Ridge."""
+        induced, kernel, features = self.induced, self.induced.kernel, self.induced.features
         vectors = np.column_stack([added] if removed is None else [added, removed])
-        signed = vectors * [1.0, -1.0][: vectors.shape[1]]
-        whitened = scipy.linalg.blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
+        signs = np.array([1.0, -1.0])[: vectors.shape[1]]
+        whitened = scipy.linalg.blas.dtrsm(1.0, induced.factor, features.T @ vectors, lower=1, trans_a=1)
         of_features = scipy.linalg.blas.dtrsm(1.0, induced.factor, self.explained, side=1, lower=1)
+        inverse = scipy.linalg.blas.dtrsm(1.0, induced.factor, np.eye(len(self.inner)), side=1, lower=1)
+        known = self.inner - np.eye(len(self.inner)) - self.explained
         gradient = np.zeros(induced.inputs.shape[1] + 1)
         for rows in _blocks(len(self.weights)):
-            cross = kernel.cross(induced.inputs[rows], induced.inducing)
-            cross *= (self.weights[rows, None] * induced.features[rows]) @ of_features + signed[rows] @ whitened.T
-            gradient += _contracted(kernel, induced.inputs[rows], induced.inducing, cross)
-        gradient -= self._of_inducing(whitened, whitened * [1.0, -1.0][: whitened.shape[1]])
-        gradient[-1] -= kernel.variance * float(self.weights.sum())
+            slopes = (self.weights[rows, None] * features[rows]) @ of_features + (vectors[rows] * signs) @ whitened.T
+            if weights is not None:
+                beyond = (weights - self.weights)[rows, None] * features[rows]
+                known += features[rows].T @ beyond
+                slopes += beyond @ inverse
+            slopes *= kernel.cross(induced.inputs[rows], induced.inducing)
+            gradient += kernel.cross_gradient(induced.inputs[rows], induced.inducing, slopes)
+        gradient -= self._of_inducing(known, (whitened * signs) @ whitened.T)
+        gradient[-1] -= kernel.variance * float((self.weights if weights is None else weights).sum())
         return gradient
 
-    def _of_inducing(self, whitened: Array, signed: Array) -> Array:
+    def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
+        """As in ridge.py: P_BB^-1 = W_B^-1 + V_B C^-1 V_B', C = I + V' W V less what the block B adds to it."""
+        errors, variance = np.empty(len(weights)), np.empty(len(weights))
+        order = np.argsort(block, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(block[order])) + 1):
+            known = self._covariance_without(rows)
+            noise, features = 1.0 / self.weights[rows], self.induced.features[rows]
+            errors[rows] = noise * weights[rows] + features @ (known @ (features.T @ weights[rows]))
+            variance[rows] = noise + np.einsum("ij,ij->i", features @ known, features)
+        return errors, variance
+
+    def _covariance_without(self, rows: IntArray) -> Array:
+        """C^-1 (m, m): covariance of the whitened inducing variables given all rows but these."""
+        weighted = self.induced.features[rows] * np.sqrt(self.weights[rows])[:, None]
+        factor = cholesky_in_place(np.ascontiguousarray(self.inner - weighted.T @ weighted))
+        return np.asarray(scipy.linalg.cho_solve((factor, True), np.eye(len(factor))))
+
+    def _of_inducing(self, known: Array, squares: Array) -> Array:
         """The part of the gradient that goes through K_ZZ, with opposite sign."""
         induced, kernel = self.induced, self.induced.kernel
-        known = self.inner - np.eye(len(self.inner)) - self.explained
         weights = scipy.linalg.blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
-        weights = scipy.linalg.blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ whitened.T
+        weights = scipy.linalg.blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + squares
         weights = 0.25 * (weights + weights.T)
         gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)
         gradient[-1] += 2.0 * _JITTER * kernel.variance * float(np.trace(weights))
         return gradient
 
 
-def _inducing_factor(kernel: SquaredExponential, inducing: Array) -> Array:
+def _inducing_factor(kernel: ArdKernel, inducing: Array) -> Array:
     """L (m, m), L L' = K_ZZ + jitter. Raises LinAlgError."""
     matrix = kernel.matrix(inducing)
     matrix.flat[:: len(matrix) + 1] += _JITTER * kernel.variance
@@ -153,15 +196,6 @@ def _inducing_factor(kernel: SquaredExponential, inducing: Array) -> Array:
 def _whitened(factor: Array, rows: Array) -> Array:
     """Rows (n, m) times L^-T, in their memory."""
     return np.asarray(scipy.linalg.blas.dtrsm(1.0, factor, rows.T, lower=1, overwrite_b=1).T)
-
-
-def _contracted(kernel: SquaredExponential, inputs: Array, inducing: Array, weighted: Array) -> Array:
-    """Sum_ij weights_ij d k(x_i, z_j) of weighted = weights * k (n, m)."""
-    scale = np.exp(-kernel.log_lengthscales)
-    x, z = inputs * scale, inducing * scale
-    of_rows = weighted.sum(axis=1)
-    squares = of_rows @ (x * x) + weighted.sum(axis=0) @ (z * z) - 2.0 * (x * (weighted @ z)).sum(axis=0)
-    return np.append(squares, 2.0 * of_rows.sum())
 
 
 def _blocks(n: int) -> Iterator[slice]:

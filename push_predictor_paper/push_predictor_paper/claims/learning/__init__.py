@@ -12,7 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Claims of section VI-A: learning curves. Beyond the paper: other kernels.
-
-Sections of the report: `learning_curves` and `variants`.
-"""
+"""Claims of section VI-A: `learning_curves`, a section of the report."""

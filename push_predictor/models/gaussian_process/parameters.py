@@ -20,13 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.kernels import (
-    DEFAULT_CHOICE,
-    ArdKernel,
-    KernelChoice,
-    KernelFamily,
-    ard_kernel,
-)
+from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.types import Array
 
 JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
@@ -36,7 +30,7 @@ JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
 class VhgpParameters:
     """Hyperparameters: ARD kernel of the signal f, ARD kernel of the log noise variance g, prior mean of g.
 
-    log_nugget_sd: log of the standard deviation of g's nugget, which is independent from row to row; None if absent.
+    log_nugget_sd: log of the standard deviation of g's nugget, which is independent from row to row.
     """
 
     log_lengthscales: Array
@@ -44,33 +38,27 @@ class VhgpParameters:
     noise_log_lengthscales: Array
     noise_log_sd: float
     noise_mean: float
-    family: KernelFamily = "squared_exponential"
-    log_nugget_sd: float | None = None
-
-    @property
-    def choice(self) -> KernelChoice:
-        """The kernels that these are hyperparameters of."""
-        return KernelChoice(self.family, self.log_nugget_sd is not None)
+    log_nugget_sd: float
 
     @property
     def count(self) -> int:
         """Number of hyperparameters."""
-        return len(self.to_vector())
+        return 2 * len(self.log_lengthscales) + 4
 
     @property
     def signal(self) -> ArdKernel:
         """Kernel of f."""
-        return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)
+        return ArdKernel(self.log_lengthscales, self.log_signal_sd)
 
     @property
     def noise(self) -> ArdKernel:
         """Kernel of g, without its nugget."""
-        return ard_kernel(self.family, self.noise_log_lengthscales, self.noise_log_sd)
+        return ArdKernel(self.noise_log_lengthscales, self.noise_log_sd)
 
     @property
     def nugget(self) -> float:
         """What is added to the diagonal of K_g, and to the variance of g at any input."""
-        return 0.0 if self.log_nugget_sd is None else float(np.exp(2.0 * self.log_nugget_sd))
+        return float(np.exp(2.0 * self.log_nugget_sd))
 
     @property
     def jitter(self) -> float:
@@ -78,15 +66,13 @@ class VhgpParameters:
         return JITTER * self.signal.variance
 
     def to_vector(self) -> Array:
-        """The numbers in their order, shape (2 D + 3,), or (2 D + 4,) with a nugget."""
+        """The numbers in their order, shape (2 D + 4,)."""
         signal = np.append(self.log_lengthscales, self.log_signal_sd)
-        nugget = [] if self.log_nugget_sd is None else [self.log_nugget_sd]
-        return np.concatenate([signal, self.noise_log_lengthscales, [self.noise_log_sd, self.noise_mean], nugget])
+        rest = [self.noise_log_sd, self.noise_mean, self.log_nugget_sd]
+        return np.concatenate([signal, self.noise_log_lengthscales, rest])
 
     @classmethod
-    def from_vector(cls, vector: Array, choice: KernelChoice = DEFAULT_CHOICE) -> VhgpParameters:
+    def from_vector(cls, vector: Array) -> VhgpParameters:
         """The inverse of `to_vector`."""
-        nugget = float(vector[-1]) if choice.noise_nugget else None
-        d = (len(vector) - 3) // 2
-        noise_sd, noise_mean = float(vector[2 * d + 1]), float(vector[2 * d + 2])
-        return cls(vector[:d], float(vector[d]), vector[d + 1 : 2 * d + 1], noise_sd, noise_mean, choice.family, nugget)
+        d = (len(vector) - 4) // 2
+        return cls(vector[:d], float(vector[d]), vector[d + 1 : -3], *(float(value) for value in vector[-3:]))

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
 from push_predictor.types import Array
 
 _SHORTEST_STEP = 1.0 / 64.0

@@ -1,0 +1,204 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The variational bound of a VHGP and its derivatives (Lazaro-Gredilla and Titsias 2011, equation 7).
+
+Where the printed equations differ from these: docs/explanation/errata.md.
+
+    F = log N(y | 0, K_f + R) - 1/4 tr S - KL(N(m, S) || N(mu0, K_g)),     R_ii = exp(m_i - S_ii / 2)
+    S^-1 = K_g^-1 + Lambda,     m = mu0 + K_g b,     Lambda diagonal ("site precisions"), b ("mean weights")
+
+K_g includes the nugget. At a maximum over (b, Lambda) the two are tied, b = Lambda - 1/2, which leaves one number per
+training row.
+
+With inducing inputs for f and g (sparse/kernel.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
+K_g. The variances c that they do not explain add -1/2 sum_i c_f,i / R_ii, and c_g to the variances S_ii. If every row
+is an inducing input, the two bounds are equal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.posterior import Likelihood
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel, Regularisable, Ridge
+from push_predictor.types import Array, IntArray
+
+_SMALLEST_PRECISION = 1e-7  # below it S loses its precision
+_EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class VhgpProblem:
+    """Training outputs (n,) and hyperparameters with the two kernels, which do not depend on (b, Lambda)."""
+
+    outputs: Array
+    parameters: VhgpParameters
+    signal: Regularisable
+    noise: Regularisable
+
+    @classmethod
+    def of(cls, inputs: Array, outputs: Array, parameters: VhgpParameters) -> VhgpProblem:
+        """Build and factorise both kernel matrices of inputs (n, D)."""
+        signal, noise = (DenseKernel.of(kernel, inputs) for kernel in (parameters.signal, parameters.noise))
+        return cls.about(outputs, parameters, signal, noise)
+
+    @classmethod
+    def about(
+        cls, outputs: Array, parameters: VhgpParameters, signal: Regularisable, noise: Regularisable
+    ) -> VhgpProblem:
+        """With these kernels of f and g, to which g's nugget is added."""
+        return cls(outputs, parameters, signal, NuggetKernel(noise, parameters.nugget))
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """q(g) as the prior times Gaussian sites of given precisions (Lambda) and potentials (precision times mean), (n,).
+
+    They stay meaningful when the hyperparameters change, which the moments of q(g) do not.
+    """
+
+    precisions: Array
+    potentials: Array
+
+    @classmethod
+    def optimal(cls, precisions: Array, noise_mean: Array) -> Sites:
+        """The sites of optimal precisions for a mean m (n,) of q(g)."""
+        return cls(np.maximum(precisions, _SMALLEST_PRECISION), precisions * noise_mean + precisions - 0.5)
+
+    def towards(self, other: Sites, step: float) -> Sites:
+        """These sites for step 0, the target's for step 1, interpolated between."""
+        precisions = self.precisions + step * (other.precisions - self.precisions)
+        return Sites(precisions, self.potentials + step * (other.potentials - self.potentials))
+
+
+@dataclass(frozen=True, eq=False)
+class SignalFit:
+    """The signal given the noise: the parts of F and its derivatives that depend on f."""
+
+    level: Array  # R
+    likelihood: Likelihood
+
+    @classmethod
+    def of(cls, problem: VhgpProblem, noise_mean: Array, noise_variances: Array) -> SignalFit:
+        """The signal for these moments of q(g). Raises LinAlgError or FloatingPointError where it is not finite."""
+        with np.errstate(over="raise", invalid="raise"):
+            level = np.exp(noise_mean - 0.5 * noise_variances)
+            noise = level + problem.parameters.jitter
+            return cls(level, Likelihood.of(problem.signal, problem.outputs, noise))
+
+    @property
+    def optimal_precisions(self) -> Array:
+        """1/2 + dF/dm >= 0, shape (n,)."""
+        return self.level * self.likelihood.slopes + 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """F at one q(g), with the quantities that its derivatives share."""
+
+    problem: VhgpProblem
+    sites: Sites
+    mean_weights: Array  # b
+    noise_mean: Array  # m
+    noise_ridge: Ridge
+    signal: SignalFit
+    value: float
+
+    @classmethod
+    def at(cls, problem: VhgpProblem, sites: Sites) -> Bound:
+        """Evaluate F. Raises LinAlgError or FloatingPointError where it is not a finite number."""
+        prior_mean = problem.parameters.noise_mean
+        ridge = problem.noise.regularise(sites.precisions)
+        explained = ridge.posterior_diagonal
+        variances = explained + problem.noise.unexplained
+        mean_weights = ridge.residual(sites.potentials - sites.precisions * prior_mean)
+        deviation = problem.noise.times(mean_weights)
+        signal = SignalFit.of(problem, prior_mean + deviation, variances)
+        divergence = deviation @ mean_weights - sites.precisions @ explained + ridge.log_determinant
+        value = signal.likelihood.value - 0.25 * float(variances.sum()) - 0.5 * float(divergence)
+        if not np.isfinite(value):
+            raise FloatingPointError("the variational bound is not finite")
+        return cls(problem, sites, mean_weights, prior_mean + deviation, ridge, signal, value)
+
+    @classmethod
+    def tied(cls, problem: VhgpProblem, site_precisions: Array) -> Bound:
+        """F as a function of the site precisions alone, b = Lambda - 1/2."""
+        mean_weights = site_precisions - 0.5
+        mean = problem.parameters.noise_mean + problem.noise.times(mean_weights)
+        return cls.at(problem, Sites(site_precisions, site_precisions * mean + mean_weights))
+
+    @property
+    def site_precisions(self) -> Array:
+        """Lambda, shape (n,)."""
+        return self.sites.precisions
+
+    @property
+    def noise_level(self) -> Array:
+        """R, shape (n,)."""
+        return self.signal.level
+
+    @property
+    def alpha(self) -> Array:
+        """(K_f + R)^-1 y, shape (n,)."""
+        return self.signal.likelihood.alpha
+
+    @cached_property
+    def optimal_precisions(self) -> Array:
+        """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
+        return self.signal.optimal_precisions
+
+    @property
+    def tied_precisions(self) -> Array:
+        """Site precisions tied to these mean weights, with the same m; near a maximum those of `sites`."""
+        return np.maximum(self.mean_weights + 0.5, _SMALLEST_PRECISION)
+
+    @property
+    def optimal_sites(self) -> Sites:
+        """The sites that a fixed point reproduces: where a step of natural gradient of length 1 ends."""
+        return Sites.optimal(self.optimal_precisions, self.noise_mean)
+
+    def hyperparameter_gradient(self) -> Array:
+        """dF/d(parameters.to_vector()) at fixed Lambda and b; at a maximum over these, that of the maximum."""
+        signal = self.signal.likelihood.gradient()
+        signal[-1] += 2.0 * self.problem.parameters.jitter * float(self.signal.likelihood.slopes.sum())
+        # dF/dm = gb gives b gb' + gb b' - b b', as one difference of squares
+        optimal = self.optimal_precisions - 0.5
+        noise = self.noise_ridge.gradient(optimal, optimal - self.mean_weights)
+        return np.concatenate([signal, noise[:-1], [optimal.sum()], noise[-1:]])
+
+    def held_out(self, block: IntArray) -> LatentPrediction:
+        """Predict f and g at the n rows from the rows of all other blocks (n,), from these factorisations.
+
+        The signal is seen through R, the log noise variance through the sites, whose values are m + b / Lambda. R and
+        the sites of the other rows are kept: refitting them without the block changes them little, and takes forty
+        times as long (Vehtari et al. 2016, "Bayesian leave-one-out cross-validation approximations for Gaussian latent
+        variable models").
+        """
+        problem, parameters = self.problem, self.problem.parameters
+        errors, variance = self.signal.likelihood.ridge.held_out_errors(self.alpha, block)
+        of_noise, noise_variance = self.noise_ridge.held_out_errors(self.mean_weights, block)
+        site_variance = 1.0 / self.site_precisions
+        noise_variance = noise_variance + problem.noise.unexplained - site_variance
+        return LatentPrediction(
+            problem.outputs - errors,
+            np.maximum(variance + problem.signal.unexplained - self.noise_level, parameters.jitter),
+            self.noise_mean + self.mean_weights * site_variance - of_noise,
+            np.maximum(noise_variance, parameters.nugget + _EPSILON * parameters.noise.variance),
+        )
