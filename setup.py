@@ -14,13 +14,56 @@
 
 """The ROS package push_predictor (ament_python), installable by pip and by colcon alike."""
 
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from glob import glob
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
 
 NAME = "push_predictor"
 NODES = ("predict_server", "push_recorder", "push_replay", "push_validator")
+COMPILED = (  # below push_predictor: Python files that Cython translates to C
+    "geometry/boundary",
+    "models/mechanics/kernel/surface",
+    "models/mechanics/kernel/contact",
+    "models/mechanics/kernel/sweep",
+    "models/mechanics/kernel/push",
+    "models/tabulated/spline",
+)
+NO_CYTHON = "setup.py: Cython 3 is needed to build: apt install cython3, or pip install 'Cython>=3.0'"
+
+
+class BuildCompiled(build_ext):
+    """Translates and compiles. Only this step imports Cython: --version, egg_info and colcon's first look do without."""
+
+    def build_extensions(self):
+        """Compile with all cores while the next file is translated."""
+        with ThreadPoolExecutor(self.parallel or len(os.sched_getaffinity(0))) as pool:
+            jobs = [pool.submit(self.build_extension, self.translated(each)) for each in self.extensions]
+        for job in jobs:
+            job.result()
+
+    def translated(self, extension):
+        """Return the same extension in C. The C file is written into the folder of temporary files."""
+        try:
+            from Cython.Build import cythonize
+        except ImportError:
+            sys.exit(NO_CYTHON)
+        (in_c,) = cythonize([extension], build_dir=self.build_temp, force=self.force, quiet=True)
+        result = copy(extension)  # the original lists the files of a source distribution
+        result.sources = in_c.sources
+        return result
+
+
+def extension(name):
+    """The extension module of one compiled file: no -march, no -ffast-math, so that all machines agree."""
+    path = f"{NAME}/{name}"
+    return Extension(path.replace("/", "."), [f"{path}.py"], extra_compile_args=["-O3", "-g0"])
+
 
 setup(
     name=NAME,
@@ -43,6 +86,8 @@ setup(
     python_requires=">=3.10",
     packages=find_packages(include=["push_predictor", "push_predictor.*", "msg_adapters", "msg_adapters.*"]),
     package_data={"push_predictor": ["py.typed", "reporting/templates/*"]},
+    ext_modules=[extension(name) for name in COMPILED],
+    cmdclass={"build_ext": BuildCompiled},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
