@@ -38,7 +38,7 @@ NO_CYTHON = "setup.py: Cython 3 is needed to build: apt install cython3, or pip 
 
 
 class BuildCompiled(build_ext):
-    """Translates and compiles. Only this step imports Cython: --version, egg_info and colcon's first look do without."""
+    """Translates and compiles. Only this step imports Cython: --version, egg_info and colcon's look do without."""
 
     def build_extensions(self):
         """Compile with all cores while the next file is translated."""
