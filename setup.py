@@ -49,14 +49,21 @@ class BuildCompiled(build_ext):
 
     def translated(self, extension):
         """Return the same extension in C. The C file is written into the folder of temporary files."""
-        try:
-            from Cython.Build import cythonize
-        except ImportError:
-            sys.exit(NO_CYTHON)
-        (in_c,) = cythonize([extension], build_dir=self.build_temp, force=self.force, quiet=True)
+        (in_c,) = cythonize()([extension], build_dir=self.build_temp, force=self.force, quiet=True)
         result = copy(extension)  # the original lists the files of a source distribution
         result.sources = in_c.sources
         return result
+
+
+def cythonize():
+    """Return Cython's function of this name, or end with one line where there is none of version 3."""
+    try:
+        import Cython.Build
+    except ImportError:
+        sys.exit(NO_CYTHON)
+    if int(Cython.__version__.split(".")[0]) < 3:
+        sys.exit(f"{NO_CYTHON} (found: {Cython.__version__})")
+    return Cython.Build.cythonize
 
 
 def extension(name):
@@ -117,6 +124,7 @@ setup(
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
             "catkin_pkg>=1",
+            "Cython>=3.0",
             "ezdxf>=1.1",
             "pytest>=8",
             "pytest-xdist>=3.5",

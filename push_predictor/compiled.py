@@ -20,12 +20,13 @@ import sys
 
 from push_predictor.errors import NotCompiledError
 
+REMEDY = "`pip install -e .` in its folder (needs a C compiler), or build it with colcon"
+
 
 def require_compiled(file: str) -> None:
     """Raise NotCompiledError if the module of this file is Python code. Called before the module imports `cython`."""
     if file.endswith(".py"):
         version = ".".join(map(str, sys.version_info[:2]))
         raise NotCompiledError(
-            f"the compiled mechanics of push_predictor are missing ({file} is not compiled for Python {version}): "
-            "run `pip install -e .` in its folder (needs a C compiler), or build it with colcon"
+            f"the compiled mechanics of push_predictor are missing ({file}, Python {version}): run {REMEDY}"
         )
