@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Refuses a module that should have been compiled and was not: as Python it would be a hundred times slower."""
+"""Refuses a module that should have been compiled and was not: as Python it would be more than ten times slower."""
 
 from __future__ import annotations
 

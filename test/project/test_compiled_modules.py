@@ -106,7 +106,7 @@ def test_build_puts_c_files_into_the_temporary_folder_and_modules_next_to_their_
 def test_module_that_is_not_compiled_refuses_with_the_remedy(
     path: Path, cython: ModuleType | None, monkeypatch: pytest.MonkeyPatch
 ):
-    """Whether Cython is installed or not: with it, the module would run, a hundred times slower."""
+    """Whether Cython is installed or not: with it, the module would run as slow Python."""
     monkeypatch.setitem(sys.modules, "cython", cython)
     with pytest.raises(NotCompiledError) as refused:
         runpy.run_path(str(path))
@@ -132,9 +132,7 @@ def test_node_without_compiled_modules_prints_one_line(tmp_path: Path):
 
 
 def test_doctor_without_compiled_modules_names_the_remedy(tmp_path: Path):
-    code = (
-        "from push_predictor.commands.doctor.checks import compiled_modules; print(*compiled_modules().lines, sep='|')"
-    )
+    code = "from push_predictor.commands.doctor.checks import compiled_modules as check; print(*check().lines, sep='|')"
     done = python("-c", code, first=HIDE_COMPILED, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     finding, why, remedy = done.stdout.strip().split("|")
