@@ -44,12 +44,12 @@ sys.meta_path.insert(0, Finder)
 """
 
 
-def python(*words: str, first: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def python(*words: str, first: str, folder: Path, patience: float = 60.0) -> subprocess.CompletedProcess[str]:
     """Run Python in the repository, with code that runs before anything else."""
     (folder / "sitecustomize.py").write_text(first)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(REPOSITORY)])}
     command = [sys.executable, *words]
-    return subprocess.run(command, env=environment, cwd=REPOSITORY, capture_output=True, text=True, timeout=600.0)
+    return subprocess.run(command, env=environment, cwd=REPOSITORY, capture_output=True, text=True, timeout=patience)
 
 
 # --- setup.py --------------------------------------------------------------------------------------------------------
@@ -86,7 +86,9 @@ def test_build_puts_c_files_into_the_temporary_folder_and_modules_next_to_their_
     if find_spec("Cython") is None:
         pytest.skip("Cython is not installed")
     before = set(REPOSITORY.rglob("push_predictor/**/*.c"))
-    done = python("setup.py", "-q", "build", "--build-base", str(tmp_path / "build"), first="", folder=tmp_path)
+    done = python(
+        "setup.py", "-q", "build", "--build-base", str(tmp_path / "build"), first="", folder=tmp_path, patience=900.0
+    )
     assert done.returncode == 0, done.stderr
     assert set(REPOSITORY.rglob("push_predictor/**/*.c")) == before == set()
     (built,) = (tmp_path / "build").glob("lib*")
