@@ -49,10 +49,21 @@ class BuildCompiled(build_ext):
 
     def translated(self, extension):
         """Return the same extension in C. The C file is written into the folder of temporary files."""
-        (in_c,) = cythonize()([extension], build_dir=self.build_temp, force=self.force, quiet=True)
+        in_c = Path(self.build_temp, extension.sources[0]).with_suffix(".c")
+        if self.force or not in_c.exists() or in_c.stat().st_mtime < newest_source():
+            language = {"language_level": 3}
+            cythonize()(
+                [extension], build_dir=self.build_temp, compiler_directives=language, force=self.force, quiet=True
+            )
         result = copy(extension)  # the original lists the files of a source distribution
-        result.sources = in_c.sources
+        result.sources = [str(in_c)]
         return result
+
+
+def newest_source():
+    """Time of the last change of a compiled file. Cython also looks at its own files, which each run of pip installs."""
+    paths = [Path(NAME, f"{name}{end}") for name in COMPILED for end in (".py", ".pxd")]
+    return max(path.stat().st_mtime for path in paths if path.exists())
 
 
 def cythonize():
@@ -76,7 +87,7 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Learned and analytical models of planar pushing for ROS 2",
-    long_description=Path(__file__).with_name("README.md").read_text(encoding="utf-8"),
+    long_description=Path(__file__).resolve().with_name("README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     author="push_predictor founders",
     license="Apache-2.0",
