@@ -61,7 +61,7 @@ class BuildCompiled(build_ext):
 
 
 def newest_source():
-    """Time of the last change of a compiled file. Cython also looks at its own files, which each run of pip installs."""
+    """Time of the last change of a compiled file. Cython also looks at its own files, which are new for each pip."""
     paths = [Path(NAME, f"{name}{end}") for name in COMPILED for end in (".py", ".pxd")]
     return max(path.stat().st_mtime for path in paths if path.exists())
 
