@@ -7,7 +7,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := $(shell find push_predictor push_predictor_paper msg_adapters launch config scripts -type f -not -name '*.pyc' -not -path '*/build/*' -not -path '*.egg-info/*') setup.py setup.cfg package.xml
+SOURCES := $(shell find push_predictor push_predictor_paper msg_adapters launch config scripts -type f -not -name '*.pyc' -not -name '*.so' -not -path '*/build/*' -not -path '*.egg-info/*') setup.py setup.cfg pyproject.toml package.xml
 INTERFACES := $(shell find push_predictor_interfaces -type f -not -path '*/build/*')
 # One process or robot must not hear another's demo or tests (ROS_DOMAIN_ID is theirs to choose).
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
@@ -56,6 +56,7 @@ bags: $(VENV)/.installed
 
 clean:
 	rm -rf $(VENV) build out install log *.egg-info
+	find push_predictor -name '*.so' -delete
 
 $(VENV)/.python:
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13) and "Python 3.10 to 3.13 is needed, this is " + sys.version)'
@@ -94,6 +95,8 @@ $(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) setup.py push_predictor_paper
 	$(BIN)/pip install -qq --force-reinstall --no-deps $(VENV)/wheels/*.whl
 	touch $@
 
+# Tests and the demonstration run from the checkout: the modules that pip compiled (in build/, once) go there too.
 $(VENV)/.installed: $(VENV)/.interfaces $(SOURCES)
 	$(BIN)/pip install -qq --no-deps --force-reinstall . ./push_predictor_paper
+	cd $(BIN)/../lib/python3*/site-packages && find push_predictor -name '*.so' -exec cp --parents -p {} '$(CURDIR)' \;
 	touch $@

@@ -24,6 +24,10 @@ class PushPredictorError(Exception):
     """Any failure that this package foresees."""
 
 
+class NotCompiledError(PushPredictorError, ImportError):
+    """A compiled module is there as Python code alone; the message has the command that builds it."""
+
+
 class DataWarning(UserWarning):
     """Data contain a probable mistake, cover little of the domain, or do not fit the model."""
 

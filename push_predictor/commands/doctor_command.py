@@ -39,6 +39,7 @@ from push_predictor.commands.common.options import (
 from push_predictor.commands.common.output import write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.commands.doctor.checks import (
+    compiled_modules,
     executables,
     model_predicts,
     python_and_packages,
@@ -92,6 +93,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _findings(model: Path | None, recording: Path | None, topics: Topics, rig: Rig | None) -> Iterator[Finding]:
     yield from python_and_packages()
+    yield compiled_modules()
     yield from _ros_findings()
     yield executables()
     yield model_predicts(model)

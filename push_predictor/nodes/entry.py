@@ -21,9 +21,11 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from importlib import import_module
 
 from push_predictor.blas_threads import limit_process
+from push_predictor.errors import NotCompiledError
 
 
 def predict_server() -> int:
@@ -58,7 +60,12 @@ def install_handlers() -> None:
 def _run(node: str) -> int:
     install_handlers()
     limit_process()
-    status: int = import_module(f"push_predictor.nodes.{node}").main()
+    try:
+        module = import_module(f"push_predictor.nodes.{node}")
+    except NotCompiledError as error:
+        print(f"{node}: {error}", file=sys.stderr)
+        return 1
+    status: int = module.main()
     return status
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -34,6 +35,7 @@ from push_predictor.cli import main
 from push_predictor.commands import doctor_command
 from push_predictor.commands.doctor import checks as doctor_checks
 from push_predictor.commands.doctor.checks import (
+    compiled_modules,
     executables,
     model_predicts,
     python_and_packages,
@@ -71,7 +73,18 @@ def test_doctor_checks_every_part_of_this_installation(
     said = json.loads(printed.out)
     states = {check["name"]: check["state"] for check in said["checks"]}
     assert said["sound"] and "missing" not in states.values()
-    assert {"Python", "numpy", "scipy", "mcap", "executables", "model", "recording", "space", *OF_ROS} <= states.keys()
+    assert {
+        "Python",
+        "numpy",
+        "scipy",
+        "mcap",
+        "compiled",
+        "executables",
+        "model",
+        "recording",
+        "space",
+        *OF_ROS,
+    } <= states.keys()
     assert all(states[name] == "ok" for name in ("loop-back call", "interfaces", "model", "recording"))
 
 
@@ -136,14 +149,35 @@ def test_missing_message_package_is_named(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_checked_packages_equal_those_that_setup_declares():
-    setup: dict[str, Any] = {}
-    source = (REPOSITORY / "setup.py").read_text().replace("from setuptools import", "#")
-    file = str(REPOSITORY / "setup.py")
-    exec(source, {"__file__": file, "setup": setup.update, "find_packages": lambda **how: []})
+    setup = setup_arguments()
     assert [f"{name}>={least}" for name, least in doctor_checks.NEEDED.items()] == setup["install_requires"]
     extras = {name: {row.split(">")[0] for row in rows} for name, rows in setup["extras_require"].items()}
     for name, (packages, _) in doctor_checks.EXTRAS.items():
         assert set(packages) <= extras[name], name
+
+
+def test_checked_modules_equal_those_that_setup_compiles():
+    compiled = [extension.name for extension in setup_arguments()["ext_modules"]]
+    assert [f"push_predictor.{name}" for name in doctor_checks.COMPILED] == compiled
+
+
+def setup_arguments() -> dict[str, Any]:
+    """What setup.py passes to setuptools."""
+    import setuptools
+
+    given: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(REPOSITORY)
+        patch.setattr(setuptools, "setup", given.update)
+        runpy.run_path("setup.py")
+    return given
+
+
+def test_module_that_is_not_compiled_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(doctor_checks, "COMPILED", ("errors", "no_such_module"))
+    gone = compiled_modules()
+    assert (gone.state, gone.found) == ("missing", "no_such_module: No module named 'push_predictor.no_such_module'")
+    assert "`pip install -e .`" in gone.remedy and "colcon" in gone.remedy
 
 
 def test_old_or_missing_package_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):

@@ -27,8 +27,8 @@ from push_predictor.models.gaussian_process.bound import VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The checks of `doctor` that need no ROS: Python, packages, model, recording, executables, disk space."""
+"""The checks of `doctor` that need no ROS: Python, packages, compiled modules, model, recording, executables, space."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor.commands.doctor.findings import Finding
-from push_predictor.errors import PushPredictorError
+from push_predictor.compiled import REMEDY
+from push_predictor.errors import NotCompiledError, PushPredictorError
 
 if TYPE_CHECKING:
     from push_predictor.recordings.rig import Rig
@@ -50,6 +51,14 @@ EXTRAS = {
     "completion": (("argcomplete",), "completion in the shell"),
     "import": (("rosbags", "h5py"), "ROS 1 bags, and `import` of the MIT push data set"),
 }
+COMPILED = (
+    "geometry.boundary",
+    "models.mechanics.kernel.surface",
+    "models.mechanics.kernel.contact",
+    "models.mechanics.kernel.sweep",
+    "models.mechanics.kernel.push",
+    "models.tabulated.spline",
+)
 NODES = ("predict_server", "push_recorder", "push_replay", "push_validator")
 MODULES = {"PyYAML": "yaml"}
 ENOUGH = 200e6  # bytes: a recording of some minutes and a report
@@ -62,6 +71,18 @@ def python_and_packages() -> Iterator[Finding]:
         yield _needed(name, least)
     for extra, (names, purpose) in EXTRAS.items():
         yield _extra(extra, names, purpose)
+
+
+def compiled_modules() -> Finding:
+    """Check that every compiled module can be imported."""
+    files = []
+    for name in COMPILED:
+        try:
+            files.append(importlib.import_module(f"push_predictor.{name}").__file__)
+        except ImportError as error:
+            found = f"{name} is not compiled" if isinstance(error, NotCompiledError) else f"{name}: {error}"
+            return _broken("compiled", found, "models compute pushes with it", REMEDY)
+    return Finding("compiled", "ok", f"{len(files)} modules, the first is {files[0]}")
 
 
 def model_predicts(given: Path | None) -> Finding:
