@@ -19,7 +19,7 @@ cdef struct Body:
     double* edges  # per edge: x, y of its start, x, y along it, square of its length, outward normal, start, share
     Py_ssize_t count  # of edges; 0 for a smooth curve
     double a, b, x, y, cos_turn, sin_turn  # semi-axes and pose
-    double perimeter
+    double perimeter, polar_moment
     double* arc
     double* parameter
     Py_ssize_t last  # index in both
@@ -33,6 +33,6 @@ cdef struct Nearest:
 cdef struct Contact:
     double x, y, normal_x, normal_y  # inward normal
 
-cdef Body body_of(double[:, ::1] edges, double[::1] axes, double[:, ::1] curve) noexcept
+cdef Body body_of(double* boundary) noexcept nogil
 cdef Nearest nearest_to(double x, double y, Body* body) noexcept nogil
 cdef Contact contact_at(double contact, Body* body) noexcept nogil

@@ -15,6 +15,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, nonecheck=False, initializedcheck=False
 """The boundary of a slider, compiled: nearest points, and the point of a contact. The types are in boundary.pxd."""
 
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
+
 import cython
 from cython.cimports.libc.math import M_PI, atan2, copysign, cos, fabs, sin, sqrt
 from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Nearest
@@ -25,20 +29,14 @@ PARAMETER_TOLERANCE = cython.declare(cython.double, 1e-14)  # rad
 ROUNDING = cython.declare(cython.double, 1e-12)
 
 
-def project(
-    points: cython.double[:, ::1],
-    edges: cython.double[:, ::1],
-    axes: cython.double[::1],
-    curve: cython.double[:, ::1],
-    found: cython.double[:, ::1],
-) -> None:
+def project(points: cython.double[:, ::1], boundary: cython.double[::1], found: cython.double[:, ::1]) -> None:
     """Find the nearest boundary points of points (n, 2) in m, body frame.
 
-    edges, axes, curve: see Outline.boundary. found (n, 8) is written: x, y of the nearest point, outward normal x, y,
-    signed distance (negative inside), edge, share of the edge (or the parameter of a smooth curve), and 1 where a
-    corner is nearest.
+    boundary: see Outline.boundary. found (n, 8) is written: x, y of the nearest point, outward normal x, y, signed
+    distance (negative inside), edge, share of the edge (or the parameter of a smooth curve), and 1 where a corner is
+    nearest.
     """
-    body: Body = body_of(edges, axes, curve)
+    body: Body = body_of(cython.address(boundary[0]))
     nearest: Nearest
     k: cython.Py_ssize_t
     with cython.nogil:
@@ -51,18 +49,19 @@ def project(
 
 
 @cython.cfunc
+@cython.nogil
 @cython.exceptval(check=False)
-def body_of(edges: cython.double[:, ::1], axes: cython.double[::1], curve: cython.double[:, ::1]) -> Body:
-    """The arrays of Outline.boundary as the functions below take them; they must outlive it."""
+def body_of(boundary: cython.p_double) -> Body:
+    """Outline.boundary as the functions below take it; the array must outlive it."""
     body: Body
-    body.count = edges.shape[0]
-    body.edges = cython.address(edges[0, 0]) if body.count else cython.NULL
-    body.a, body.b, body.x, body.y = axes[0], axes[1], axes[2], axes[3]
-    body.cos_turn, body.sin_turn = cos(axes[4]), sin(axes[4])
-    body.last = curve.shape[1] - 1
-    body.arc = cython.address(curve[0, 0]) if body.last > 0 else cython.NULL
-    body.parameter = cython.address(curve[1, 0]) if body.last > 0 else cython.NULL
-    body.perimeter = curve[0, body.last] if body.last > 0 else 0.0
+    body.count, body.last = cython.cast(cython.Py_ssize_t, boundary[0]), cython.cast(cython.Py_ssize_t, boundary[1]) - 1
+    body.a, body.b, body.x, body.y = boundary[2], boundary[3], boundary[4], boundary[5]
+    body.cos_turn, body.sin_turn = cos(boundary[6]), sin(boundary[6])
+    body.polar_moment = boundary[7]
+    body.edges = boundary + 8
+    body.arc = body.edges + 9 * body.count
+    body.parameter = body.arc + body.last + 1
+    body.perimeter = body.arc[body.last] if body.last > 0 else 0.0
     return body
 
 
@@ -153,8 +152,8 @@ def _parameter(a: cython.double, b: cython.double, x: cython.double, y: cython.d
     low: cython.double = 0.0
     high: cython.double = 0.5 * M_PI
     skew: cython.double = b * b - a * a
-    k: cython.int
-    for k in range(NEWTON_STEPS):
+    _k: cython.int
+    for _k in range(NEWTON_STEPS):
         c: cython.double = cos(t)
         s: cython.double = sin(t)
         slope: cython.double = skew * c * s + x * a * s - y * b * c

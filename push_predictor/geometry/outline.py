@@ -173,7 +173,7 @@ class Outline:
         """Nearest boundary points of points (n, 2) in the body frame."""
         points = np.array(points, dtype=np.float64, ndmin=2, order="C")
         found = np.empty((len(points), 8))
-        boundary.project(points, *self.boundary, found)
+        boundary.project(points, self.boundary, found)
         edge, share = found[:, 5].astype(np.int64), found[:, 6]
         if self.semi_axes is not None:
             return Projection(found[:, :2], found[:, 2:4], found[:, 4], found[:, 7] > 0.0, lambda: self._arc_at(share))
@@ -182,18 +182,21 @@ class Outline:
         )
 
     @cached_property
-    def boundary(self) -> tuple[Array, Array, Array]:
-        """The outline as the compiled functions take it, SI units: edges (V, 9), axes (5,), curve (2, m).
+    def boundary(self) -> Array:
+        """The outline as the compiled functions take it, SI units, one number after the other.
 
-        edges: x, y of the start, x, y along the edge, square of its length, outward normal x, y, contact at the start,
-        share of the perimeter. Of a smooth outline there are none: axes are its semi-axes, x, y and angle of its pose,
-        and curve has lengths along it and its parameters there.
+        Number of edges and of points of the curve m; semi-axes, x, y and angle of their pose; polar moment; 9 per edge
+        (x, y of the start, x, y along it, square of its length, outward normal x, y, contact at the start, share of the
+        perimeter); m lengths along the curve; m parameters there. A polygon has no curve but a zero, a smooth outline
+        no edges.
         """
         if self.semi_axes is not None:
-            return np.zeros((0, 9)), np.array([*self.semi_axes, *self.pose]), np.stack([self._arc, self._table])
+            head = [0.0, len(self._arc), *self.semi_axes, *self.pose, self.polar_moment]
+            return np.concatenate([head, self._arc, self._table])
         along, starts = self._ends - self.vertices, self.edge_starts
         columns = [self.vertices, along, np.sum(along**2, axis=1), self._edge_normals, starts[:-1], self._edge_shares]
-        return np.ascontiguousarray(np.column_stack(columns)), np.zeros(5), np.zeros((2, 1))
+        head = [len(along), 1.0, *np.zeros(5), self.polar_moment]
+        return np.concatenate([head, np.column_stack(columns).ravel(), np.zeros(2)])
 
     # --- polygons -----------------------------------------------------------------------------------------------
 

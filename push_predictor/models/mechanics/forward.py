@@ -89,21 +89,18 @@ class PushMechanics:
         if not n:
             return found
         given = covariates or {}
-        pushes = np.empty((n, 5))
+        pushes = np.empty((n, 7))
         pushes[:, :3], pushes[:, 3] = inputs, duration
         in_world = values[:, _IN_WORLD].any()
         pushes[:, 4] = given["push_heading"] if in_world else 0.0
         surfaces = self._surfaces(values, n, given)
-        tables = surfaces.tables
+        pushes[:, 5], pushes[:, 6], tables = surfaces.low, surfaces.share, surfaces.tables
         stretched = values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any())
         slopes = tables.slopes if stretched else _NO_SLOPES
         displacements(
             np.require(values, np.float64, ["C", "W"]),
             pushes,
-            surfaces.low,
-            surfaces.share,
-            *self.outline.boundary,
-            self.outline.polar_moment,
+            self.outline.boundary,
             tables.cells,
             slopes,
             tables.quantities,

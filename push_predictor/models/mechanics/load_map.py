@@ -44,8 +44,8 @@ class LoadMap:
     nodes (ELEVATIONS, AZIMUTHS + 1, 4): unit twists (vx, vy, w times length) of loads with that azimuth of their force
     and that elevation of moment / length over force, and the size of the load on the surface. A load with a negative
     moment has the opposite twist of its opposite. centred: the distribution about its centre.
-    quantities (22,): centre x, y (m), length c = mmax / fmax (m), mean squares xx, xy, yy (m^2) of the pressure, and its
-    reach; see `reach`.
+    quantities (22,): centre x, y (m), length c = mmax / fmax (m), mean squares xx, xy, yy (m^2) of the pressure, and
+    its reach; see `reach`.
     """
 
     nodes: Array

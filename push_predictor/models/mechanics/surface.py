@@ -108,7 +108,7 @@ class SurfaceTables:
 
 @dataclass(frozen=True, eq=False)
 class PushSurfaces:
-    """Which of the tables each of n pushes lies on or above: low (n,), share (n,) of the next; (1,) if all are alike."""
+    """The table of each of n pushes, low (n,), and the share (n,) of the next one; (1,) if all are alike."""
 
     tables: SurfaceTables
     low: IntArray

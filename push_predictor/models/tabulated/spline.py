@@ -13,7 +13,11 @@
 # limitations under the License.
 
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, nonecheck=False, initializedcheck=False
-"""Cubic splines on boxes of up to three axes, and the moments that a table of predictions keeps as splines; compiled."""
+"""Cubic splines on boxes of up to three axes, and the moments that a table keeps as splines, compiled."""
+
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
 
 import cython
 from cython.cimports.libc.math import exp, sqrt, tanh

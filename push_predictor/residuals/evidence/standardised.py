@@ -90,8 +90,9 @@ class Evidence:
 def evidence_of(model: PushModel, table: PushTable) -> Evidence:
     """Residuals of a table under a model that was not trained on it.
 
-    A learnt model's outputs are standardised one by one. A strong correlation of the outputs would give the largest weight to small parts of the
-    residual: in one recording, the second order of an effect was found before the effect itself.
+    A learnt model's outputs are standardised one by one. A strong correlation of the outputs would give the largest
+    weight to small parts of the residual: in one recording, the second order of an effect was found before the effect
+    itself.
     """
     predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))

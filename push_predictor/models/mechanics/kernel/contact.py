@@ -19,6 +19,10 @@ The limit surface is convex, so the direction of the contact's velocity turns wi
 the friction cone it shows whether the contact slips, and between them lies the force of a contact that sticks.
 """
 
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
+
 import cython
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.push_predictor.models.mechanics.kernel.contact import RESTS, Driven, Start, Touch

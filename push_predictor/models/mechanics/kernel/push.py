@@ -15,11 +15,15 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, nonecheck=False, initializedcheck=False
 """Displacements of pushes, compiled: from what is recorded to what is true, and back."""
 
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
+
 import cython
 from cython.cimports.libc.math import atan2, cos, exp, sin
 from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Nearest, body_of, contact_at, nearest_to
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surface, root_of
-from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Values, swept
+from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Tables, Values, swept
 
 CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
 
@@ -27,12 +31,7 @@ CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
 def displacements(
     values: cython.double[:, ::1],
     pushes: cython.double[:, ::1],
-    low: cython.Py_ssize_t[::1],
-    share: cython.double[::1],
-    edges: cython.double[:, ::1],
-    axes: cython.double[::1],
-    curve: cython.double[:, ::1],
-    polar_moment: cython.double,
+    boundary: cython.double[::1],
     cells: cython.double[:, :, ::1],
     slopes: cython.double[:, :, :, ::1],
     quantities: cython.double[:, ::1],
@@ -43,39 +42,31 @@ def displacements(
 ) -> None:
     """Compute displacements (n, 3: dx, dy in m, dtheta in rad) of the recorded origin in the recorded push frame.
 
-    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 5): velocity m/s, contact, angle rad,
-    duration s, heading of the push in the world rad. low, share (n,), or (1,) for all: table of each push, and the
-    share of the next one. edges, axes, curve: see Outline.boundary; polar_moment: of its area, m^2. cells (T, 6912, 16),
-    slopes (T, 2, 6912, 16) or (0, 2, 0, 16) where no parameter needs them, quantities (T, 22): see load_map; power: of
-    the power law where there is no table, else 0. pusher_radius m. accuracy: relative. found (n, 3) is written; what
-    takes too many steps, or is not finite, is not a number.
+    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 7): velocity m/s, contact, angle
+    rad, duration s, heading of the push in the world rad, number of its table, share of the next one. boundary: see
+    Outline.boundary. cells (T, 6912, 16), slopes (T, 2, 6912, 16) or empty where no parameter needs them, quantities
+    (T, 22): see LoadMap; power: of the power law where there is no table, else 0. pusher_radius m. accuracy: relative.
+    found (n, 3) is written; what takes too many steps, or is not finite, is not a number.
     """
-    body: Body = body_of(edges, axes, curve)
+    body: Body = body_of(cython.address(boundary[0]))
     k: cython.Py_ssize_t
-    tables: _Tables
+    tables: Tables
     tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
     tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
     tables.quantities = cython.address(quantities[0, 0])
     tables.power = power
     per_push: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
-    own_table: cython.Py_ssize_t = 1 if low.shape[0] > 1 else 0
     with cython.nogil:
         for k in range(pushes.shape[0]):
             _displacement(
                 cython.cast(cython.pointer(Values), cython.address(values[k * per_push, 0])),
                 cython.address(pushes[k, 0]),
-                low[k * own_table],
-                share[k * own_table],
                 cython.address(body),
-                polar_moment,
                 cython.address(tables),
                 pusher_radius,
                 accuracy,
                 cython.address(found[k, 0]),
             )
-
-
-_Tables = cython.struct(cells=cython.p_double, slopes=cython.p_double, quantities=cython.p_double, power=cython.double)
 
 
 @cython.cfunc
@@ -84,11 +75,8 @@ _Tables = cython.struct(cells=cython.p_double, slopes=cython.p_double, quantitie
 def _displacement(
     values: cython.pointer(Values),
     given: cython.p_double,
-    low: cython.Py_ssize_t,
-    share: cython.double,
     body: cython.pointer(Body),
-    polar_moment: cython.double,
-    tables: cython.pointer(_Tables),
+    tables: cython.pointer(Tables),
     pusher_radius: cython.double,
     accuracy: cython.double,
     found: cython.p_double,
@@ -101,8 +89,9 @@ def _displacement(
     recorded_x: cython.double = c * contact.normal_x - s * contact.normal_y
     recorded_y: cython.double = s * contact.normal_x + c * contact.normal_y
     push: Push
-    push.values, push.body, push.polar_moment = values, body, polar_moment
-    surface: Surface = _surface(tables, low, share, cython.address(push))
+    push.values, push.body = values, body
+    low: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, given[5])
+    surface: Surface = _surface(tables, low, given[6], cython.address(push))
     push.surface = cython.address(surface)
     push.radius = pusher_radius + values.radius_error
     along: cython.double = values.tip_offset_along + velocity * values.clock_delay
@@ -139,7 +128,7 @@ def _displacement(
 @cython.nogil
 @cython.exceptval(check=False)
 def _surface(
-    tables: cython.pointer(_Tables), low: cython.Py_ssize_t, share: cython.double, push: cython.pointer(Push)
+    tables: cython.pointer(Tables), low: cython.Py_ssize_t, share: cython.double, push: cython.pointer(Push)
 ) -> Surface:
     """The surface of a push; what of it acts alike all along the push is written into the push."""
     values: cython.pointer(Values) = push.values

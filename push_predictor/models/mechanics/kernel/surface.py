@@ -23,6 +23,10 @@ W = [[1 + a, b], [b, 1 - a]]. With its root R, isotropic friction resists at the
 R f. A body whose points have the arms r is then one with the arms R r / det R under the same moments.
 """
 
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
+
 import cython
 from cython.cimports.libc.math import M_PI, atan2, cos, fabs, pow, sin, sqrt
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Acting, Answer, Root, Surface, Three
@@ -221,8 +225,8 @@ def _with_pull(
     radius: cython.double = 1.0
     share: cython.double = 1.0
     on: Three
-    k: cython.int
-    for k in range(PULL_ROUNDS):
+    _k: cython.int
+    for _k in range(PULL_ROUNDS):
         margin: cython.double = dot * dot + radius * radius - square
         share = -dot + sqrt(margin if not margin < SMALLEST_MARGIN else SMALLEST_MARGIN)
         on.x, on.y, on.m = share * x + pull.x, share * y + pull.y, share * m + pull.m

@@ -35,7 +35,6 @@ cdef struct Push:
     Body* body
     Surface* surface
     double centre_x, centre_y, xx, xy, yy  # centre and mean squares of the pressure
-    double polar_moment  # of the slider's area, m^2
     Acting acting  # what acts alike all along the push
 
 cdef struct Pose:
@@ -46,5 +45,17 @@ cdef struct Rate:
     double gap  # between disc and slider
     double along  # above 0 where the disc comes closer
     int kind  # of the contact: the same number while the rate is smooth, below 0 at a corner
+
+cdef struct Step:
+    Pose pose
+    Pose difference  # of the rates of two methods
+    bint smooth  # whether all stages have contacts of one kind
+
+cdef struct Tables:
+    # Limit surfaces of all pushes of a batch: see LoadMap.
+    double* cells
+    double* slopes
+    double* quantities
+    double power
 
 cdef Pose swept(Push* push, double accuracy) noexcept nogil

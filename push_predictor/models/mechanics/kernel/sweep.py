@@ -22,6 +22,10 @@ and the estimate holds. Other steps are compared with two of half their length, 
 is smooth.
 """
 
+from push_predictor.compiled import require_compiled
+
+require_compiled(__file__)
+
 import cython
 from cython.cimports.libc.math import NAN, atan2, cos, fabs, log, sin, sqrt
 from cython.cimports.push_predictor.geometry.boundary import Nearest, nearest_to
@@ -34,7 +38,7 @@ from cython.cimports.push_predictor.models.mechanics.kernel.surface import (
     root_of,
     stretched,
 )
-from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Rate, Values
+from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Rate, Step, Values
 
 LONGEST_STEP = cython.declare(cython.double, 0.004)  # m: about a pusher's radius, so that no corner is stepped over
 TOUCHING = cython.declare(cython.double, 2e-5)  # m: a wider gap at the start of a step is no contact
@@ -77,7 +81,7 @@ def swept(push: cython.pointer(Push), accuracy: cython.double) -> Pose:
         apart: cython.bint = first.gap >= TOUCHING
         if apart and first.along > 0.0:
             step = _least(step, first.gap)
-        moved: _Step = _advance(pose, done, step, first, push, cython.address(start))
+        moved: Step = _advance(pose, done, step, first, push, cython.address(start))
         last: Rate = _rate(moved.pose, done + step, push, cython.address(start))
         allowed: cython.double = accuracy * (_distance(moved.pose, pose, length) + OF_TRAVEL * push.travel)
         smooth: cython.bint = apart or (moved.smooth and last.kind == first.kind)
@@ -97,9 +101,6 @@ def swept(push: cython.pointer(Push), accuracy: cython.double) -> Pose:
     return pose
 
 
-_Step = cython.struct(pose=Pose, difference=Pose, smooth=cython.bint)
-
-
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
@@ -110,13 +111,13 @@ def _advance(
     first: Rate,
     push: cython.pointer(Push),
     start: cython.pointer(Start),
-) -> _Step:
+) -> Step:
     """One step by Kutta's 3/8 rule (1901) of fourth order, from the rate `first` at its begin.
 
     difference: the weighted sum of the stages' rates which with that after the step gives the difference from a method
     of third order, also where rates depend on the travel alone. smooth: whether all stages have contacts of one kind.
     """
-    found: _Step
+    found: Step
     found.pose, found.smooth = pose, True
     found.difference.x = found.difference.y = found.difference.heading = 0.0
     if first.gap >= TOUCHING:
@@ -203,7 +204,7 @@ def _inertial(bend: Pose, heading: cython.double, push: cython.pointer(Push)) ->
     c: cython.double = cos(heading)
     s: cython.double = sin(heading)
     load.x, load.y = c * bend.x + s * bend.y, c * bend.y - s * bend.x
-    load.m = push.polar_moment / push.surface.length * bend.heading
+    load.m = push.body.polar_moment / push.surface.length * bend.heading
     share: cython.double = push.values.inertia * push.speed * push.speed
     size: cython.double = sqrt(load.x * load.x + load.y * load.y + load.m * load.m) * fabs(share) / MOST_INERTIA
     share = -share / size if size > 1.0 else -share
