@@ -115,8 +115,8 @@ class PushMechanics:
         """Limit surfaces of n pushes with these values; tabulates what is not tabulated yet."""
         exponent = values[:, _RIM]
         if self.supports and RECORDING in covariates:
-            number = np.full(n, -1 if self.support is None else 0)
-            known = [] if self.support is None else [self.support]
+            known = [self.support] if isinstance(self.support, PressureDistribution) else []
+            number = np.full(n, len(known) - 1)
             for recording, support in self.supports.items():
                 number[covariates[RECORDING] == recording] = len(known)
                 known.append(support)

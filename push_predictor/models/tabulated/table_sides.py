@@ -77,7 +77,9 @@ def _itself(values: Array) -> Array:
 
 def _places(chart: Chart) -> Callable[[Array], Array]:
     """Features (boxes, m, columns) of the places (m,) of every box."""
-    return lambda places: np.stack([np.column_stack(chart.place_features(places, k)) for k in range(chart.boxes)])
+    return lambda places: np.stack(
+        [np.column_stack(chart.place_features(places, np.full(len(places), k))) for k in range(chart.boxes)]
+    )
 
 
 def _standardised(
