@@ -98,7 +98,7 @@ class PushMechanics:
         stretched = values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any())
         slopes = tables.slopes if stretched else _NO_SLOPES
         displacements(
-            np.require(values, np.float64, ["C", "W"]),
+            values if values.flags.c_contiguous and values.flags.writeable else np.array(values, order="C"),
             pushes,
             self.outline.boundary,
             tables.cells,

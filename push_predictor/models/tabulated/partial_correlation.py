@@ -15,8 +15,8 @@
 """Correlation matrices of three outputs as three unbounded numbers, which a table can interpolate.
 
 The compiled `spline.table_moments` turns them back. They are atanh of r12, of r13 and of the partial correlation
-r23.1. Any three numbers give a positive definite matrix. An error e in one of them changes the variance of any combination of outputs by at most about 2 e (relative), however
-close to +-1 the correlation is.
+r23.1. Any three numbers give a positive definite matrix. An error e in one of them changes the variance of any
+combination of outputs by at most about 2 e (relative), however close to +-1 the correlation is.
 """
 
 from __future__ import annotations
