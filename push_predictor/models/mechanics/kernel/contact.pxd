@@ -22,9 +22,9 @@ cdef struct Touch:
     double along, across  # velocity of the pusher along the normal and its left
 
 cdef struct Start:
-    # Where the force lay in the friction cone at the last contact, from 0 at its right edge to 1 at its left, and the
-    # change of that share over the change of the lag; 0 if unknown.
-    double share, slope
+    # Where the force lay in the friction cone at the last contact, from 0 at its right edge to 1 at its left, the change
+    # of that share over the change of the lag, 0 if unknown, and to how many rad a contact is solved.
+    double share, slope, tolerance
 
 cdef struct Driven:
     double x, y, spin  # velocity of the centre of friction, and spin times length

@@ -29,7 +29,6 @@ from cython.cimports.push_predictor.models.mechanics.kernel.contact import RESTS
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Acting, Surface, Three, driven_twist
 
 ROOT_STEPS = cython.declare(cython.int, 40)
-ROOT_TOLERANCE = cython.declare(cython.double, 1e-10)  # rad
 BISECT_EVERY = cython.declare(cython.int, 6)  # steps: next to a flat or an edge of the surface, secants converge slowly
 
 
@@ -80,7 +79,7 @@ def driven(
         # Above 0 where the force must turn to the left, for the contact to move as the pusher does. The velocity is
         # within a right angle of the force, so one away from the pusher lies beyond the normal's left or right.
         lag: cython.double = (toward if toward > 0.0 else 0.0) * touch.across - sideways * touch.along
-        if fabs(lag) <= ROOT_TOLERANCE * toward or high - low <= ROOT_TOLERANCE:
+        if fabs(lag) <= start.tolerance * toward or high - low <= start.tolerance:
             break
         if (share == 1.0 and lag > 0.0) or (share == 0.0 and lag < 0.0):
             break

@@ -45,6 +45,7 @@ TOUCHING = cython.declare(cython.double, 2e-5)  # m: a wider gap at the start of
 OF_TRAVEL = cython.declare(cython.double, 0.01)  # of the accuracy: the error of a step allowed for the whole travel
 OF_CORNER = cython.declare(cython.double, 0.25)  # of the allowed error: how far the disc may enter
 SHORTEST_AT_CORNER = cython.declare(cython.double, 1e-4)  # m: in longer steps
+OF_CONTACT = cython.declare(cython.double, 1e-5)  # of the accuracy: to how many rad a contact is solved
 MOST_STEPS = cython.declare(cython.int, 20000)  # what takes more is reported as not a number
 REFERENCE_SPEED = cython.declare(cython.double, 0.02)  # m/s, at which friction_by_speed is zero
 SLOWEST = cython.declare(cython.double, 1e-4)  # m/s, of a tangential speed
@@ -67,7 +68,7 @@ def swept(push: cython.pointer(Push), accuracy: cython.double) -> Pose:
     length: cython.double = push.surface.length
     rough: cython.bint = False
     start: Start
-    start.share, start.slope = 0.5, 0.0
+    start.share, start.slope, start.tolerance = 0.5, 0.0, OF_CONTACT * accuracy
     steps: cython.int = 0
     if not push.travel > 0.0:
         return pose
