@@ -48,6 +48,35 @@ def project(points: cython.double[:, ::1], boundary: cython.double[::1], found: 
             found[k, 6], found[k, 7] = nearest.share, nearest.corner
 
 
+def place_features(
+    inputs: cython.double[:, ::1],
+    boundary: cython.double[::1],
+    order: cython.Py_ssize_t,
+    spacing: cython.double,
+    found: cython.double[:, ::1],
+) -> None:
+    """Compute features of pushes (n, 3: velocity, contact, angle) that fold an outline's rotational symmetry.
+
+    order: of the symmetry, 0 for a circle. spacing: distance between edges that no symmetry maps onto each other.
+    found (n, D) is written: the velocity, the place of the contact (none on a circle; cosine and sine on a smooth
+    curve; on a polygon the fraction of the edge), the angle.
+    """
+    body: Body = body_of(cython.address(boundary[0]))
+    last: cython.Py_ssize_t = found.shape[1] - 1
+    n: cython.Py_ssize_t
+    with cython.nogil:
+        for n in range(inputs.shape[0]):
+            found[n, 0], found[n, last] = inputs[n, 0], inputs[n, 2]
+            contact: cython.double = inputs[n, 1]
+            if body.count > 0:
+                edge: cython.Py_ssize_t = _edge_at(contact, cython.address(body))
+                share: cython.double = (contact - body.edges[9 * edge + 7]) / body.edges[9 * edge + 8]
+                share = 0.0 if share < 0.0 else (1.0 if share > 1.0 else share)
+                found[n, 1] = spacing * (edge % (body.count // order)) + share
+            elif order > 0:
+                found[n, 1], found[n, 2] = cos(2.0 * M_PI * order * contact), sin(2.0 * M_PI * order * contact)
+
+
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
@@ -185,13 +214,20 @@ def contact_at(contact: cython.double, body: cython.pointer(Body)) -> Contact:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def _edge_at(contact: cython.double, body: cython.pointer(Body)) -> cython.Py_ssize_t:
+    edge: cython.Py_ssize_t = body.count - 1
+    while edge > 0 and contact < body.edges[9 * edge + 7]:
+        edge -= 1
+    return edge
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def _contact_on_polygon(contact: cython.double, body: cython.pointer(Body)) -> Contact:
     found: Contact
     edge: cython.p_double
-    k: cython.Py_ssize_t = body.count - 1
-    while k > 0 and contact < body.edges[9 * k + 7]:
-        k -= 1
-    edge = body.edges + 9 * k
+    edge = body.edges + 9 * _edge_at(contact, body)
     share: cython.double = (contact - edge[7]) / edge[8]
     share = 0.0 if share < 0.0 else (1.0 if share > 1.0 else share)
     found.x, found.y = edge[0] + share * edge[2], edge[1] + share * edge[3]

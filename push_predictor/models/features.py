@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.geometry.boundary import place_features
 from push_predictor.geometry.outline import Outline
 from push_predictor.types import Array
 
@@ -30,21 +31,8 @@ EDGE_SPACING = 3.0  # distance, in edge lengths, between edges that no symmetry 
 
 def push_features(outline: Outline, inputs: Array) -> Array:
     """Features (n, D) of inputs (n, 3: velocity m/s, contact, angle rad); the velocity comes first, the angle last."""
-    velocity, contact, angle = inputs.T
-    places = _contact_features(outline, contact)
-    features = np.empty((len(inputs), 2 + len(places)))  # np.column_stack takes several times as long
-    features[:, 0], features[:, -1] = velocity, angle
-    for k, place in enumerate(places, 1):
-        features[:, k] = place
-    return features
-
-
-def _contact_features(outline: Outline, contact: Array) -> list[Array]:
     order = outline.rotational_symmetry
-    if order == 0:
-        return []
-    if outline.semi_axes is not None:
-        phase = 2.0 * np.pi * order * contact
-        return [np.cos(phase), np.sin(phase)]
-    edge, fraction = outline.edge(contact)
-    return [EDGE_SPACING * (edge % (len(outline.vertices) // order)) + fraction]
+    places = 0 if order == 0 else 1 if outline.semi_axes is None else 2
+    features = np.empty((len(inputs), 2 + places))
+    place_features(np.array(inputs, dtype=np.float64, order="C"), outline.boundary, order, EDGE_SPACING, features)
+    return features

@@ -60,8 +60,8 @@ class Mechanism:
 
     def response(self, mechanics: FittedMechanics, push: Push) -> Array:
         """Derivatives (n, 3, p) of the outcome (m, m, rad, push frame) by the parameters, by central differences."""
-        slopes = mechanics.slopes({name: np.zeros(len(push.inputs)) for name in self.quantities}, push)
-        return np.stack([slopes[name] for name in self.quantities], axis=2)
+        unchanged = np.zeros((len(push.inputs), len(self.quantities)))
+        return mechanics.shifted(self.quantities, unchanged, push)[1].transpose(0, 2, 1)
 
     def plausible(self, values: Array) -> bool:
         """Whether a rig could have these values (n, p) of the parameters."""

@@ -17,15 +17,72 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.effect import Effect, products
-from push_predictor.models.mechanics.fitted import Changes, FittedMechanics, ends_of, slopes_between
+from push_predictor.models.effects.driver_basis import columns_of
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.fitted import Changes, FittedMechanics
 from push_predictor.models.mechanisms import LARGEST
 from push_predictor.models.push import Push
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class JointEffects:
+    """Effects that change parameters of the mechanics, as one set of m coefficients that change q parameters."""
+
+    effects: tuple[Effect, ...]
+
+    @staticmethod
+    def of(effects: Sequence[Effect]) -> JointEffects:
+        """Those of some effects that have a mechanism."""
+        return JointEffects(tuple(effect for effect in effects if effect.exact))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters that change, each once."""
+        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.quantities))
+
+    def columns(self, push: Push) -> Array:
+        """The bases (n, b) of all effects, one after the other."""
+        n = len(push.inputs)
+        return np.concatenate([effect.basis.values(push.covariates, n) for effect in self.effects], axis=1)
+
+    def changes(self, columns: Array) -> Array:
+        """The changes (n, q), at most the largest that a rig can have."""
+        return np.minimum(np.maximum(columns @ self._weights, -self._largest), self._largest)
+
+    def design(self, columns: Array, slopes: Array) -> Array:
+        """Derivatives (n, m, 3) by the coefficients, from those (n, q, 3) by the parameters."""
+        parameter, column = self._acting
+        return np.asarray(slopes[:, parameter] * columns[:, column, None])
+
+    @cached_property
+    def _acting(self) -> tuple[IntArray, IntArray]:
+        """The parameter and the column of the bases that each coefficient (m,) acts on."""
+        parameters, columns, begin = [], [], 0
+        for effect in self.effects:
+            width = columns_of(effect.basis)
+            own = [self.names.index(name) for name in effect.quantities]
+            parameters.append(np.repeat(own, width))
+            columns.append(np.tile(begin + np.arange(width), len(own)))
+            begin += width
+        return np.concatenate(parameters), np.concatenate(columns)
+
+    @cached_property
+    def _weights(self) -> Array:
+        """What a unit of each column changes, (b, q)."""
+        parameter, column = self._acting
+        weights = np.zeros((int(column.max()) + 1, len(self.names)))
+        np.add.at(weights, (column, parameter), np.concatenate([effect.coefficients for effect in self.effects]))
+        return weights
+
+    @cached_property
+    def _largest(self) -> Array:
+        return np.array([LARGEST[name] for name in self.names])
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,47 +131,42 @@ def joint(
 ) -> JointShift:
     """The shift by all effects together, and its derivatives by their coefficients.
 
-    unchanged (n, 3): what `undisturbed` returns, where it is known from before.
+    unchanged (n, 3): what `undisturbed` returns, where it is known from before; used without derivatives.
     """
-    n, changes = len(push.inputs), changes_of(effects, push)
-    ends = {name: ends_of(name, mechanics.value(name), c) for name, c in changes.items()} if derivatives else {}
-    tried = [{**changes, name: end} for name, both in ends.items() for end in both]
-    if not changes:
-        moved = np.zeros((2, n, 3))
-    elif unchanged is None:
-        moved = mechanics.displacements([{}, changes, *tried], push)
+    acting, n = JointEffects.of(effects), len(push.inputs)
+    if not acting.effects:
+        found = JointShift(np.zeros((n, 3)), [], {})
+    elif derivatives:
+        columns = acting.columns(push)
+        shift, slopes = mechanics.shifted(acting.names, acting.changes(columns), push)
+        found = JointShift(shift, [], {name: slopes[:, k] for k, name in enumerate(acting.names)})
+        exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
     else:
-        moved = np.concatenate([unchanged[None], mechanics.displacements([changes, *tried], push)])
-    of_parameter = slopes_between(ends, moved[2:])
-    together = JointShift(moved[1] - moved[0], [], of_parameter)
-    shift, designs = together.shift, together.designs
+        moved = mechanics.displacements([changes_of(effects, push)], push)[0]
+        found = JointShift(moved - (undisturbed(mechanics, push) if unchanged is None else unchanged), [], {})
+    shift = found.shift
     for effect in effects:
         if not effect.exact:
-            designs.append(effect.design(mechanics, push))
-            shift = shift + designs[-1] @ effect.coefficients
+            found.designs.append(effect.design(mechanics, push))
+            shift = shift + found.designs[-1] @ effect.coefficients
         elif derivatives:
-            designs.append(products(together.responses(effect), effect.basis.values(push.covariates, n)))
-    return JointShift(shift, designs, of_parameter)
+            found.designs.append(next(exact))
+    return replace(found, shift=shift)
+
+
+def _ends(effects: Sequence[Effect]) -> IntArray:
+    """Where the coefficients of each effect end among all, but for the last."""
+    return np.cumsum([len(effect.coefficients) for effect in effects])[:-1]
 
 
 def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
     """The sum of all effects' changes of each parameter, at most the largest that a rig can have."""
-    return within_limits(sums_of(effects, push))
+    acting = JointEffects.of(effects)
+    if not acting.effects:
+        return {}
+    return dict(zip(acting.names, acting.changes(acting.columns(push)).T, strict=True))
 
 
 def within_limits(changes: Changes) -> Changes:
     """Changes of at most the largest that a rig can have."""
     return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in changes.items()}
-
-
-def sums_of(effects: Sequence[Effect], push: Push) -> Changes:
-    """The sum of all effects' changes of each parameter."""
-    n, total = len(push.inputs), dict[str, Array]()
-    for effect in effects:
-        if not effect.exact:
-            continue
-        values = effect.basis.values(push.covariates, n)
-        strengths = effect.coefficients.reshape(-1, values.shape[1]) @ values.T
-        for name, strength in zip(effect.quantities, strengths, strict=True):
-            total[name] = total[name] + strength if name in total else strength
-    return total

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -25,7 +25,7 @@ import numpy as np
 
 from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.mechanics.forward import COLUMN, RECORDING, TEXTBOOK, PushMechanics
+from push_predictor.models.mechanics.forward import COLUMN, RECORDING, TEXTBOOK, PushMechanics, Shape
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
@@ -66,7 +66,7 @@ class FittedMechanics:
 
     def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
-        return self.mechanics.displaced(self._row, inputs, duration, covariates)
+        return self.mechanics.displaced(self._row, inputs, duration, covariates, self._shape)
 
     def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
         """Displacements (k, n, 3) with each of k sets of changes of parameters, computed as one set of pushes.
@@ -79,22 +79,53 @@ class FittedMechanics:
         for own, changes in zip(values, tried, strict=True):
             for name, change in changes.items():
                 own[:, COLUMN[name]] += change
-        given = self._covariates(push, tried)
+        given = self._covariates(push, {name for changes in tried for name in changes})
         if k > 1:
             given = {name: np.tile(column, k) for name, column in given.items()}
         inputs = np.broadcast_to(push.inputs, (k, n, 3)).reshape(-1, 3)
         duration = np.broadcast_to(push.duration, (k, n)).reshape(-1)
         return self.mechanics.displaced(values.reshape(k * n, -1), inputs, duration, given).reshape(k, n, 3)
 
-    def slopes(self, changes: Changes, push: Push) -> dict[str, Array]:
-        """Derivatives (n, 3) of the displacement under changes, by each parameter that changes, by differences."""
-        steps, tried = {name: ends_of(name, self.value(name), change) for name, change in changes.items()}, []
-        for name, ends in steps.items():
-            tried += [{**changes, name: end} for end in ends]
-        if not tried:
-            return {}
-        moved = self.displacements(tried, push)
-        return slopes_between(steps, moved)
+    def shifted(self, names: tuple[str, ...], changes: Array, push: Push) -> tuple[Array, Array]:
+        """What changes (n, q) of the parameters `names` shift the displacement by (n, 3), and derivatives (n, q, 3)."""
+        given = Push(push.inputs, push.duration, self._covariates(push, names))
+        moved = self._moved(names)
+        shape = self._changed_shape(names, changes)
+        found = self.mechanics.shifted(self._row, shape, changes, moved, given)
+        return found[:, 0], found[:, 1:]
+
+    def _changed_shape(self, names: tuple[str, ...], changes: Array) -> Shape:
+        """Where no rim changes it is the same for all changes of these parameters."""
+        rim = "rim_exponent" in names
+        if rim or names not in self._shapes:
+            ends = np.repeat(self._row, 2, axis=0)
+            for k, name in enumerate(names):
+                step = DIFFERENCE * BY_NAME[name].spread
+                ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
+            if rim:
+                return self.mechanics.shape_of(ends)
+            self._shapes[names] = self.mechanics.shape_of(ends)
+        return self._shapes[names]
+
+    @cached_property
+    def _shapes(self) -> dict[tuple[str, ...], Shape]:
+        return {}
+
+    @cached_property
+    def _shape(self) -> Shape:
+        return self.mechanics.shape_of(self._row)
+
+    def _moved(self, names: tuple[str, ...]) -> Array:
+        """The parameters of a difference, see PushMechanics.shifted. No friction and no inertia is below zero."""
+        if names not in self._differences:
+            steps = [DIFFERENCE * BY_NAME[name].spread for name in names]
+            least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
+            self._differences[names] = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
+        return self._differences[names]
+
+    @cached_property
+    def _differences(self) -> dict[tuple[str, ...], Array]:
+        return {}
 
     def value(self, name: str) -> float:
         """The value of a parameter: the fitted one, or the textbook's."""
@@ -120,14 +151,17 @@ class FittedMechanics:
             row[COLUMN[name]] = value
         return row[None]
 
-    def _covariates(self, push: Push, tried: Sequence[Changes]) -> dict[str, Array]:
-        """What the mechanics need of the covariates of pushes."""
+    def _covariates(self, push: Push, names: Iterable[str]) -> dict[str, Array]:
+        """What the mechanics with changes of these parameters need of the covariates of pushes."""
         given = push.covariates
         used = {RECORDING: given[RECORDING]} if self.mechanics.supports and RECORDING in given else {}
-        names = {name for changes in tried for name in changes}
-        if any(BY_NAME[name].needs for name in (*names, *self.values)):
+        if self._in_world or any(BY_NAME[name].needs for name in names):
             used["push_heading"] = self._heading(push)
         return used
+
+    @cached_property
+    def _in_world(self) -> bool:
+        return any(BY_NAME[name].needs for name in self.values)
 
     def _heading(self, push: Push) -> Array:
         if "slider_heading" not in push.covariates:
@@ -136,24 +170,6 @@ class FittedMechanics:
         return np.asarray(
             push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
         )
-
-
-def ends_of(name: str, value: float, change: Array) -> tuple[Array, Array]:
-    """Changes (n,) of a parameter below and above, between which a derivative is taken.
-
-    No coefficient of friction and no inertia is below zero.
-    """
-    step = DIFFERENCE * BY_NAME[name].spread
-    least = -value if BY_NAME[name].low == 0.0 else -np.inf
-    return np.maximum(change - step, np.minimum(least, change)), change + step
-
-
-def slopes_between(ends: Mapping[str, tuple[Array, Array]], moved: Array) -> dict[str, Array]:
-    """Derivatives (n, 3) by q parameters, from displacements (2 q, n, 3) at both ends of each."""
-    return {
-        name: (moved[2 * k + 1] - moved[2 * k]) / (high - low)[:, None]
-        for k, (name, (low, high)) in enumerate(ends.items())
-    }
 
 
 def analytical_mechanics(

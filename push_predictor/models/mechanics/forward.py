@@ -23,20 +23,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.mechanics.kernel.push import displacements
+from push_predictor.models.mechanics.kernel.push import displacements, shifts
 from push_predictor.models.mechanics.parameters import PARAMETERS, ParameterValues
 from push_predictor.models.mechanics.pressure import PressureDistribution
 from push_predictor.models.mechanics.surface import (
+    NO_SLOPES,
     PowerSurface,
-    PushSurfaces,
-    mixed_surfaces,
-    patch_surfaces,
-    same_surface,
+    SurfaceTables,
+    knots_about,
+    power_table,
+    surface_tables,
 )
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 RECORDING = "recording"  # the covariate that numbers recordings with different supports
@@ -46,7 +49,13 @@ _IN_WORLD = slice(COLUMN["grain_x"], COLUMN["gradient_y"] + 1)  # what needs the
 _STRETCHING = slice(COLUMN["body_anisotropy"], COLUMN["body_anisotropy_diagonal"] + 1)
 _GRAIN = slice(COLUMN["grain_x"], COLUMN["grain_diagonal"] + 1)
 _RIM = COLUMN["rim_exponent"]
-_NO_SLOPES = np.zeros((0, 2, 0, 16))
+
+
+class Shape(NamedTuple):
+    """What the kernel needs in addition to pushes and values. in_world: whether the heading of a push matters."""
+
+    in_world: bool
+    given: tuple[Array, Array, Array, Array, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,60 +90,74 @@ class PushMechanics:
         return self.displaced(table, inputs, duration, covariates)
 
     def displaced(
-        self, values: Array, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
+        self,
+        values: Array,
+        inputs: Array,
+        duration: Array,
+        covariates: Mapping[str, Array] | None = None,
+        shape: Shape | None = None,
     ) -> Array:
-        """The same with values as rows (n, 28) in the order of parameters.PARAMETERS, or (1, 28) for all pushes."""
-        n = len(inputs)
-        found = np.empty((n, 3))
-        if not n:
-            return found
-        given = covariates or {}
-        pushes = np.empty((n, 7))
-        pushes[:, :3], pushes[:, 3] = inputs, duration
-        in_world = values[:, _IN_WORLD].any()
-        pushes[:, 4] = given["push_heading"] if in_world else 0.0
-        surfaces = self._surfaces(values, n, given)
-        pushes[:, 5], pushes[:, 6], tables = surfaces.low, surfaces.share, surfaces.tables
-        stretched = values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any())
-        slopes = tables.slopes if stretched else _NO_SLOPES
-        displacements(
-            values if values.flags.c_contiguous and values.flags.writeable else np.array(values, order="C"),
-            pushes,
-            self.outline.boundary,
-            tables.cells,
-            slopes,
-            tables.quantities,
-            tables.power,
-            self.pusher_radius,
-            self.accuracy,
-            found,
-        )
+        """The same with values as rows (n, 28) in the order of parameters.PARAMETERS, or (1, 28) for all pushes.
+
+        shape: `shape_of` the values, where it is known.
+        """
+        found = np.empty((len(inputs), 3))
+        if len(inputs):
+            shape = shape or self.shape_of(values)
+            displacements(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
         return found
 
-    def _surfaces(self, values: Array, n: int, covariates: Mapping[str, Array]) -> PushSurfaces:
-        """Limit surfaces of n pushes with these values; tabulates what is not tabulated yet."""
-        exponent = values[:, _RIM]
-        if self.supports and RECORDING in covariates:
-            known = [self.support] if isinstance(self.support, PressureDistribution) else []
-            number = np.full(n, len(known) - 1)
-            for recording, support in self.supports.items():
-                number[covariates[RECORDING] == recording] = len(known)
-                known.append(support)
-            return mixed_surfaces(self.outline, np.broadcast_to(exponent, n), number, known)
-        if self.support is not None:
-            return self._same
-        first = float(exponent[0])
-        if len(exponent) == 1 or (exponent == first).all():
-            if first not in self._of_exponent:
-                self._of_exponent[first] = patch_surfaces(self.outline, exponent[:1])
-            return self._of_exponent[first]
-        return patch_surfaces(self.outline, exponent)
+    def shifted(self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push) -> Array:
+        """What changes (n, q) of q parameters shift, and its derivatives by each of them, (n, 1 + q, 3).
+
+        values (1, 28); shape: theirs with the changes, see shape_of. moved (3, q): index of the parameter, step of its
+        central difference, least change of it.
+        """
+        found = np.empty((len(changes), 1 + changes.shape[1], 3))
+        if len(changes):
+            pushes = self._pushes(shape, push.inputs, push.duration, push.covariates)
+            shifts(values, _writeable(changes), moved, pushes, *shape.given, found)
+        return found
+
+    def shape_of(self, values: Array) -> Shape:
+        """What the kernel needs for pushes with values (k, 28), tabulated if it is not yet."""
+        in_world = bool(values[:, _IN_WORLD].any())
+        stretched = bool(values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any()))
+        exponents = values[:, _RIM]
+        knots = knots_about(float(exponents.min()), float(exponents.max())) if self.support is None else ()
+        if knots not in self._tables:
+            if isinstance(self.support, PowerSurface):
+                self._tables[knots] = power_table(self.support)
+            else:
+                self._tables[knots] = surface_tables(self._known, self.outline, knots)
+        tables = self._tables[knots]
+        slopes = tables.slopes if stretched else NO_SLOPES
+        surfaces = tables.cells, slopes, tables.quantities, tables.power
+        return Shape(in_world, (self.outline.boundary, *surfaces, self.pusher_radius, self.accuracy))
+
+    def _pushes(self, shape: Shape, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Array:
+        """Pushes (n, 6) as the kernel takes them."""
+        pushes = np.empty((len(inputs), 6))
+        pushes[:, :3], pushes[:, 3] = inputs, duration
+        given = covariates or {}
+        pushes[:, 4] = given["push_heading"] if shape.in_world else 0.0
+        pushes[:, 5] = -1.0 if self.support is None else 0.0
+        if self.supports and RECORDING in given:
+            for number, recording in enumerate(self.supports, len(self._known) - len(self.supports)):
+                pushes[given[RECORDING] == recording, 5] = number
+        return pushes
 
     @cached_property
-    def _same(self) -> PushSurfaces:
-        assert self.support is not None
-        return same_surface(self.support)
+    def _known(self) -> tuple[PressureDistribution, ...]:
+        own = (self.support,) if isinstance(self.support, PressureDistribution) else ()
+        return (*own, *self.supports.values())
 
     @cached_property
-    def _of_exponent(self) -> dict[float, PushSurfaces]:
+    def _tables(self) -> dict[tuple[float, ...], SurfaceTables]:
+        """By the exponents of patches that they contain."""
         return {}
+
+
+def _writeable(values: Array) -> Array:
+    """An array as the kernel takes it."""
+    return values if values.flags.c_contiguous and values.flags.writeable else np.array(values, order="C")

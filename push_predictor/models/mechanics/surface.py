@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -27,12 +28,11 @@ from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.mechanics.load_map import DIRECTIONS, LoadMap, load_map
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 SQUARE_OF_SPREAD = 9.0 / 16.0  # mean square of a coordinate over c squared, of an even disc
-_KNOTS = np.array(EXPONENT_KNOTS)
-_NO_CELLS, _NO_SLOPES = np.zeros((0, 0, 16)), np.zeros((0, 2, 0, 16))
+_NO_CELLS, NO_SLOPES = np.zeros((0, 0, 16)), np.zeros((0, 2, 0, 16))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,10 @@ def _antiderivative(points: Array, along: Array, height: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceTables:
-    """Surfaces that pushes are on or between: maps, or a power law. quantities (T, 22): see LoadMap."""
+    """Surfaces that pushes are on or between: maps of known supports, then of patches by exponent; or a power law.
+
+    quantities (T, 23): those of LoadMap, and the exponent of a patch, not a number for a known support.
+    """
 
     quantities: Array
     maps: tuple[LoadMap, ...] = ()
@@ -102,17 +105,38 @@ class SurfaceTables:
 
     @cached_property
     def slopes(self) -> Array:
-        """Those of all maps, (T, 2, cells, 16)."""
-        return np.stack([one.slopes for one in self.maps]) if self.maps else _NO_SLOPES
+        """Those of all maps, (T, 2, cells, 16); each takes 0.1 s."""
+        return np.stack([one.slopes for one in self.maps]) if self.maps else NO_SLOPES
 
 
-@dataclass(frozen=True, eq=False)
-class PushSurfaces:
-    """The table of each of n pushes, low (n,), and the share (n,) of the next one; (1,) if all are alike."""
+def power_table(surface: PowerSurface) -> SurfaceTables:
+    """A power law in place of tables."""
+    c, spread = surface.length, SQUARE_OF_SPREAD * surface.length**2
+    reach = np.full(DIRECTIONS, 1.0 / DIRECTIONS)  # of a disc
+    quantities = np.concatenate([surface.centre, [c, spread, 0.0, spread], reach, [np.nan]])
+    return SurfaceTables(quantities[None], power=surface.power)
 
-    tables: SurfaceTables
-    low: IntArray
-    share: Array
+
+def surface_tables(
+    known: Sequence[PressureDistribution], outline: Outline, exponents: Sequence[float]
+) -> SurfaceTables:
+    """Tables of known supports, and of patches over the outline with these exponents, some of EXPONENT_KNOTS.
+
+    A table that is used for the first time takes 0.1 s.
+    """
+    vertices = outline.vertices.tobytes()
+    maps = [_known_map(one) for one in known]
+    maps += [_patch_map(_Patch(vertices, outline.semi_axes, exponent, outline)) for exponent in exponents]
+    knots = [*[np.nan] * len(known), *exponents]
+    quantities = np.column_stack([np.stack([one.quantities for one in maps]), knots])
+    return SurfaceTables(np.ascontiguousarray(quantities), tuple(maps))
+
+
+def knots_about(low: float, high: float) -> tuple[float, ...]:
+    """Those of EXPONENT_KNOTS between which exponents from low to high lie; beyond the ends, the last one."""
+    last = len(EXPONENT_KNOTS) - 1
+    first, end = bisect_right(EXPONENT_KNOTS, low) - 1, bisect_left(EXPONENT_KNOTS, high)
+    return EXPONENT_KNOTS[min(max(first, 0), last) : min(max(end, 0), last) + 1]
 
 
 @dataclass(frozen=True)
@@ -131,50 +155,5 @@ def _patch_map(key: _Patch) -> LoadMap:
 
 
 @lru_cache(maxsize=64)
-def known_map(pressure: PressureDistribution) -> LoadMap:
-    """The table of a known distribution."""
+def _known_map(pressure: PressureDistribution) -> LoadMap:
     return load_map(pressure)
-
-
-def same_surface(surface: PowerSurface | PressureDistribution) -> PushSurfaces:
-    """One surface for all pushes."""
-    if isinstance(surface, PressureDistribution):
-        return PushSurfaces(stacked((known_map(surface),)), np.zeros(1, np.int64), np.zeros(1))
-    c, spread = surface.length, SQUARE_OF_SPREAD * surface.length**2
-    reach = np.full(DIRECTIONS, 1.0 / DIRECTIONS)  # of a disc
-    quantities = np.concatenate([surface.centre, [c, spread, 0.0, spread], reach])[None]
-    return PushSurfaces(SurfaceTables(quantities, power=surface.power), np.zeros(1, np.int64), np.zeros(1))
-
-
-def patch_surfaces(outline: Outline, exponent: Array) -> PushSurfaces:
-    """Patches over an outline with rim exponents (n,), blended from those of EXPONENT_KNOTS next to them.
-
-    A knot that is used for the first time takes 0.1 s.
-    """
-    return mixed_surfaces(outline, exponent, np.full(len(exponent), -1), ())
-
-
-def mixed_surfaces(
-    outline: Outline, exponent: Array, support: IntArray, known: Sequence[PressureDistribution]
-) -> PushSurfaces:
-    """Surfaces on known distributions, by number (n,), and where that is negative on the outline's patch."""
-    on_patch = support < 0
-    exponent = np.clip(exponent, _KNOTS[0], _KNOTS[-1])
-    below = np.minimum(np.searchsorted(_KNOTS, exponent, side="right") - 1, len(_KNOTS) - 2)
-    share = np.where(on_patch, (exponent - _KNOTS[below]) / (_KNOTS[below + 1] - _KNOTS[below]), 0.0)
-    first, last = 0, -1
-    if on_patch.any():
-        first, last = int(below[on_patch].min()), int((below + (share > 0.0))[on_patch].max())
-    maps = tuple(known_map(one) for one in known) + _patch_maps(outline, EXPONENT_KNOTS[first : last + 1])
-    return PushSurfaces(stacked(maps), np.where(on_patch, len(known) + below - first, support), share)
-
-
-def _patch_maps(outline: Outline, exponents: Sequence[float]) -> tuple[LoadMap, ...]:
-    vertices = outline.vertices.tobytes()
-    return tuple(_patch_map(_Patch(vertices, outline.semi_axes, exponent, outline)) for exponent in exponents)
-
-
-@lru_cache(maxsize=16)
-def stacked(maps: tuple[LoadMap, ...]) -> SurfaceTables:
-    """The tables of some maps, together."""
-    return SurfaceTables(np.stack([one.quantities for one in maps]), maps)

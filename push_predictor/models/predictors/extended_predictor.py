@@ -23,7 +23,7 @@ import numpy as np
 
 from push_predictor.models.effects.covariance import covariance_of
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import joint
+from push_predictor.models.effects.exact import JointEffects, joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.tails import Tails
@@ -116,17 +116,30 @@ class ExtendedPredictor:
         """See Predictor."""
         mean, total, process = moments
         shift, uncertainty = self.shift(push)
-        factor = np.outer(self.scale, self.scale)
-        return Moments(mean + shift, total * factor + uncertainty, process * factor)
+        return Moments(mean + shift, total * self._factor + uncertainty, process * self._factor)
+
+    @cached_property
+    def _factor(self) -> Array:
+        """Of the base's covariances, (3, 3)."""
+        return np.outer(self.scale, self.scale)
 
     def shift(self, push: Push) -> Shift:
         """See Predictor."""
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
-        together = joint(self.mechanics, self.effects, push)
-        design = np.concatenate(together.designs, axis=2)
-        return Shift(together.shift, design @ self._covariance @ design.transpose(0, 2, 1))
+        if len(self._acting.effects) < len(self.effects):  # an effect without a mechanism
+            together = joint(self.mechanics, self.effects, push)
+            design = np.concatenate(together.designs, axis=2).transpose(0, 2, 1)
+            return Shift(together.shift, design.transpose(0, 2, 1) @ self._covariance @ design)
+        columns = self._acting.columns(push)
+        shift, slopes = self.mechanics.shifted(self._acting.names, self._acting.changes(columns), push)
+        design = self._acting.design(columns, slopes)
+        return Shift(shift, design.transpose(0, 2, 1) @ self._covariance @ design)
+
+    @cached_property
+    def _acting(self) -> JointEffects:
+        return JointEffects.of(self.effects)
 
     @cached_property
     def _covariance(self) -> Array:

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.exact import sums_of, within_limits
+from push_predictor.models.effects.exact import changes_of, within_limits
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.ladder import Group
@@ -76,7 +76,7 @@ class ParameterChanges:
     ) -> Array:
         """Displacement (n, 3) of the windows; values: of the coefficients, each a number or (n,)."""
         push, n = Push(inputs, duration, covariates or {}), len(inputs)
-        changes = dict(sums_of(self.evidence.effects, push))
+        changes = dict(changes_of(self.evidence.effects, push))
         for key, value in values.items():
             strength = np.broadcast_to(np.asarray(value, dtype=np.float64), n)
             c, quantity, k = self.columns[key]

@@ -26,6 +26,8 @@ from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surfa
 from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Tables, Values, swept
 
 CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
+QUANTITIES = cython.declare(cython.Py_ssize_t, 23)
+PARAMETERS = cython.declare(cython.int, 28)
 
 
 def displacements(
@@ -42,31 +44,114 @@ def displacements(
 ) -> None:
     """Compute displacements (n, 3: dx, dy in m, dtheta in rad) of the recorded origin in the recorded push frame.
 
-    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 7): velocity m/s, contact, angle
-    rad, duration s, heading of the push in the world rad, number of its table, share of the next one. boundary: see
+    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 6): velocity m/s, contact, angle
+    rad, duration s, heading of the push in the world rad, number of its known table, -1 for the patch. boundary: see
     Outline.boundary. cells (T, 6912, 16), slopes (T, 2, 6912, 16) or empty where no parameter needs them, quantities
-    (T, 22): see LoadMap; power: of the power law where there is no table, else 0. pusher_radius m. accuracy: relative.
-    found (n, 3) is written; what takes too many steps, or is not finite, is not a number.
+    (T, 23): see SurfaceTables; power: of the power law where there is no table, else 0. pusher_radius m. accuracy:
+    relative. found (n, 3) is written; what takes too many steps, or is not finite, is not a number.
     """
     body: Body = body_of(cython.address(boundary[0]))
-    k: cython.Py_ssize_t
-    tables: Tables
+    tables: Tables = _tables(cython.address(quantities[0, 0]), quantities.shape[0], power)
     tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
     tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
-    tables.quantities = cython.address(quantities[0, 0])
-    tables.power = power
-    per_push: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
+    own: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
+    n: cython.Py_ssize_t
     with cython.nogil:
-        for k in range(pushes.shape[0]):
+        for n in range(pushes.shape[0]):
             _displacement(
-                cython.cast(cython.pointer(Values), cython.address(values[k * per_push, 0])),
-                cython.address(pushes[k, 0]),
+                cython.cast(cython.pointer(Values), cython.address(values[n * own, 0])),
+                cython.address(pushes[n, 0]),
                 cython.address(body),
                 cython.address(tables),
                 pusher_radius,
                 accuracy,
-                cython.address(found[k, 0]),
+                cython.address(found[n, 0]),
             )
+
+
+def shifts(
+    values: cython.double[:, ::1],
+    changes: cython.double[:, ::1],
+    moved: cython.double[:, ::1],
+    pushes: cython.double[:, ::1],
+    boundary: cython.double[::1],
+    cells: cython.double[:, :, ::1],
+    slopes: cython.double[:, :, :, ::1],
+    quantities: cython.double[:, ::1],
+    power: cython.double,
+    pusher_radius: cython.double,
+    accuracy: cython.double,
+    found: cython.double[:, :, ::1],
+) -> None:
+    """Compute what changes (n, q) of q parameters shift, and its derivatives by each of them, by central differences.
+
+    values (1, 28). moved (3, q): number of the parameter, step of its difference, least change of it. found
+    (n, 1 + q, 3) is written: the shift, then the derivatives. The rest as in `displacements`.
+    """
+    body: Body = body_of(cython.address(boundary[0]))
+    tables: Tables = _tables(cython.address(quantities[0, 0]), quantities.shape[0], power)
+    tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
+    tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+    own: cython.double[28]
+    tried: cython.double[3]
+    column: cython.Py_ssize_t
+    n: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    end: cython.int
+    with cython.nogil:
+        for n in range(pushes.shape[0]):
+            for i in range(PARAMETERS):
+                own[i] = values[0, i]
+            for end in range(2):
+                _displacement(
+                    cython.cast(cython.pointer(Values), cython.address(own[0])),
+                    cython.address(pushes[n, 0]),
+                    cython.address(body),
+                    cython.address(tables),
+                    pusher_radius,
+                    accuracy,
+                    cython.address(tried[0]),
+                )
+                for i in range(3):
+                    found[n, 0, i] = tried[i] - found[n, 0, i] if end else tried[i]
+                if end == 0:
+                    for k in range(changes.shape[1]):
+                        own[cython.cast(cython.Py_ssize_t, moved[0, k])] += changes[n, k]
+            for k in range(changes.shape[1]):
+                column = cython.cast(cython.Py_ssize_t, moved[0, k])
+                changed: cython.double = own[column]
+                least: cython.double = values[0, column] + moved[2, k]
+                least = changed if changed < least else least
+                low: cython.double = changed - moved[1, k]
+                low = least if low < least else low
+                high: cython.double = changed + moved[1, k]
+                for end in range(2):
+                    own[column] = high if end else low
+                    _displacement(
+                        cython.cast(cython.pointer(Values), cython.address(own[0])),
+                        cython.address(pushes[n, 0]),
+                        cython.address(body),
+                        cython.address(tables),
+                        pusher_radius,
+                        accuracy,
+                        cython.address(tried[0]),
+                    )
+                    for i in range(3):
+                        found[n, 1 + k, i] = (tried[i] - found[n, 1 + k, i]) / (high - low) if end else tried[i]
+                own[column] = changed
+
+
+@cython.cfunc
+@cython.exceptval(check=False)
+def _tables(quantities: cython.p_double, count: cython.Py_ssize_t, power: cython.double) -> Tables:
+    tables: Tables
+    tables.quantities, tables.count, tables.power, tables.known = quantities, count, power, 0
+    exponent: cython.p_double = quantities + QUANTITIES - 1
+    while tables.known < count and exponent[0] != exponent[0]:  # a known support has no exponent
+        tables.known += 1
+        exponent += QUANTITIES
+    return tables
 
 
 @cython.cfunc
@@ -90,8 +175,7 @@ def _displacement(
     recorded_y: cython.double = s * contact.normal_x + c * contact.normal_y
     push: Push
     push.values, push.body = values, body
-    low: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, given[5])
-    surface: Surface = _surface(tables, low, given[6], cython.address(push))
+    surface: Surface = _surface(tables, given[5], cython.address(push))
     push.surface = cython.address(surface)
     push.radius = pusher_radius + values.radius_error
     along: cython.double = values.tip_offset_along + velocity * values.clock_delay
@@ -127,33 +211,42 @@ def _displacement(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _surface(
-    tables: cython.pointer(Tables), low: cython.Py_ssize_t, share: cython.double, push: cython.pointer(Push)
-) -> Surface:
+def _surface(tables: cython.pointer(Tables), number: cython.double, push: cython.pointer(Push)) -> Surface:
     """The surface of a push; what of it acts alike all along the push is written into the push."""
     values: cython.pointer(Values) = push.values
-    one: cython.p_double = tables.quantities + 22 * low
-    other: cython.p_double = one + 22 if share > 0.0 else one
-    spread: cython.double = exp(values.pressure_spread)  # about the centre: the surface keeps its shape
+    low: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, number)
     surface: Surface
-    surface.power, surface.share = tables.power, share
-    surface.length = (one[2] + share * (other[2] - one[2])) * spread
+    surface.power, surface.share = tables.power, 0.0
+    if number < 0.0:  # between the patches whose exponents are next to that of the push
+        exponent: cython.double = values.rim_exponent
+        low = tables.known
+        while low < tables.count - 2 and exponent >= tables.quantities[QUANTITIES * (low + 2) - 1]:
+            low += 1
+        if tables.count > low + 1:
+            below: cython.double = tables.quantities[QUANTITIES * (low + 1) - 1]
+            share: cython.double = (exponent - below) / (tables.quantities[QUANTITIES * (low + 2) - 1] - below)
+            surface.share = 0.0 if share < 0.0 else (1.0 if share > 1.0 else share)
+    blend: cython.double = surface.share
+    one: cython.p_double = tables.quantities + QUANTITIES * low
+    other: cython.p_double = one + QUANTITIES if blend > 0.0 else one
+    spread: cython.double = exp(values.pressure_spread)  # about the centre: the surface keeps its shape
+    surface.length = (one[2] + blend * (other[2] - one[2])) * spread
     surface.reach_low, surface.reach_high = one + 6, other + 6
     surface.low = surface.high = surface.slopes_low = surface.slopes_high = cython.NULL
     if tables.cells != cython.NULL:
         surface.low = surface.high = tables.cells + CELLS * low
-        if share > 0.0:
+        if blend > 0.0:
             surface.high = surface.low + CELLS
     if tables.slopes != cython.NULL:
         surface.slopes_low = surface.slopes_high = tables.slopes + 2 * CELLS * low
-        if share > 0.0:
+        if blend > 0.0:
             surface.slopes_high = surface.slopes_low + 2 * CELLS
-    push.centre_x = one[0] + share * (other[0] - one[0]) + values.centre_x
-    push.centre_y = one[1] + share * (other[1] - one[1]) + values.centre_y
+    push.centre_x = one[0] + blend * (other[0] - one[0]) + values.centre_x
+    push.centre_y = one[1] + blend * (other[1] - one[1]) + values.centre_y
     square: cython.double = spread * spread
-    push.xx = (one[3] + share * (other[3] - one[3])) * square
-    push.xy = (one[4] + share * (other[4] - one[4])) * square
-    push.yy = (one[5] + share * (other[5] - one[5])) * square
+    push.xx = (one[3] + blend * (other[3] - one[3])) * square
+    push.xy = (one[4] + blend * (other[4] - one[4])) * square
+    push.yy = (one[5] + blend * (other[5] - one[5])) * square
     push.acting.root.needed = False
     if values.body_anisotropy != 0.0 or values.body_anisotropy_diagonal != 0.0:
         push.acting.root = root_of(values.body_anisotropy, values.body_anisotropy_diagonal, cython.address(surface))

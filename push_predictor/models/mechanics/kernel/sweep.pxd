@@ -57,5 +57,6 @@ cdef struct Tables:
     double* slopes
     double* quantities
     double power
+    Py_ssize_t known, count  # the first ones are of known supports, the others of the patch's exponents in order
 
 cdef Pose swept(Push* push, double accuracy) noexcept nogil
