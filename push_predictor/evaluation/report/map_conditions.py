@@ -62,7 +62,7 @@ def fixed_covariates_text(model: PushModel, fixed: Mapping[str, float]) -> str:
         sentences.append("At another heading the map differs.")
     for name, value in fixed.items():
         known = model.covariate_ranges.get(name)
-        if known is not None and not known.contains_one(value):
+        if known is not None and not known.contains(np.array([value]))[0]:
             sentences.append(f"Nothing is drawn: the model was extended on {name} from {known}.")
     return " ".join(sentences)
 

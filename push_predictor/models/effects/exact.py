@@ -49,42 +49,12 @@ def joint_shift(mechanics: FittedMechanics, effects: Sequence[Effect], push: Pus
     return joint(mechanics, effects, push, derivatives=False).shift
 
 
-def joint_shifts(
-    mechanics: FittedMechanics, alternatives: Sequence[Sequence[Effect]], push: Push, unchanged: Array
-) -> Array:
-    """Shifts (k, n, 3) of the mean by the mechanisms of each of k sets of effects, computed as one set of pushes.
-
-    unchanged (n, 3): what `undisturbed` returns.
-    """
-    return mechanics.displacements([changes_of(effects, push) for effects in alternatives], push) - unchanged
-
-
-def undisturbed(mechanics: FittedMechanics, push: Push) -> Array:
-    """Displacements (n, 3) by the mechanics without effects."""
-    return np.asarray(mechanics.displacements([{}], push)[0])
-
-
-def joint(
-    mechanics: FittedMechanics,
-    effects: Sequence[Effect],
-    push: Push,
-    *,
-    derivatives: bool = True,
-    unchanged: Array | None = None,
-) -> JointShift:
-    """The shift by all effects together, and its derivatives by their coefficients.
-
-    unchanged (n, 3): what `undisturbed` returns, where it is known from before.
-    """
+def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
+    """The shift by all effects together, and its derivatives by their coefficients."""
     n, changes = len(push.inputs), changes_of(effects, push)
     ends = {name: ends_of(name, mechanics.value(name), c) for name, c in changes.items()} if derivatives else {}
     tried = [{**changes, name: end} for name, both in ends.items() for end in both]
-    if not changes:
-        moved = np.zeros((2, n, 3))
-    elif unchanged is None:
-        moved = mechanics.displacements([{}, changes, *tried], push)
-    else:
-        moved = np.concatenate([unchanged[None], mechanics.displacements([changes, *tried], push)])
+    moved = mechanics.displacements([{}, changes, *tried], push) if changes else np.zeros((2, n, 3))
     of_parameter = slopes_between(ends, moved[2:])
     together = JointShift(moved[1] - moved[0], [], of_parameter)
     shift, designs = together.shift, together.designs

@@ -22,7 +22,6 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect, responses_of
-from push_predictor.models.effects.exact import undisturbed
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
@@ -66,11 +65,6 @@ class Evidence:
         return blocks_of(self.table, self.chosen)
 
     @cached_property
-    def undisturbed(self) -> Array:
-        """Displacements (n, 3) by the mechanics without effects, from which shifts of effects are counted."""
-        return undisturbed(self.mechanics, self.push)
-
-    @cached_property
     def responses(self) -> dict[str | None, Array]:
         """Those that are known, by mechanism; see whitened_response."""
         return {}
@@ -90,8 +84,9 @@ class Evidence:
 def evidence_of(model: PushModel, table: PushTable) -> Evidence:
     """Residuals of a table under a model that was not trained on it.
 
-    A learnt model's outputs are standardised one by one. A strong correlation of the outputs would give the largest weight to small parts of the
-    residual: in one recording, the second order of an effect was found before the effect itself.
+    A learnt model's outputs are standardised one by one. A strong correlation of the outputs would give the largest
+    weight to small parts of the residual: in one recording, the second order of an effect was found before the effect
+    itself.
     """
     predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
