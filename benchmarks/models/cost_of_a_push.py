@@ -103,20 +103,24 @@ def _cases() -> dict[str, FittedMechanics]:
 
 
 def asked(n: int) -> Asked:
-    """n random pushes."""
+    """Random pushes."""
     rng = np.random.default_rng(0)
     inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.2, 1.2, n)])
     return Asked(inputs, np.full(n, 0.2), rng.uniform(-3.0, 3.0, n))
 
 
 def measured(cases: dict[str, FittedMechanics], pushes: Asked, sizes: list[int]) -> dict[str, list[float]]:
-    """Seconds a push, by case, for each batch size: the least of some rounds, in each of which all take their turn."""
+    """Seconds a push, by case, for each batch size: the least of some rounds, in each of which all take their turn.
+
+    Batches of more than PUSHES are computed once.
+    """
     costs: dict[str, list[float]] = {name: [] for name in cases}
     for mechanics in cases.values():  # tabulates
         pushes.displaced(mechanics, slice(0, 1))
     for size in sizes:
         calls = min(CALLS, max(1, PUSHES // size), len(pushes.duration) // size)
-        rounds = [[_seconds(mechanics, pushes, size, calls) for mechanics in cases.values()] for _ in range(ROUNDS)]
+        repeats = ROUNDS if size <= PUSHES else 1
+        rounds = [[_seconds(mechanics, pushes, size, calls) for mechanics in cases.values()] for _ in range(repeats)]
         for name, seconds in zip(cases, np.min(rounds, axis=0), strict=True):
             costs[name].append(float(seconds) / (size * calls))
     return costs
