@@ -137,7 +137,7 @@ def report(base: PushModel, data: LoadedData) -> None:
     for before, after, name in zip([None, *scores], scores, names, strict=False):
         print(_row(before, after, name), flush=True)
     print()
-    p_values = {(found_effect.mechanism, found_effect.covariate): found_effect.p_value for found_effect in found.effects}
+    p_values = {(reported.mechanism, reported.covariate): reported.p_value for reported in found.effects}
     for effect in found.terms:
         p_value = p_values.get((effect.mechanism, effect.covariate))
         text = "not reported" if p_value is None else f"p {p_value:.1g}"

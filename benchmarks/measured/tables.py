@@ -28,12 +28,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from push_predictor.models.mechanics.fit import FitRows, fit_jointly
-from push_predictor.models.mechanics.fitted import analytical_mechanics
 
 from benchmarks.measured.scores import HEAD, Fold, figures, pooled, total, trained
 from benchmarks.measured.square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
+from push_predictor.models.mechanics.fit import FitRows, fit_jointly
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import distinct_pushes, load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
