@@ -29,7 +29,7 @@ import numpy as np
 
 from examples.hidden import until
 from push_predictor.geometry.frames import rotate
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.surface import uniform_ellipsoid
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.importers.cleaning import nanoseconds
 from push_predictor.recordings.importers.mlab.force import force_samples
@@ -159,7 +159,7 @@ def _known(before: Rig, after: Rig) -> str:
 def _arm(rig: Rig) -> float:
     """Mean distance (m) of the load from the centre; a flat face is taken as evenly loaded."""
     if rig.support_points is None:
-        return AnalyticalPush(rig.outline, rig.pusher_radius).support.length
+        return uniform_ellipsoid(rig.outline).length
     return float(np.hypot(*rig.support_points[:, :2].T) @ rig.support_points[:, 2])
 
 

@@ -35,10 +35,11 @@ import numpy as np
 
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, push_scores
-from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.models.train_mechanics import predictor_about
@@ -136,8 +137,11 @@ def report(base: PushModel, data: LoadedData) -> None:
     for before, after, name in zip([None, *scores], scores, names, strict=False):
         print(_row(before, after, name), flush=True)
     print()
-    for found_effect, effect in zip(found.effects, found.terms, strict=True):
-        print("\n  ".join([f"{named(effect)}, p {found_effect.p_value:.1g}", *parameters(effect)]))
+    p_values = {(reported.mechanism, reported.covariate): reported.p_value for reported in found.effects}
+    for effect in found.terms:
+        p_value = p_values.get((effect.mechanism, effect.covariate))
+        text = "not reported" if p_value is None else f"p {p_value:.1g}"
+        print("\n  ".join([f"{named(effect)}, {text}", *parameters(effect)]))
 
 
 def models_of(found: Trace) -> list[PushModel]:

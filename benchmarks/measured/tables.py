@@ -32,7 +32,8 @@ import numpy as np
 from benchmarks.measured.scores import HEAD, Fold, figures, pooled, total, trained
 from benchmarks.measured.square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
-from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
+from push_predictor.models.mechanics.fit import FitRows, fit_jointly
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import distinct_pushes, load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
@@ -139,8 +140,11 @@ def _nmse_in_domain(folds: Sequence[Fold]) -> float:
 def _physics_in_words(runs: Sequence[Path]) -> str:
     """The fitted parameters, and the part of the textbook model's error in dx due to acceleration within a window."""
     rig, table = load_rig_for(runs), load_data(runs)
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
-    fitted = fit_analytical(physics, table.inputs, table.duration, table.outcomes)
+    physics = analytical_mechanics(rig.outline, rig.pusher_radius)
+    push = np.unique(table.push_id, return_inverse=True)[1]
+    rows = FitRows(table.inputs, table.duration, table.outcomes, push)
+    fitted = fit_jointly(physics.mechanics, rows, ("contact_friction", "pressure_spread")).values
+    even = physics.ellipsoid.length
     recordings = [read_recording(run) for run in runs]
     speeds = [mean_speed(r, w.start, w.end) for r in recordings for w in find_windows(r, rig)]
     mean_speeds = np.column_stack([speeds, table.inputs[:, 1:]])
@@ -148,9 +152,9 @@ def _physics_in_words(runs: Sequence[Path]) -> str:
     dx = [nmse(mean, table.outcomes, table.outcomes.mean(axis=0))[0] for mean in predicted]
     turn = np.sum(predicted[0][:, 2] * np.sign(table.outcomes[:, 2])) / np.sum(np.abs(table.outcomes[:, 2]))
     return (
-        f"fitted to all four: friction {fitted.contact_friction:.2f}, c {1e3 * fitted.support.length:.1f} mm (even "
-        f"pressure {1e3 * physics.support.length:.1f} mm). Textbook: turns {turn:.2f} times the observed; NMSE of dx "
-        f"{dx[0]:.3f}, with the mean speed of each window {dx[1]:.3f}"
+        f"fitted to all four: friction {fitted['contact_friction']:.2f}, c "
+        f"{1e3 * even * np.exp(fitted['pressure_spread']):.1f} mm (even pressure {1e3 * even:.1f} mm). Textbook: turns "
+        f"{turn:.2f} times the observed; NMSE of dx {dx[0]:.3f}, with the mean speed of each window {dx[1]:.3f}"
     )
 
 
@@ -165,7 +169,7 @@ def mit_table(data: Path, work: Path, quick: bool) -> None:
         print(f"\nvelocity {1e3 * velocity:.0f} mm/s, contact {contact:.3f}, angle {np.degrees(angle):.1f} degrees")
     print("\n| | dx, mm | dy, mm | dtheta, degrees |\n|---|---|---|---|")
     print(_outcome_rows("observed", table.outcomes))
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
+    physics = analytical_mechanics(rig.outline, rig.pusher_radius)
     print(_outcome_rows("analytical, textbook", physics.displacement(table.inputs, table.duration)))
 
 

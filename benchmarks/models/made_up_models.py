@@ -21,19 +21,27 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, mechanism_named
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
 DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+EIGHT = {
+    "contact_friction": 0.25,
+    "friction_by_angle": 0.1,
+    "centre_x": 0.001,
+    "centre_y": -0.001,
+    "pushing_height": 0.003,
+    "tracker_rotation": 0.02,
+    "body_anisotropy": 0.1,
+    "radius_error": 0.0002,
+}
 
 
 def made_up_table(count: int, seed: int) -> PushTable:
@@ -41,7 +49,8 @@ def made_up_table(count: int, seed: int) -> PushTable:
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
     duration = np.full(count, 0.2)
-    outcomes = square_physics().displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
+    textbook = analytical_mechanics(square_rig().outline, square_rig().pusher_radius)
+    outcomes = textbook.displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
     covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
     covariates |= {name: rng.uniform(-0.1, 0.1, count) for name in ("slider_x", "slider_y")}
     return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
@@ -52,36 +61,33 @@ def square_rig() -> Rig:
     return Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
 
 
-def square_physics() -> AnalyticalPush:
-    """The textbook model of that rig."""
-    return AnalyticalPush(square_rig().outline, square_rig().pusher_radius)
-
-
-def base_model() -> PushModel:
-    """A GP of 300 windows."""
-    return train_model(made_up_table(300, 0), square_rig(), "gp", name="base")
-
-
 def analytical_model(table: PushTable) -> PushModel:
     """The analytical model of these windows."""
     return train_model(table, square_rig(), "analytical", name="analytical")
 
 
-def informed_model(base: PushModel) -> PushModel:
-    """A GP of the same windows about mechanics with the square's pressure and a shifted centre."""
-    mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
-    fitted = FittedMechanics(mechanics, {"contact_friction": 0.28, "centre_x": 0.001})
-    options = TrainingOptions(about=MechanicsMean(fitted, 0.004))
-    return train_model(base.training, square_rig(), "gp", name="informed", options=options)
+def eight_fitted() -> FittedMechanics:
+    """The square on a patch, with eight parameters that differ from the textbook's."""
+    return FittedMechanics(PushMechanics(square_rig().outline, square_rig().pusher_radius), dict(EIGHT))
 
 
-def spread_effect(mechanism: str, basis: DriverBasis, size: float = 1.0) -> Effect:
-    """An exact effect of alternating signs, known to 10 %; size: in usual spreads of the parameters."""
-    width = columns_of(basis)
-    spreads = np.repeat([BY_NAME[name].spread for name in mechanism_named(mechanism).quantities], width)
-    coefficients = size * spreads * np.where(np.arange(len(spreads)) % 2, -1.0, 1.0)
-    covariance = np.diag(0.1 * np.abs(coefficients)) ** 2
-    return Effect(mechanism, "any", basis, coefficients, covariance, np.array([0.02, 0.02, 0.5]), exact=True)
+def fitted_model(table: PushTable) -> PushModel:
+    """These mechanics with the covariance of the table's noise."""
+    base = analytical_model(table)
+    assert isinstance(base.predictor, MechanicsPredictor)
+    return replace(base, name="fitted", predictor=MechanicsPredictor(eight_fitted(), base.predictor.covariance))
+
+
+def informed_model(table: PushTable, kind: str) -> PushModel:
+    """A learnt model of these windows about the same mechanics."""
+    options = TrainingOptions(about=MechanicsMean(eight_fitted(), 0.004))
+    return train_model(table, square_rig(), kind, name="informed", options=options)
+
+
+def prior_model() -> PushModel:
+    """The model before the first push."""
+    table = made_up_table(2, 0).take(np.arange(0))
+    return train_model(table, square_rig(), "prior", name="prior")
 
 
 def drifting_effect(mechanism: str | None, *size: float) -> Effect:
@@ -92,4 +98,4 @@ def drifting_effect(mechanism: str | None, *size: float) -> Effect:
 
 def extended_model(base: PushModel, *effects: Effect) -> PushModel:
     """The base with these effects."""
-    return replace(base, predictor=ExtendedPredictor(base.predictor.base, square_physics(), effects, np.ones(3)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor.base, effects, np.ones(3)))

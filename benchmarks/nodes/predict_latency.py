@@ -17,9 +17,13 @@
     python -m benchmarks.nodes.predict_latency [--pin] [--model FILE] [--calls N] [--domain D]
 
 Without --model these kinds of push are compared, each with its own server: of VHGPs of 100 and of 1000 simulated
-windows (trained first, some 20 s), of the latter outside its domain, of an analytical model, and of that model with an
-effect: between its training pushes, later than these, and outside the table of the effect. All servers run at the same
-time and are called in turns, in short blocks, so that they share the machine's load, which is printed.
+windows (trained first, some 20 s), of the latter outside its domain, of an analytical model, of that model with an
+effect (between its training pushes, later than these, and far outside their range) and with two, of fitted mechanics,
+of a VHGP about these, and of the prior before the first push. All servers run at the same time and are called in turns,
+in short blocks, so that they share the machine's load, which is printed.
+
+The last table has the callback's median in the server, its ratio to that of the tabulated VHGP, and times of one
+prediction in this process: processor time with the model as tabulated, and of PushModel.predict of the library.
 
 Two empty services: `empty` is a plain rclpy node with a std_srvs/Trigger. `empty, direct` is answered by a separate
 thread, as predict_push is: the rest of predict_push is the prediction and its larger messages.
@@ -46,8 +50,15 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from benchmarks.models.extended_latency import EFFECTS
-from benchmarks.models.made_up_models import analytical_model, extended_model, made_up_table
+from benchmarks.models.made_up_models import (
+    analytical_model,
+    drifting_effect,
+    extended_model,
+    fitted_model,
+    informed_model,
+    made_up_table,
+    prior_model,
+)
 from benchmarks.nodes.server_under_test import (
     DEPTH,
     Caller,
@@ -62,7 +73,7 @@ from benchmarks.nodes.server_under_test import (
 )
 from msg_adapters.predictions import push_from_request
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import PushRequest
+from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.table_cache import as_served, keep_tables
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
@@ -74,8 +85,8 @@ BLOCK = 20
 WARM_UP = 200
 SIZES = (100, 1000)  # windows
 REQUESTS = 200  # different ones of each kind
-EFFECT = "friction, linear"  # of EFFECTS
-LATER, FAR = 1900.0, 5000.0  # s; the training pushes take 1000, and the table of the effect contains up to twice that
+TABULATED = f"VHGP, n = {SIZES[-1]}"  # the row that the others are compared with
+LATER, FAR = 1900.0, 5000.0  # s; the training pushes take 1000
 SETTLING = 15.0  # s, until the servers have computed all that makes predictions fast
 ROUNDS = 5
 
@@ -153,16 +164,25 @@ def _folder() -> TemporaryDirectory[str]:
 
 def _cases(folder: Path) -> list[Case]:
     small, large = (trained_vhgp(size) for size in SIZES)
-    analytical = analytical_model(made_up_table(300, 0))
-    extended = extended_model(analytical, *EFFECTS[EFFECT])
+    table = made_up_table(300, 0)
+    analytical = analytical_model(table)
+    friction, centre = drifting_effect("contact_friction", 0.1), drifting_effect("centre_of_friction", 0.002, -0.002)
+    extended, twice = extended_model(analytical, friction), extended_model(analytical, friction, centre)
+    others = {
+        "fitted mechanics": fitted_model(table),
+        "informed VHGP": informed_model(table, "vhgp"),
+    }
     kinds = {
         f"VHGP, n = {SIZES[0]}": (small, single_requests(small, REQUESTS)),
-        f"VHGP, n = {SIZES[1]}": (large, single_requests(large, REQUESTS)),
-        f"VHGP, n = {SIZES[1]}, outside": (large, outside_requests(large, REQUESTS)),
+        TABULATED: (large, single_requests(large, REQUESTS)),
+        f"{TABULATED}, outside": (large, outside_requests(large, REQUESTS)),
         "analytical": (analytical, single_requests(analytical, REQUESTS)),
         "with an effect": (extended, single_requests(extended, REQUESTS)),
         "effect, later": (extended, _at(LATER, single_requests(extended, REQUESTS))),
-        "effect, outside its table": (extended, _at(FAR, single_requests(extended, REQUESTS))),
+        "effect, outside its range": (extended, _at(FAR, single_requests(extended, REQUESTS))),
+        "two effects": (twice, single_requests(twice, REQUESTS)),
+        **{name: (model, single_requests(model, REQUESTS)) for name, model in others.items()},
+        "prior": (prior_model(), single_requests(analytical, REQUESTS)),
     }
     found = []
     for k, (name, (model, requests)) in enumerate(kinds.items()):
@@ -197,12 +217,7 @@ def _measure(client: Caller, cases: list[Case], calls: int) -> None:
             taken[name] += [client.timed(service, request)[0] for request in block]
     print(f"{calls} calls of each service, one at a time; load average {before} before, {load()} after")
     _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in taken.items()})
-    for k, case in enumerate(cases):
-        status = client.reported(f"/server_{k}/")
-        times = f"p50 {status['callback_p50_us']} us, p99 {status['callback_p99_us']} us"
-        print(f"callback in the server, {case.name:28s} {times}")
-    for case in cases:
-        _in_this_process(case)
+    _report_callbacks(cases, [client.reported(f"/server_{k}/") for k in range(len(cases))])
 
 
 def _report(times: dict[str, np.ndarray]) -> None:
@@ -213,25 +228,34 @@ def _report(times: dict[str, np.ndarray]) -> None:
         print(f"{name:28s}" + "".join(f"{value:9.0f}" for value in row) + f"{ratios[0]:16.2f}{ratios[1]:13.2f}")
 
 
-def _in_this_process(case: Case) -> None:
-    """Print processor time of predictions without ROS: the time of a busy machine goes to others."""
-    tabulated = as_served(case.model)
-    pushes = [push_from_request(request) for request in case.requests]
-    table, exact = (_processor_time(model, pushes) for model in (tabulated, case.model))
-    print(f"{case.name}: {tabulated.how}")
-    print(f"  in this process, processor time: as served {table:.0f} us, exact model {exact:.0f} us")
+def _report_callbacks(cases: list[Case], statuses: list[dict[str, str]]) -> None:
+    """Print a table; processor time, because the time of a busy machine goes to others."""
+    medians = {case.name: float(status["callback_p50_us"]) for case, status in zip(cases, statuses, strict=True)}
+    print("\n| kind | callback, us | 99 % | callback / tabulated | processor time, us | library, us | predicts |")
+    print("|---" * 7 + "|")
+    for case, status in zip(cases, statuses, strict=True):
+        tabulated = as_served(case.model)
+        ratio = f"{medians[case.name] / medians[TABULATED]:.2f}" if TABULATED in medians else ""
+        table, library = _processor_times(tabulated, case)
+        times = f"{medians[case.name]:.0f} | {status['callback_p99_us']} | {ratio} | {table:.0f} | {library:.0f}"
+        print(f"| {case.name} | {times} | {tabulated.how} |")
 
 
-def _processor_time(model: PushModel | TabulatedModel, pushes: list[PushRequest]) -> float:
-    """Of one prediction, us: the least of some rounds over all pushes."""
-    arrays = [push.arrays for push in pushes]
+def _processor_times(tabulated: TabulatedModel, case: Case) -> tuple[float, float]:
+    """Of one prediction with and without tables, us: the least of some rounds over all pushes, in turns."""
+    arrays = [push_from_request(request).arrays for request in case.requests]
+    pushes = [Pushes(*inputs.T, duration, covariates) for inputs, duration, covariates in arrays]
     rounds = []
     for _ in range(ROUNDS):
         start = process_time()
         for inputs, duration, covariates in arrays:
-            model.predict_rows(inputs, duration, covariates)
-        rounds.append((process_time() - start) / len(arrays))
-    return min(rounds) * 1e6
+            tabulated.predict_rows(inputs, duration, covariates)
+        middle = process_time()
+        for push in pushes:
+            case.model.predict(push)
+        rounds.append([middle - start, process_time() - middle])
+    table, library = (float(value) * 1e6 / len(arrays) for value in np.min(rounds, axis=0))
+    return table, library
 
 
 def _arguments() -> argparse.Namespace:

@@ -36,7 +36,7 @@ from rclpy.qos import QoSProfile
 
 from push_predictor.blas_threads import VARIABLES
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated.table_accuracy import outside_pushes
@@ -187,7 +187,7 @@ def trained_vhgp(count: int) -> PushModel:
     rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
     inputs = rng.uniform([0.01, 0.0, -1.2], [0.05, 1.0, 1.2], (count, 3))
     duration = np.full(count, 0.2)
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
     outcomes += rng.normal(size=(count, 3)) @ NOISE * (0.3 + np.abs(inputs[:, 2:]))
     table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
     return train_model(table, rig, "vhgp", name=f"vhgp_{count}")

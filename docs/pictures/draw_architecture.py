@@ -53,7 +53,7 @@ ROWS = (
         ("planning", "rollouts, choice of pushes", LIBRARY, 1.8),
         ("reporting", "pages and pictures", LIBRARY, 1.4),
     ),
-    (("models", "VHGP, GP, analytical; effects; tables; model files", LIBRARY, 1),),
+    (("models", "mechanics, VHGP, GP; effects; tables; model files", LIBRARY, 1),),
     (("recordings", "bags, push tables, rigs, windows, importers", LIBRARY, 1),),
     (("geometry", "outlines, frames, contact", LIBRARY, 1),),
 )

@@ -33,7 +33,7 @@ from matplotlib.patches import Arc, Circle, Polygon
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 
 PICTURE = Path(__file__).with_name("push.png")
 OUTLINE = shape_outline("rect1")
@@ -91,7 +91,7 @@ def draw_inputs(axes: Axes) -> None:
 def draw_outcome(axes: Axes) -> None:
     """The outcome: slider and pusher before and after, push frame, dx, dy, dtheta."""
     point, normal, direction = contact_point()
-    dx, dy, dtheta = AnalyticalPush(OUTLINE, RADIUS, FRICTION).displacement(
+    dx, dy, dtheta = analytical_mechanics(OUTLINE, RADIUS, FRICTION).displacement(
         np.array([[VELOCITY, CONTACT, ANGLE]]), np.array([DURATION])
     )[0]
     left = np.array([-direction[1], direction[0]])

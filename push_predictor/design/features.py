@@ -29,8 +29,6 @@ import scipy
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.exact import joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.parameter_draws import displacements
-from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
@@ -42,7 +40,6 @@ from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.types import Array
 
-DIFFERENCE = 0.5  # prior standard deviations: a shorter step of a derivative would show errors of the integration
 NEGLIGIBLE = 0.01  # of the noise variance: what is known that well is not resolved further
 
 
@@ -103,17 +100,11 @@ def _of_functions(base: GaussianProcessPredictor, push: Push, noise_sd: Array) -
 
 def _of_parameters(fitted: FittedMechanics, push: Push) -> Array:
     """Features (n, 3, p) in m, m, rad of the mechanics' uncertain parameters: derivatives times a root."""
-    names = tuple(fitted.values)
+    n = len(push.inputs)
     if not np.any(fitted.covariance):
-        return np.zeros((len(push.inputs), 3, 0))
-    values = np.array(list(fitted.values.values()))
-    step = DIFFERENCE * np.array([BY_NAME[name].spread for name in names])
-    low = np.maximum(values - step, [BY_NAME[name].low for name in names])
-    high = np.minimum(values + step, [BY_NAME[name].high for name in names])
-    ends = np.concatenate([values + np.diag(high - values), values + np.diag(low - values)])
-    moved = displacements(fitted.mechanics, names, ends, push.inputs, push.duration, push.covariates)
-    jacobian = (moved[:, : len(names)] - moved[:, len(names) :]).transpose(0, 2, 1) / (high - low)
-    return np.asarray(jacobian @ _symmetric_root(fitted.covariance))
+        return np.zeros((n, 3, 0))
+    slopes = fitted.slopes(dict.fromkeys(fitted.values, np.zeros(n)), push)
+    return np.asarray(np.stack(list(slopes.values()), axis=2) @ _symmetric_root(fitted.covariance))
 
 
 def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:

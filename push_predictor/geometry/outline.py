@@ -174,12 +174,11 @@ class Outline:
         points = np.array(points, dtype=np.float64, ndmin=2, order="C")
         found = np.empty((len(points), 8))
         boundary.project(points, self.boundary, found)
-        edge, share = found[:, 5].astype(np.int64), found[:, 6]
+        edge, share, corner = found[:, 5].astype(np.int64), found[:, 6], found[:, 7] > 0.0
         if self.semi_axes is not None:
-            return Projection(found[:, :2], found[:, 2:4], found[:, 4], found[:, 7] > 0.0, lambda: self._arc_at(share))
-        return Projection(
-            found[:, :2], found[:, 2:4], found[:, 4], found[:, 7] > 0.0, lambda: self.contact_on_edge(edge, share)
-        )
+            return Projection(found[:, :2], found[:, 2:4], found[:, 4], corner, lambda: self._arc_at(share))
+        edge, share = (edge, share) if not corner.any() else self._facing(edge, share, found[:, 2:4], corner)
+        return Projection(found[:, :2], found[:, 2:4], found[:, 4], corner, lambda: self.contact_on_edge(edge, share))
 
     @cached_property
     def boundary(self) -> Array:
@@ -203,6 +202,16 @@ class Outline:
     @cached_property
     def _ends(self) -> Array:
         return np.roll(self.vertices, -1, axis=0)
+
+    def _facing(self, edge: IntArray, share: Array, normal: Array, corner: BoolArray) -> tuple[IntArray, Array]:
+        """At a corner, the edge that faces the point more, and the corner's place on it.
+
+        Both edges are equally near, and rounding must not decide from which normal the angle of a push counts.
+        """
+        other = np.where(share < 0.5, edge - 1, edge + 1) % len(self.vertices)
+        faces = np.einsum("enk,nk->en", self._edge_normals[np.stack([edge, other])], normal)
+        swapped = corner & (faces[1] > faces[0])
+        return np.where(swapped, other, edge), np.where(swapped, 1.0 - share, share)
 
     @cached_property
     def _edge_normals(self) -> Array:

@@ -50,8 +50,6 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
-
 TRAINING = BAGS / "square_abs_test"
 FEW = BAGS / "hexagon_delrin"  # 53 windows
 

@@ -26,24 +26,24 @@ from drifting_models import extended, grain, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
-from push_predictor.design.features import DIFFERENCE, NEGLIGIBLE, features_of
+from push_predictor.design.features import NEGLIGIBLE, features_of
 from push_predictor.errors import RequestError
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.fitted import DIFFERENCE, FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsMean,
     MechanicsPredictor,
 )
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.types import Array
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 TABLE = noisy_pushes(36)
 
@@ -134,8 +134,7 @@ def test_features_of_the_mechanics_are_derivatives_by_the_parameters() -> None:
         alone = replace(mechanics, covariance=one)
         found = features_of(replace(model, predictor=MechanicsPredictor(alone, model.predictor.covariance)), push)
         ends = within(name, mechanics.values[name])
-        changes = [{name: np.full(10, end - mechanics.values[name])} for end in ends]
-        low, high = (mechanics.displacement(push.inputs, push.duration, {}, change) for change in changes)
+        low, high = mechanics.displacements([{name: np.full(10, end - mechanics.values[name])} for end in ends], push)
         slope = 0.01 * (high - low) / (ends[1] - ends[0]) / found.noise_sd
         along = found.values[:, :, np.argmax(np.abs(found.values).sum(axis=(0, 1)))]
         np.testing.assert_allclose(np.abs(along), np.abs(slope), atol=1e-3 * np.abs(slope).max())

@@ -41,8 +41,8 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_update import CORRELATION
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, PriorPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.train import TrainingOptions, train_model
@@ -52,7 +52,7 @@ from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module", autouse=True)

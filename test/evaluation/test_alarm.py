@@ -39,15 +39,13 @@ from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.splits import push_folds
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
-
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 SIZE, SHIFT = ScoreKind("size", 0.5, False), ScoreKind("shift", 0.5, True)
 KINDS = (SIZE, SHIFT)
@@ -173,7 +171,7 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
     duration = np.full(n, 0.2)
     push_id = np.array([f"{seed}-{k // windows:04d}" for k in range(n)])
     noise = 0.8 * rng.standard_normal((n, 3)) + np.repeat(0.6 * rng.standard_normal((pushes, 3)), windows, axis=0)
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius, contact_friction=friction)
+    physics = analytical_mechanics(rig.outline, rig.pusher_radius, contact_friction=friction)
     outcomes = physics.displacement(inputs, duration) + NOISE * noise
     return PushTable(inputs, duration, outcomes, push_id, {"slider_heading": rng.uniform(-3.0, 3.0, n)})
 
@@ -238,7 +236,7 @@ def test_effects_are_kept_while_the_base_is_refitted_without_them(models: dict[s
     base, rows = models["gp"], models["gp"].training
     drift = DriverBasis("linear", ("slider_heading",), (0.0,), (3.0,))
     effect = Effect(None, "slider_heading", drift, np.full(18, 0.3), 1e-4 * np.eye(18), np.array([0.02, 0.02, 0.5]))
-    predictor = ExtendedPredictor(base.predictor.base, base.predictor.physics, (effect,), np.array([1.0, 1.2, 1.0]))
+    predictor = ExtendedPredictor(base.predictor.base, (effect,), np.array([1.0, 1.2, 1.0]))
     shift = predictor.shift(Push(rows.inputs, rows.duration, rows.covariates)).mean
     moved = replace(rows, outcomes=rows.outcomes + shift)
     mean, covariance = held_out_moments(replace(base, predictor=predictor, training=moved))

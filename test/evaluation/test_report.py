@@ -55,8 +55,6 @@ from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting import html
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
-
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
 
 

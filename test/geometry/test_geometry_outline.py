@@ -294,3 +294,14 @@ def test_mirror_symmetry_is_that_of_any_axis():
     assert not has_mirror_symmetry(Outline(TRIANGLE.vertices * [1.0, 0.8]))
     parallelogram = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.13, 0.05], [0.03, 0.05]]))
     assert not has_mirror_symmetry(parallelogram)
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-17, 1e-16, -1e-16, 1e-12, -1e-12])
+def test_a_corner_belongs_to_the_edge_that_faces_the_point_whatever_the_rounding(error: float) -> None:
+    """From the other edge's normal a push onto the corner would have an angle of a quarter turn."""
+    square = shape_outline("rect1")
+    for k, corner in enumerate(square.vertices):
+        normal = square.inward_normal(np.array([(k + 0.5) / 4.0]))[0]
+        points = corner - 0.005 * normal + error * np.array([[1.0, 0.0], [0.0, 1.0]])
+        contact = square.project(points).contact
+        assert np.all(square.edge(contact)[0] == k)

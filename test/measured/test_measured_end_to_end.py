@@ -43,7 +43,7 @@ from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.splits import split_by_push
 from push_predictor.evaluation.validation import metrics_json
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
@@ -119,7 +119,7 @@ def test_the_windows_of_a_long_push_add_up_to_what_the_rig_did(
 def test_textbook_physics_explains_the_long_pushes_and_no_mirror_of_them(imported: dict[str, Path], block: str) -> None:
     runs = block_runs(imported, block)
     table, rig = load_data(runs), load_rig_for(runs)
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
+    physics = analytical_mechanics(rig.outline, rig.pusher_radius)
 
     def score(angle: int, dtheta: int) -> float:
         predicted = physics.displacement(table.inputs * [1, 1, angle], table.duration) * [1, 1, dtheta]
@@ -235,7 +235,7 @@ def test_physics_predicts_the_sense_of_the_hexagons_rotation_not_its_size(
     imported: dict[str, Path], found: dict[str, list[PushWindow]]
 ) -> None:
     rig, table = load_rig_for([imported[HEXAGON]]), load_data([imported[HEXAGON]])
-    predicted = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(table.inputs, table.duration)[0]
+    predicted = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(table.inputs, table.duration)[0]
     observed = found[HEXAGON][0].displacement
     assert np.hypot(*(predicted - observed)[:2]) < 0.005
     assert observed[2] < 2.0 * predicted[2] < 0.0, "struck at its corner at 150 mm/s it spins faster than it is pushed"

@@ -42,7 +42,6 @@ from msg_adapters.residual_schema import RESIDUAL_TYPE
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -111,9 +110,7 @@ def model(recording: Path) -> Path:
     base = train_model(load_data([recording]), rig, "analytical", name="warm")
     basis = DriverBasis("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
     effect = Effect("contact_friction", f"topic:{WARMTH}", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
-    predictor = ExtendedPredictor(
-        base.predictor.base, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3)
-    )
+    predictor = ExtendedPredictor(base.predictor.base, (effect,), np.ones(3))
     path = recording.parent / "warm.pushmodel"
     save_model(replace(base, predictor=predictor), path)
     return path

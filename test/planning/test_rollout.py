@@ -18,13 +18,11 @@ from __future__ import annotations
 
 import gc
 import weakref
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 import pytest
-from coarse import coarse_mechanics
 from synthetic import RADIUS, square_rig
 
 from benchmarks.planning.rollout_truth import EnergyDistance
@@ -34,9 +32,9 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import ACCURACY, AnalyticalPush
+from push_predictor.models.mechanics.fitted import ANALYTICAL_ACCURACY, analytical_mechanics
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
 from push_predictor.models.push import Push
-from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.planning.particles import Deviations
@@ -60,7 +58,7 @@ def rows(count: int = 40) -> PushTable:
     """Windows of 0.2 s, five a push."""
     rng = np.random.default_rng(0)
     inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
-    outcomes = AnalyticalPush(shape_outline("rect1"), RADIUS).displacement(inputs, np.full(count, 0.2))
+    outcomes = analytical_mechanics(shape_outline("rect1"), RADIUS).displacement(inputs, np.full(count, 0.2))
     outcomes += rng.standard_normal((count, 3)) * SD
     return PushTable(inputs, np.full(count, 0.2), outcomes, np.array([f"p{k // 5}" for k in range(count)]))
 
@@ -68,7 +66,7 @@ def rows(count: int = 40) -> PushTable:
 def model_with(covariance: Array, shape: str = "rect1") -> PushModel:
     """The analytical model of a shape, every window of 0.2 s with one covariance (3, 3)."""
     rig = Rig(shape, shape_outline(shape), RADIUS, "abs", 0.837)
-    predictor = AnalyticalPredictor(AnalyticalPush(rig.outline, RADIUS), covariance)
+    predictor = MechanicsPredictor(analytical_mechanics(rig.outline, RADIUS), covariance)
     return PushModel("made", "analytical", rig, predictor, rows(), Provenance((), 8, 0, "0"))
 
 
@@ -82,15 +80,8 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
     """Where the analytical model has the slider (3,) after one push from rest, integrated at once."""
     velocity, contact, angle, duration = step
     heading = np.array([heading_of(contact, angle, model)])
-    moved = model.predictor.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
+    moved = model.predictor.mechanics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
     return displaced(AT_REST[None], heading, moved)[0]
-
-
-@pytest.fixture
-def coarse_integration() -> Iterator[None]:
-    """For tests of distributions."""
-    with coarse_mechanics():
-        yield
 
 
 @pytest.mark.slow
@@ -99,8 +90,8 @@ def coarse_integration() -> Iterator[None]:
 def test_rollout_without_noise_equals_the_integrated_push(shape, contact, angle, duration) -> None:
     model, step = model_with(CERTAIN, shape), [0.02, contact, angle, duration]
     rolled = rollout(model, AT_REST, CERTAIN, [step], particles=2, persistence=INDEPENDENT)
-    # Each window is integrated to ACCURACY of its displacement, which a tenth of it bounds here.
-    np.testing.assert_allclose(rolled.mean[0], after_one_push(model, step), rtol=0.1 * ACCURACY, atol=2e-7)
+    # Each window is integrated to ANALYTICAL_ACCURACY of its displacement, which a tenth of it bounds here.
+    np.testing.assert_allclose(rolled.mean[0], after_one_push(model, step), rtol=0.1 * ANALYTICAL_ACCURACY, atol=2e-7)
     np.testing.assert_allclose(rolled.covariance[0], 0.0, atol=1e-20)
 
 
@@ -142,7 +133,6 @@ def test_rollout_is_equivariant_under_translation_and_rotation() -> None:
     np.testing.assert_allclose(there.covariance, covariance_in_world(here.covariance, np.full(2, 2.0)), atol=1e-15)
 
 
-@pytest.mark.usefixtures("coarse_integration")
 def test_uncertainty_of_the_start_is_propagated() -> None:
     """A slider whose heading is off goes off sideways by the way it is pushed; without noise that is all."""
     model, sd = model_with(CERTAIN), np.array([1e-3, 2e-3, 0.02])
@@ -155,7 +145,6 @@ def test_uncertainty_of_the_start_is_propagated() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.05)
 
 
-@pytest.mark.usefixtures("coarse_integration")
 def test_uncertainty_grows_with_each_push() -> None:
     rolled = rollout(model_with(NOISY), AT_REST, CERTAIN, [PUSH] * 4, 2000)
     spread = np.linalg.det(rolled.covariance)
@@ -195,7 +184,6 @@ def test_slider_does_not_move_after_the_tip_has_passed() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_integration")
 def test_unimodal_steps_can_lead_to_two_modes() -> None:
     """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
@@ -274,7 +262,6 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_integration")
 def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     turned = [
@@ -410,8 +397,7 @@ def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
     base = train_model(table, square_rig(), "gp", name="learnt")
     form, size = DriverBasis("constant"), np.array([0.4, 0.2])
     effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
-    physics = AnalyticalPush(base.rig.outline, RADIUS)
-    model = replace(base, predictor=ExtendedPredictor(base.predictor.base, physics, (effect,), np.ones(3)))
+    model = replace(base, predictor=ExtendedPredictor(base.predictor.base, (effect,), np.ones(3)))
     assert model.needs == ("slider_heading",)
     moved = []
     for heading in (0.0, 0.8):

@@ -33,7 +33,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
@@ -47,8 +47,6 @@ from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.windows.track import Track
-
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 RADIUS, SPEED, DURATION = 0.00475, 0.02, 0.2
 TOLD = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
@@ -64,7 +62,7 @@ def model_of(shape: str, kind: str = "analytical") -> PushModel:
     inputs = np.column_stack([np.full(60, SPEED), rng.random(60), rng.uniform(-1.0, 1.0, 60)])
     duration = np.full(60, DURATION)
     shared = rng.standard_normal((60, 1)) + 0.3 * rng.standard_normal((60, 3))
-    outcomes = AnalyticalPush(rig.outline, RADIUS).displacement(inputs, duration) + shared * [1e-4, 2e-4, 5e-3]
+    outcomes = analytical_mechanics(rig.outline, RADIUS).displacement(inputs, duration) + shared * [1e-4, 2e-4, 5e-3]
     table = PushTable(
         inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(60)]), {"slider_x": rng.random(60)}
     )
@@ -276,7 +274,7 @@ def leaning(covariate: str) -> PushModel:
     form = DriverBasis("linear", (covariate,), (0.0,), (1.0,))
     effect = Effect("contact_friction", covariate, form, np.array([0.1]), np.array([[1e-4]]), np.ones(3))
     training = replace(base.training, covariates={covariate: np.linspace(-4.0, 4.0, len(base.training))})
-    predictor = ExtendedPredictor(base.predictor.base, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
+    predictor = ExtendedPredictor(base.predictor.base, (effect,), np.ones(3))
     return replace(base, predictor=predictor, training=training)
 
 

@@ -33,7 +33,7 @@ from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
@@ -183,7 +183,7 @@ def model_of(shape: str, kind: str) -> PushModel:
     inputs = np.column_stack([rng.uniform(0.01, 0.05, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
     duration = np.full(n, 0.2)
     noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
-    outcomes = AnalyticalPush(rig.outline, RADIUS).displacement(inputs, duration) + noise
+    outcomes = analytical_mechanics(rig.outline, RADIUS).displacement(inputs, duration) + noise
     table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(n)]))
     return train_model(table, rig, kind, name=f"{shape}_{kind}")
 

@@ -17,16 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from unittest.mock import patch
 
 import pytest
-from coarse import coarse_effects, coarse_simulator
-
-from push_predictor.residuals.candidates import parameter_changes
+from coarse import coarse_simulator
 
 
 @pytest.fixture(scope="module", autouse=True)
 def coarsely() -> Iterator[None]:
     """For all tests of this folder."""
-    with coarse_effects(), coarse_simulator(4.0), patch.object(parameter_changes, "ACCURACY", 1e-2):
+    with coarse_simulator(4.0):
         yield

@@ -71,7 +71,7 @@ def base(table: PushTable) -> PushModel:
 
 
 def extended(base: PushModel, *effects: Effect) -> PushModel:
-    predictor = ExtendedPredictor(base.predictor.base, base.predictor.physics, effects, np.ones(3))
+    predictor = ExtendedPredictor(base.predictor.base, effects, np.ones(3))
     return replace(base, name="extended", predictor=predictor)
 
 

@@ -52,14 +52,14 @@ def deployed() -> PushModel:
 
 def overconfident(model: PushModel, factor: float) -> PushModel:
     """The model with predicted deviations `factor` times as large."""
-    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (), np.full(3, factor))
+    predictor = ExtendedPredictor(model.predictor.base, (), np.full(3, factor))
     return replace(model, predictor=predictor)
 
 
 def with_idle_effect(model: PushModel, variance: float) -> PushModel:
     """The model with an effect of size zero that is uncertain."""
     idle = Effect("contact_friction", "model_inputs", CONSTANT, np.zeros(1), np.array([[variance]]), np.ones(3))
-    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (idle,), scale_of(model))
+    predictor = ExtendedPredictor(model.predictor.base, (idle,), scale_of(model))
     return replace(model, predictor=predictor)
 
 
@@ -163,7 +163,6 @@ def test_interval_of_a_size_contains_errors_of_the_mechanics(size: float) -> Non
         np.array([size]),
         np.full((1, 1), 1e-12),
         np.ones(3),
-        True,
     )
     sized = size_of(exact, pushes(2, 0))
     assert sized is not None and sized.value == pytest.approx(size)
@@ -183,7 +182,7 @@ def test_size_of_a_step_does_not_depend_on_its_place(share: float) -> None:
     table = pushes(60, 0)
     place = float(np.quantile(table.covariates["elapsed_time"], share))
     basis = DriverBasis("step", ("elapsed_time",), place=place)
-    step = Effect("contact_friction", "elapsed_time", basis, np.array([0.1]), np.full((1, 1), 1e-6), np.ones(3), True)
+    step = Effect("contact_friction", "elapsed_time", basis, np.array([0.1]), np.full((1, 1), 1e-6), np.ones(3))
     sized = size_of(step, table)
     assert sized is not None and sized.value == pytest.approx(0.1)
 
@@ -196,7 +195,6 @@ def test_length_of_a_vector_is_not_negative() -> None:
         np.array([1e-4, 0.0]),
         np.eye(2) * 1e-6,
         np.ones(3),
-        True,
     )
     sized = size_of(small, pushes(2, 0))
     assert sized is not None and sized.low >= 0.0

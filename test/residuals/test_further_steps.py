@@ -27,11 +27,13 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import Mechanics, joint_shift
-from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Push
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
@@ -207,7 +209,6 @@ def test_changes_of_parameters_displace_as_the_effects_do(deployed: PushModel) -
     effects = [
         planted("contact_friction", "elapsed_time", DRIFT, 0.1),
         constant("centre_of_friction", 0.002, -0.001),
-        constant("limit_surface_power", 0.3),
     ]
     evidence = evidence_of(deployed, pushes(30, 2))
     changes = ParameterChanges.of(evidence, [candidate(evidence, e.mechanism, e.covariate, e.basis) for e in effects])
@@ -228,14 +229,12 @@ def test_changes_of_parameters_displace_as_the_effects_do(deployed: PushModel) -
 @pytest.mark.parametrize("mechanism", REFINEMENTS, ids=lambda m: m.name)
 def test_an_effect_of_a_refinement_is_its_response(mechanism: Any) -> None:
     table = pushes(20, 2)
-    push, patch = Push(table.inputs, table.duration, table.covariates), mechanics_of(physics())
-    if mechanism.name == "rim_pressure":
-        patch = FittedMechanics(replace(patch.mechanics, support=None), patch.values)
+    push, mechanics = Push(table.inputs, table.duration, table.covariates), physics()
+    if mechanism.name == "rim_pressure":  # of a patch
+        mechanics = FittedMechanics(PushMechanics(mechanics.outline, mechanics.mechanics.pusher_radius))
     sizes = 0.5 * np.array([BY_NAME[name].spread for name in mechanism.quantities])
-    more, less = (
-        joint_shift(Mechanics(physics(), patch), [constant(mechanism.name, *size)], push) for size in (sizes, -sizes)
-    )
-    expected = mechanism.response(physics(), push) @ sizes
+    more, less = (joint_shift(mechanics, [constant(mechanism.name, *size)], push) for size in (sizes, -sizes))
+    expected = mechanism.response(mechanics, push) @ sizes
     assert np.linalg.norm(expected) > 0.0
     assert np.linalg.norm(0.5 * (more - less) - expected) < 0.02 * np.linalg.norm(expected)
 

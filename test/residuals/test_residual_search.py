@@ -25,11 +25,11 @@ import pytest
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
-from push_predictor.models.effects.exact import Mechanics, joint_shift
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.mechanisms import LIBRARY, Push
-from push_predictor.models.predictors import AnalyticalPredictor
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.fitted import analytical_mechanics
+from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.predictors import MechanicsPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
@@ -37,7 +37,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
@@ -48,8 +48,7 @@ COUNT, WINDOWS = 100, 2  # pushes of a session, as few as have blocks enough (FE
 SIDE = 0.09
 SQUARE = Outline(0.5 * SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))
 RIG = Rig("square", SQUARE, 0.00475, "made up", 0.8)
-PHYSICS = AnalyticalPush(SQUARE, 0.00475, 0.25)
-MECHANICS = Mechanics(PHYSICS, mechanics_of(PHYSICS))
+MECHANICS = analytical_mechanics(SQUARE, 0.00475, 0.25)
 NOISE = np.array([0.00007, 0.0001, 0.0028])  # m, m, rad
 FOUR = ("contact_friction", "pressure_spread", "centre_of_friction", "anisotropic_friction")
 DRIVERS = ("elapsed_time", "topic:/temperature", "slider_x", "slider_heading", "edge")
@@ -72,13 +71,18 @@ def pushes(n: int, seed: int, noise: np.ndarray = NOISE) -> PushTable:
         "slider_heading": rng.uniform(-np.pi, np.pi, n)[push],
         "edge": edge,
     }
-    outcomes = PHYSICS.displacement(inputs, duration) + noise * drawn
+    outcomes = MECHANICS.displacement(inputs, duration) + noise * drawn
     return PushTable(inputs, duration, outcomes, np.array([f"{seed} {k}" for k in push]), covariates)
 
 
+def seen(model: PushModel, table: PushTable) -> Evidence:
+    """The evidence of a table, where effects act on the mechanics that made it."""
+    return replace(evidence_of(model, table), mechanics=MECHANICS)
+
+
 def with_effect(table: PushTable, mechanism: str | None, basis: DriverBasis, *coefficients: float) -> PushTable:
-    push = evidence_of(ANALYTICAL, table, PHYSICS).push
-    design = design_of(mechanism, basis, PHYSICS, push, np.ones(3))
+    push = seen(ANALYTICAL, table).push
+    design = design_of(mechanism, basis, MECHANICS, push, np.ones(3))
     return replace(table, outcomes=table.outcomes + design @ np.array(coefficients))
 
 
@@ -113,7 +117,7 @@ def baseline(model: PushModel) -> Baseline:
 
 
 def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> SearchResult:
-    evidence, inputs = evidence_of(model, table, PHYSICS), inputs_basis(model, table)
+    evidence, inputs = seen(model, table), inputs_basis(model, table)
     candidates = candidates_of(evidence, drivers, inputs)
     if mechanisms is not None:
         candidates = [c for c in candidates if c.mechanism is None or c.mechanism in mechanisms]
@@ -174,7 +178,7 @@ class TestNoEffect:
         """In pushes ordered by angle, time would be blamed for errors of the base in the angle."""
         table = pushes(COUNT, 3)
         ordered = replace(table, covariates={**table.covariates, "elapsed_time": 100.0 * table.inputs[:, 2]})
-        evidence, inputs = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
+        evidence, inputs = seen(learnt, ordered), inputs_basis(learnt, ordered)
         assert confounded(evidence, DRIVERS, inputs) == ["elapsed_time"]
         assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, inputs)}
 
@@ -183,8 +187,8 @@ class TestNoEffect:
         table = pushes(COUNT, 3)
         since = np.tile([0.0, 0.2], COUNT)
         late = np.where(since == 0.0, 0.97, 1.0)
-        short = PHYSICS.displacement(table.inputs, table.duration * late)
-        moved = table.outcomes + short - PHYSICS.displacement(table.inputs, table.duration)
+        short = MECHANICS.displacement(table.inputs, table.duration * late)
+        moved = table.outcomes + short - MECHANICS.displacement(table.inputs, table.duration)
         table = replace(table, outcomes=moved, covariates={**table.covariates, "time_since_contact": since})
         found = searched(ANALYTICAL, table, drivers=("time_since_contact",)).terms
         assert "time_since_contact" not in {term.best.covariate for term in found}
@@ -196,7 +200,7 @@ class TestNoEffect:
     @pytest.mark.slow
     def test_effects_above_the_detectable_size_are_found_and_far_smaller_ones_are_not(self, learnt) -> None:
         table = pushes(COUNT, 103)
-        evidence, inputs = evidence_of(learnt, table, PHYSICS), inputs_basis(learnt, table)
+        evidence, inputs = seen(learnt, table), inputs_basis(learnt, table)
         found = search(evidence, candidates_of(evidence, DRIVERS, inputs), inputs, 0.01, baseline=baseline(learnt))
         size = detectable_json(minimum_detectable(found, evidence, inputs, 0.01, baseline(learnt)))["contact_friction"][
             "driven"
@@ -295,15 +299,15 @@ class TestBasis:
         late = DriverBasis("step", ("elapsed_time",), place=305.0)
         after = late.values(plain.covariates, len(plain))[:, 0]
         plain = replace(plain, covariates={**plain.covariates, "topic:/valve": 20.0 + 5.0 * after})
-        effect = Effect("contact_friction", "elapsed_time", late, np.array([0.35]), np.zeros((1, 1)), np.ones(3), True)
+        effect = Effect("contact_friction", "elapsed_time", late, np.array([0.35]), np.zeros((1, 1)), np.ones(3))
         push = Push(plain.inputs, plain.duration, plain.covariates)
         table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
-        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        base = replace(ANALYTICAL, predictor=MechanicsPredictor(MECHANICS, ANALYTICAL.predictor.covariance))
         (term,) = searched(base, table, drivers=[*DRIVERS, "topic:/valve"]).terms
         assert (term.best.mechanism, term.best.basis.name) == ("contact_friction", "step")
         assert set(term.naming.drivers) == {"elapsed_time", "topic:/valve"}
         assert not term.own and term.share > 0.5
-        evidence, inputs = evidence_of(base, table, PHYSICS), inputs_basis(base, table)
+        evidence, inputs = seen(base, table), inputs_basis(base, table)
         choice = TermChoice(evidence, tuple(candidates_of(evidence, [*DRIVERS, "topic:/valve"], inputs)), inputs, 0)
         screened = ForwardSelection(choice, 0.01, baseline(base)).screened(evidence.z)
         found = np.flatnonzero(screened.p_value <= 0.01).tolist()
@@ -317,14 +321,12 @@ class TestBasis:
         """An effect that soon has its full size looks constant; one that is there from the first push is constant."""
         plain = pushes(COUNT, 302)
         time, always = plain.covariates["elapsed_time"], DriverBasis("constant")
-        effect = Effect(
-            "contact_friction", "elapsed_time", always, np.array([0.15]), np.zeros((1, 1)), np.ones(3), True
-        )
+        effect = Effect("contact_friction", "elapsed_time", always, np.array([0.15]), np.zeros((1, 1)), np.ones(3))
         push = Push(plain.inputs, plain.duration, plain.covariates)
         shift = joint_shift(MECHANICS, [effect], push)
         reached = 1.0 - np.exp(-(time - time.min()) / (0.07 * np.ptp(time))) if grows else np.ones(len(time))
         table = replace(plain, outcomes=plain.outcomes + reached[:, None] * shift)
-        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        base = replace(ANALYTICAL, predictor=MechanicsPredictor(MECHANICS, ANALYTICAL.predictor.covariance))
         (term,) = searched(base, table).terms
         assert term.best.label == ("contact_friction", "model_inputs")
         assert set(term.naming.drivers) == {"model_inputs", *rivals}
@@ -334,10 +336,10 @@ class TestBasis:
         """A slope that is there from the 13th of 100 pushes on looks constant, too."""
         plain = pushes(COUNT, 302)
         late, size = DriverBasis("step", ("elapsed_time",), place=125.0), np.array([0.2, -0.1])
-        effect = Effect("tilted_surface", "elapsed_time", late, size, np.zeros((2, 2)), np.ones(3), True)
+        effect = Effect("tilted_surface", "elapsed_time", late, size, np.zeros((2, 2)), np.ones(3))
         push = Push(plain.inputs, plain.duration, plain.covariates)
         table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
-        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        base = replace(ANALYTICAL, predictor=MechanicsPredictor(MECHANICS, ANALYTICAL.predictor.covariance))
         in_library(monkeypatch, "contact_friction", "tilted_surface")
         (term,) = searched(base, table).terms
         assert (term.best.label, term.best.basis.name) == (("tilted_surface", "elapsed_time"), "step")
@@ -347,11 +349,11 @@ class TestBasis:
         """An onset before almost all pushes is the constant effect, and must gain more than the whole of this."""
         plain = pushes(COUNT, 303)
         shift, always = np.array([0.015, 0.0]), DriverBasis("constant")
-        effect = Effect("centre_of_friction", "edge", always, shift, np.zeros((2, 2)), np.ones(3), True)
+        effect = Effect("centre_of_friction", "edge", always, shift, np.zeros((2, 2)), np.ones(3))
         push = Push(plain.inputs, plain.duration, plain.covariates)
         table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
-        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
-        evidence, inputs = evidence_of(base, table, PHYSICS), inputs_basis(base, table)
+        base = replace(ANALYTICAL, predictor=MechanicsPredictor(MECHANICS, ANALYTICAL.predictor.covariance))
+        evidence, inputs = seen(base, table), inputs_basis(base, table)
         sides = table.covariates["edge"][:, None] == np.arange(3)  # they explain a part of the effect
         folded = replace(inputs, folds=True, columns=np.column_stack([inputs.columns, sides]))
         candidates = candidates_of(evidence, DRIVERS, folded)
@@ -379,7 +381,7 @@ def test_what_a_polynomial_leaves_of_an_unknown_effect_is_no_effect_of_its_own()
 def louder_to_the_right(n: int, seed: int) -> PushTable:
     """Pushes whose noise grows with the place along x."""
     table = pushes(n, seed)
-    clean = PHYSICS.displacement(table.inputs, table.duration)
+    clean = MECHANICS.displacement(table.inputs, table.duration)
     factor = np.exp(0.5 * table.covariates["slider_x"] / 0.03)
     return replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
 
@@ -389,7 +391,7 @@ class TestVariance:
     def test_variance_that_grows_with_a_covariate_is_not_a_mean_effect(self, learnt) -> None:
         louder = louder_to_the_right(COUNT, 400)
         found = searched(learnt, louder)
-        evidence = evidence_of(learnt, louder, PHYSICS)
+        evidence = seen(learnt, louder)
         noise = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline(learnt))
         assert not found.terms
         assert noise.found[0].covariate == "slider_x"
@@ -398,19 +400,19 @@ class TestVariance:
     @pytest.mark.slow
     def test_variance_that_grew_with_the_covariate_in_training_too_is_not_reported(self) -> None:
         model = train_model(louder_to_the_right(COUNT, 403), RIG, "gp", name="uneven")
-        evidence = evidence_of(model, louder_to_the_right(COUNT, 404), PHYSICS)
+        evidence = seen(model, louder_to_the_right(COUNT, 404))
         assert not variance_effects(model, evidence, evidence.z, 0.01, baseline=baseline(model)).found
         alone = variance_effects(model, evidence, evidence.z, 0.01).found
         assert [effect.covariate for effect in alone] == ["slider_x"]
 
     def test_variance_as_in_training_is_not_reported(self, learnt) -> None:
         table = pushes(COUNT, 401)
-        evidence = evidence_of(learnt, table, PHYSICS)
+        evidence = seen(learnt, table)
         assert not variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline(learnt)).found
 
     def test_larger_variance_than_in_training_is_reported_as_constant(self, learnt) -> None:
         table = pushes(COUNT, 402, noise=2.0 * NOISE)
-        evidence = evidence_of(learnt, table, PHYSICS)
+        evidence = seen(learnt, table)
         noise = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline(learnt)).found
         assert noise[0].covariate == "model_inputs"
         assert noise[0].ratio == pytest.approx(2.0, rel=0.25)

@@ -22,8 +22,7 @@ import numpy as np
 import pytest
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.limit_surface import contact_force
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
@@ -32,7 +31,7 @@ from push_predictor.residuals.channels.wrench import WrenchFinding, wrench_effec
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array
 
-PHYSICS = AnalyticalPush(shape_outline("rect1"), 0.00475, contact_friction=0.25)
+MECHANICS = analytical_mechanics(shape_outline("rect1"), 0.00475, contact_friction=0.25)
 PUSHES, WINDOWS = 120, 3  # per push
 FMAX = 2.0  # N
 SCATTER = 0.08  # of the logarithm of the force, by push and by window alike
@@ -71,29 +70,36 @@ def made(
 
 def predicted_force(contact: Array, angle: Array, contact_friction: float) -> Array:
     """Force (n, 2) along the inward normal and its left per unit of fmax."""
-    outline, support = PHYSICS.outline, PHYSICS.support
-    normal, arm = outline.inward_normal(contact), outline.point(contact) / support.length
+    outline = MECHANICS.outline
+    normal, arm = outline.inward_normal(contact), outline.point(contact) / MECHANICS.ellipsoid.length
     p = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
     q = arm[:, 0] * normal[:, 0] + arm[:, 1] * normal[:, 1]
-    fn, ft, _ = contact_force(1 + p * p, p * q, 1 + q * q, np.cos(angle), np.sin(angle), contact_friction)
-    return np.column_stack([fn, ft]) / np.sqrt(fn**2 + ft**2 + (p * fn + q * ft) ** 2)[:, None]
+    # Of the forces in the friction cone, the one whose velocity of the contact is nearest in direction to the pusher's.
+    edge = np.arctan(contact_friction)
+    tried = np.linspace(-edge, edge, 2001)
+    fn, ft = np.cos(tried), np.sin(tried)
+    moment = p[:, None] * fn + q[:, None] * ft
+    of_contact = np.arctan2(ft + moment * q[:, None], fn + moment * p[:, None])
+    best = np.argmin(np.abs(of_contact - angle[:, None]), axis=1)
+    force = np.column_stack([fn[best], ft[best]])
+    return force / np.sqrt(1.0 + moment[np.arange(len(best)), best] ** 2)[:, None]
 
 
 def found(table: PushTable, baseline: PushTable | None) -> WrenchFinding:
-    return wrench_effects(table, baseline, PHYSICS, alpha=0.002)
+    return wrench_effects(table, baseline, MECHANICS, alpha=0.002)
 
 
 def test_load_does_not_depend_on_push_direction_or_contact_friction() -> None:
     """Every window determines the surface friction by itself."""
     for contact_friction in (0.1, 0.5):
         table = made(0, contact_friction=contact_friction)
-        assert np.median(np.exp(loads(table, PHYSICS).size)) == pytest.approx(FMAX, rel=0.02)
+        assert np.median(np.exp(loads(table, MECHANICS).size)) == pytest.approx(FMAX, rel=0.02)
 
 
 def test_sensitivity_to_a_bias_is_the_derivative() -> None:
-    plain, step = loads(made(0), PHYSICS), 1e-6
+    plain, step = loads(made(0), MECHANICS), 1e-6
     for k, bias in enumerate([(step, 0.0), (0.0, step)]):
-        moved = loads(made(0, bias=bias), PHYSICS)
+        moved = loads(made(0, bias=bias), MECHANICS)
         assert np.allclose((moved.size - plain.size) / step, plain.bias[:, 0, k], atol=1e-5)
         assert np.allclose((moved.direction - plain.direction) / step, plain.bias[:, 1, k], atol=1e-5)
 
@@ -223,8 +229,8 @@ def test_level_is_shared_by_the_zero_and_the_force_in_contact() -> None:
         assert p_values[tried.mechanism, tried.covariate] >= min(1.0, 2.0 * tried.p_value)
     assert shared.effects[0].p_value == 2.0 * alone.effects[0].p_value
     level = 1.5 * alone.effects[0].p_value  # enough for the force alone, but not for half of it
-    assert wrench_effects(before, made(1), PHYSICS, alpha=level).effects
-    assert not wrench_effects(after, zeroed(made(1), (0.0, 0.0)), PHYSICS, alpha=level).effects
+    assert wrench_effects(before, made(1), MECHANICS, alpha=level).effects
+    assert not wrench_effects(after, zeroed(made(1), (0.0, 0.0)), MECHANICS, alpha=level).effects
 
 
 def test_windows_without_a_force_give_no_finding() -> None:

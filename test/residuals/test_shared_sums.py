@@ -148,8 +148,8 @@ def test_candidates_are_screened_together_as_each_alone() -> None:
 
 def test_responses_are_computed_once_for_the_same_windows(deployed: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
     evidence, computed = evidence_of(deployed, pushes(20, 2)), []
-    known = standardised.mechanism_named
-    monkeypatch.setattr(standardised, "mechanism_named", lambda name: computed.append(name) or known(name))
+    known = standardised.responses_of
+    monkeypatch.setattr(standardised, "responses_of", lambda name, *rest: computed.append(name) or known(name, *rest))
     both = [whitened_response(evidence, name) for name in ("pusher_travel", "contact_friction") * 2]
     assert computed == ["pusher_travel", "contact_friction"]
     assert both[0] is both[2] and both[1] is both[3]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`python coarse_node.py EXECUTABLE --ros-args ...` runs a node whose reports have coarse pictures, without tables.
+"""`python coarse_node.py EXECUTABLE --ros-args ...` runs a node whose reports have coarse pictures.
 
 So it is in the processes that it starts: multiprocessing runs this file in each of them, but for its end.
 """
@@ -25,12 +25,10 @@ from importlib import import_module
 
 from coarse_pictures import coarse_pictures
 
-from push_predictor.models.tabulated.effect_tables import build
 from push_predictor.nodes.entry import install_handlers
 
 ALL_THE_TIME = ExitStack()
 ALL_THE_TIME.enter_context(coarse_pictures())
-build.ATTEMPTS = ()  # a table takes two seconds; without one an extended model predicts exactly
 
 if __name__ == "__main__":
     install_handlers()

@@ -25,8 +25,7 @@ from supports import FOUR_POINTS, THREE_POINTS
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline, square
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.types import Array
 
 RADIUS = 0.00475
@@ -35,8 +34,7 @@ SQUARE = square(0.09)
 
 
 def ellipsoid(outline: Outline) -> PowerSurface:
-    support = uniform_support(outline)
-    return PowerSurface(np.array(support.centre), support.length)
+    return uniform_ellipsoid(outline)
 
 
 @cache

@@ -25,9 +25,8 @@ from synthetic import square_rig
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import Mechanics, has_exact_effects, joint_shift
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import mechanics_of
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
@@ -60,9 +59,9 @@ EXPERIMENT = (
 )
 
 
-def physics() -> AnalyticalPush:
+def physics() -> FittedMechanics:
     rig = square_rig()
-    return AnalyticalPush(rig.outline, rig.pusher_radius)
+    return analytical_mechanics(rig.outline, rig.pusher_radius)
 
 
 def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
@@ -88,7 +87,7 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
     shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
     outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
     push = Push(inputs, duration, covariates)
-    shift = joint_shift(Mechanics(physics(), mechanics_of(physics())), effects, push)
+    shift = joint_shift(physics(), effects, push)
     push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 
@@ -96,8 +95,7 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
 def planted(mechanism: str | None, covariate: str, basis: DriverBasis, *coefficients: float) -> Effect:
     """An effect of exactly this size."""
     size = np.array(coefficients)
-    exact = has_exact_effects(mechanism)
-    return Effect(mechanism, covariate, basis, size, np.zeros((len(size), len(size))), np.ones(3), exact)
+    return Effect(mechanism, covariate, basis, size, np.zeros((len(size), len(size))), np.ones(3))
 
 
 def slippery(size: float) -> Effect:

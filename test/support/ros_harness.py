@@ -120,7 +120,7 @@ def node_process(
     """Run `python -m push_predictor.nodes.EXECUTABLE --ros-args ...`; leaving stops it (SIGINT, then kill).
 
     ros_args follow --ros-args as they are, such as "-r", "slider/pose:=/vicon/pose". params: name to value.
-    coarse: with pictures that take a quarter of the time, and no tables of effects (coarse_node.py).
+    coarse: with pictures that take a quarter of the time (coarse_node.py).
     """
     arguments = node_arguments(*ros_args, namespace=namespace, params=params)
     started = [str(COARSE_NODE), executable] if coarse else ["-m", f"push_predictor.nodes.{executable}"]

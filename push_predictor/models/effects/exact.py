@@ -106,33 +106,8 @@ def joint_shift(mechanics: FittedMechanics, effects: Sequence[Effect], push: Pus
     return joint(mechanics, effects, push, derivatives=False).shift
 
 
-def joint_shifts(
-    mechanics: FittedMechanics, alternatives: Sequence[Sequence[Effect]], push: Push, unchanged: Array
-) -> Array:
-    """Shifts (k, n, 3) of the mean by the mechanisms of each of k sets of effects, computed as one set of pushes.
-
-    unchanged (n, 3): what `undisturbed` returns.
-    """
-    return mechanics.displacements([changes_of(effects, push) for effects in alternatives], push) - unchanged
-
-
-def undisturbed(mechanics: FittedMechanics, push: Push) -> Array:
-    """Displacements (n, 3) by the mechanics without effects."""
-    return np.asarray(mechanics.displacements([{}], push)[0])
-
-
-def joint(
-    mechanics: FittedMechanics,
-    effects: Sequence[Effect],
-    push: Push,
-    *,
-    derivatives: bool = True,
-    unchanged: Array | None = None,
-) -> JointShift:
-    """The shift by all effects together, and its derivatives by their coefficients.
-
-    unchanged (n, 3): what `undisturbed` returns, where it is known from before; used without derivatives.
-    """
+def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
+    """The shift by all effects together, and its derivatives by their coefficients."""
     acting, n = JointEffects.of(effects), len(push.inputs)
     if not acting.effects:
         found = JointShift(np.zeros((n, 3)), [], {})
@@ -142,8 +117,8 @@ def joint(
         found = JointShift(shift, [], {name: slopes[:, k] for k, name in enumerate(acting.names)})
         exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
     else:
-        moved = mechanics.displacements([changes_of(effects, push)], push)[0]
-        found = JointShift(moved - (undisturbed(mechanics, push) if unchanged is None else unchanged), [], {})
+        still, moved = mechanics.displacements([{}, changes_of(effects, push)], push)
+        found = JointShift(moved - still, [], {})
     shift = found.shift
     for effect in effects:
         if not effect.exact:

@@ -31,7 +31,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import JointShift, joint, joint_shift, joint_shifts
+from push_predictor.models.effects.exact import JointShift, joint, joint_shift
 from push_predictor.models.predictors import Cross
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.evidence.residualizer import Residualizer
@@ -154,8 +154,7 @@ class _Problem:
     def linearised(self, coefficients: Array) -> _Linearised:
         """The problem about these coefficients."""
         evidence, effects = self.evidence, (*self.evidence.effects, *self.effects(coefficients))
-        unchanged = evidence.undisturbed if any(effect.exact for effect in effects) else None
-        together = joint(evidence.mechanics, effects, evidence.push, unchanged=unchanged)
+        together = joint(evidence.mechanics, effects, evidence.push)
         whitener, count = self.evidence.whitener, len(self.evidence.effects)
         shift = np.einsum("nij,nj->ni", whitener, together.shift - self._before)
         columns = np.einsum("nij,njp->nip", whitener, np.concatenate(together.designs[count:], axis=2))
@@ -203,29 +202,12 @@ class _Problem:
         return (best, most) if most > 0.0 else self._shortened(now, step)
 
     def _shortened(self, now: _Linearised, step: Array) -> tuple[_Linearised, float]:
-        """The problem after the longest part of a step that is of use; as it was, if none is.
-
-        Most often none is. So all are tried at once, without derivatives.
-        """
-        tried = [now.coefficients + step * 0.5**k for k in range(1, LENGTHS)]
-        for coefficients, shift in zip(tried, self._shifts(now, tried), strict=True):
-            residual = self._cleared(self.z - shift)
-            fall = now.objective(now.ridge) - _objective(residual, now.ridge, coefficients)
-            if fall > 0.0:
-                return self.linearised(coefficients), fall
+        """The problem after the longest part of a step that is of use; as it was, if none is."""
+        for k in range(1, LENGTHS):
+            tried = self.linearised(now.coefficients + step * 0.5**k)
+            if (fall := now.objective(now.ridge) - tried.objective(now.ridge)) > 0.0:
+                return tried, fall
         return now, 0.0
-
-    def _shifts(self, now: _Linearised, tried: Sequence[Array]) -> Array:
-        """Standardised shifts (k, n, 3) with each of these coefficients; designs of linear effects do not change."""
-        evidence, designs = self.evidence, now.joint.designs
-        every = [(*evidence.effects, *self.effects(coefficients)) for coefficients in tried]
-        shifts = np.zeros((len(tried), *self.z.shape)) - self._before
-        if any(effect.exact for effect in every[0]):
-            shifts += joint_shifts(evidence.mechanics, every, evidence.push, evidence.undisturbed)
-        for shift, effects in zip(shifts, every, strict=True):
-            for effect, design in zip(effects, designs, strict=True):
-                shift += 0.0 if effect.exact else design @ effect.coefficients
-        return np.asarray(np.einsum("nij,knj->kni", evidence.whitener, shifts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,11 +226,7 @@ class _Linearised:
     joint: JointShift
 
     def objective(self, ridge: Array) -> float:
-        return _objective(self.residual, ridge, self.coefficients)
-
-
-def _objective(residual: Array, ridge: Array, coefficients: Array) -> float:
-    return 0.5 * float(np.sum(residual**2) + np.sum(ridge * coefficients**2))
+        return 0.5 * float(np.sum(self.residual**2) + np.sum(ridge * self.coefficients**2))
 
 
 def _groups(values: Array) -> IntArray:

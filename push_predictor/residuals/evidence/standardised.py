@@ -22,7 +22,6 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect, responses_of
-from push_predictor.models.effects.exact import undisturbed
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
@@ -64,11 +63,6 @@ class Evidence:
     def block(self) -> IntArray:
         """Block number (n,): neighbouring pushes share one; see blocks_of."""
         return blocks_of(self.table, self.chosen)
-
-    @cached_property
-    def undisturbed(self) -> Array:
-        """Displacements (n, 3) by the mechanics without effects, from which shifts of effects are counted."""
-        return undisturbed(self.mechanics, self.push)
 
     @cached_property
     def responses(self) -> dict[str | None, Array]:

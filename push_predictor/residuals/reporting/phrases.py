@@ -41,7 +41,6 @@ MECHANISMS: dict[str | None, MechanismPhrase] = {
     "pressure_spread": MechanismPhrase("the spread of the slider's pressure on the table"),
     "centre_of_friction": MechanismPhrase("the slider's centre of friction"),
     "pushing_height": MechanismPhrase("the pushing height"),
-    "limit_surface_power": MechanismPhrase("the shape of the limit surface"),
     "body_anisotropy": MechanismPhrase(
         "direction-dependent friction of the slider", "the slider's friction became direction-dependent"
     ),
