@@ -65,7 +65,7 @@ def features_of(model: PushModel, push: Push) -> Features:
     if isinstance(base, GaussianProcessPredictor):
         parts.append(_of_functions(base, push, noise_sd))
         if base.mean is not None:
-            parts.append(_of_parameters(base.mean.fitted, push) / noise_sd[:, :, None])
+            parts.append(_of_parameters(base.mean, push) / noise_sd[:, :, None])
     elif isinstance(base, MechanicsPredictor | PriorPredictor):
         parts.append(_of_parameters(base.fitted, push) / noise_sd[:, :, None])
     if isinstance(extended := model.predictor, ExtendedPredictor):  # its scale is on noise and base alike
@@ -87,8 +87,7 @@ def _process_covariance(base: Predictor, push: Push) -> Array:
 def _of_functions(base: GaussianProcessPredictor, push: Push, noise_sd: Array) -> Array:
     """Features (n, 3, q) of what the regressions learn; each has weights of its own."""
     at = base.scaling.features(base.rig.outline, push.inputs)
-    size = np.ones(len(at)) if base.mean is None else base.mean.size(push)
-    unit = size[:, None] * base.reported_sd / noise_sd
+    unit = base.scaling.size(push.inputs, push.duration)[:, None] * base.reported_sd / noise_sd
     roots = [
         _root(unit[:, k, None] * regression.function_covariance(at) * unit[:, k])
         for k, regression in enumerate(base.regressions)

@@ -33,7 +33,6 @@ from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
-from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
@@ -48,15 +47,16 @@ class GaussianProcessPredictor(WithoutEffects):
 
     correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
     regressions have learnt the residuals; None where they have learnt the outcomes themselves. The scaling is that of
-    what they have learnt. tails: the distribution of new pushes, to which the covariances are widened; None where the
-    training pushes were too few, and in files before format 8.
+    what they have learnt, which is per path length of the tip unless the scaling has no travel. tails: the distribution
+    of new pushes, to which the covariances are widened; None where the training pushes were too few, and in files
+    before format 8.
     """
 
     rig: Rig
     scaling: Scaling
     regressions: tuple[Regression, ...]
     correlation: Correlation | None = None
-    mean: MechanicsMean | None = None
+    mean: FittedMechanics | None = None
     tails: Tails | None = None
 
     @property
@@ -83,18 +83,18 @@ class GaussianProcessPredictor(WithoutEffects):
     def physics(self) -> AnalyticalPush:
         """See Predictor: the ellipsoidal model nearest to the mean, or the textbook's."""
         if self.mean is not None:
-            return self.mean.fitted.ellipsoid()
+            return self.mean.ellipsoid()
         return AnalyticalPush(self.rig.outline, self.rig.pusher_radius)
 
     @cached_property
     def mechanics(self) -> FittedMechanics:
         """See Predictor: the mean, or the textbook's analytical model."""
-        return self.mean.fitted if self.mean is not None else mechanics_of(self.physics)
+        return self.mean if self.mean is not None else mechanics_of(self.physics)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """See Predictor: those of the mean."""
-        return self.mean.fitted.needs if self.mean is not None else ()
+        return self.mean.needs if self.mean is not None else ()
 
     @property
     def covariates(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class GaussianProcessPredictor(WithoutEffects):
         """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
-        return self.about_mean(
+        return self.of_outcomes(
             self._moments_of(latent, self.correlation.at(features) if self.correlation else None), push
         )
 
@@ -132,7 +132,7 @@ class GaussianProcessPredictor(WithoutEffects):
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
         correlation = self.correlation.held_out(features, block) if self.correlation else None
-        return self.about_mean(self._moments_of(latent, correlation), rows)
+        return self.of_outcomes(self._moments_of(latent, correlation), rows)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""
@@ -167,21 +167,40 @@ class GaussianProcessPredictor(WithoutEffects):
         return self._log_density(latent, push, outcomes)
 
     def latent(self, inputs: Array) -> list[LatentPrediction]:
-        """Per output, the latent predictions in standardised units."""
-        features = self.scaling.features(self.rig.outline, inputs)
-        return [regression.predict(features) for regression in self.regressions]
+        """Per output, the latent predictions in standardised units, less certain beyond the training's speeds."""
+        features, more = self.scaling.features(self.rig.outline, inputs), self.scaling.deviation(inputs) ** 2
+        found = [regression.predict(features) for regression in self.regressions]
+        return [replace(p, variance=p.variance + more) for p in found]
 
     def standardised(self, push: Push, outcomes: Array) -> Array:
         """Outcomes (n, 3) in the units of `latent`."""
-        return self.scaling.outcomes(outcomes if self.mean is None else self.mean.residuals(push, outcomes))
+        return self.scaling.outcomes((outcomes - self.displacement(push)) / self._size(push))
 
-    def about_mean(self, residuals: Moments, push: Push) -> Moments:
-        """Moments of the outcomes from those of what was learnt."""
-        return residuals if self.mean is None else self.mean.outcomes(push, residuals)
+    def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
+        """Moments of the outcomes from those of what was learnt, which know the training's speeds alone."""
+        mean, covariance, process_covariance = self.scaled(learnt, push)
+        return Moments(mean + self.displacement(push), covariance, process_covariance)
 
-    def without_mean(self) -> GaussianProcessPredictor:
-        """The predictor of the residuals alone; itself if it has no mean."""
-        return self if self.mean is None else replace(self, mean=None)
+    def displacement(self, push: Push) -> Array:
+        """Displacement (n, 3) of the mean, zero if it has none."""
+        if self.mean is None:
+            return np.zeros((len(push.inputs), 3))
+        return self.mean.displacement(push.inputs, push.duration, push.covariates)
+
+    def scaled(self, learnt: Moments, push: Push) -> Moments:
+        """The same about the displacement of the mechanics."""
+        if self.scaling.travel is None:
+            return learnt
+        size, more = self._size(push), self.scaling.deviation(push.inputs)[:, None] * self.scaling.outcome_sd
+        square = (size * size)[:, :, None]
+        covariance = learnt.covariance + (more * more)[:, :, None] * np.eye(3) if more.any() else learnt.covariance
+        return Moments(learnt.mean * size, covariance * square, learnt.process_covariance * square)
+
+    def of_targets(self) -> GaussianProcessPredictor:
+        """The predictor of what was learnt, at a path of the scaling's travel; itself if that are the outcomes."""
+        if self.mean is None and self.scaling.travel is None:
+            return self
+        return replace(self, mean=None, scaling=self.scaling.without_path())
 
     def free_matrices(self) -> None:
         """Free what predictions would compute again."""
@@ -197,12 +216,15 @@ class GaussianProcessPredictor(WithoutEffects):
         """See Predictor."""
         if self.mean is None:
             return self
-        return replace(self, mean=replace(self.mean, fitted=scalar_mechanics(self.mean.fitted)))
+        return replace(self, mean=scalar_mechanics(self.mean))
+
+    def _size(self, push: Push) -> Array:
+        """Factor (n, 1) on what was learnt."""
+        return self.scaling.size(push.inputs, push.duration)[:, None]
 
     def _units(self, push: Push) -> Array:
-        """Standard deviations of what was learnt, in units of the outcomes, (3,) or (n, 3)."""
-        sd = self.scaling.outcome_sd
-        return sd if self.mean is None else np.asarray(self.mean.size(push)[:, None] * sd)
+        """Standard deviations (n, 3) of what was learnt, in units of the outcomes."""
+        return np.asarray(self._size(push) * self.scaling.outcome_sd)
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""

@@ -41,16 +41,16 @@ from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
 from push_predictor.models.tabulated.tabulated_model import (
     ONLY_LEARNT,
     TabulatedModel,
+    of_targets,
     with_base,
     with_domain,
     with_effects,
-    without_mean,
 )
 from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, compared, with_spline
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
-FORMAT_VERSION = 4  # also to be raised when a table's values change their meaning
+FORMAT_VERSION = 5  # also to be raised when a table's values change their meaning
 RECORD = "record"
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
 
@@ -105,7 +105,7 @@ def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[st
         "ends": [domain.least.tolist(), domain.most.tolist()],
         "nodes": [nodes.cells, nodes.coarse, nodes.least],
         "error": astuple(tabulated.error),
-        "probes": _probes_record(probed(without_mean(base), CHECKED)),
+        "probes": _probes_record(probed(of_targets(base), CHECKED)),
     }
 
 
@@ -121,7 +121,7 @@ def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Arra
         prior = with_spline(predictor, _spline(record["prior"], arrays["prior"]))
         accurate = compared(predictor, prior, CHECKED)[1]
         return TabulatedModel(with_base(model, prior), str(record["how"])) if accurate else None
-    learnt = without_mean(model.base)
+    learnt = of_targets(model.base)
     assert isinstance(learnt.predictor, GaussianProcessPredictor)
     cells, coarse, least_variances = record["nodes"]
     nodes = TableNodes(cells, coarse, least_variances, [arrays[f"nodes_{k}"] for k in range(9)])

@@ -66,21 +66,26 @@ def feature_box(model: PushModel) -> FeatureBox:
 
 @dataclass(frozen=True, eq=False)
 class TabulatedDomain(FeatureBox):
-    """The domain with a table of a box that contains it: from least to most (3,) of velocity, place and angle."""
+    """The domain with a table of a box that contains it: from least to most (3,) of velocity, place and angle.
+
+    limited: whether beyond the table's speeds the predictions are those of the nearest one.
+    """
 
     table: PredictionTable
     least: Array
     most: Array
+    limited: bool = False
 
     def covered(self, inputs: Array) -> BoolArray:
         """Which of the pushes (n, 3) the table contains, (n,)."""
-        return self._covered(np.column_stack([inputs[:, 0], self.chart.place(inputs[:, 1])[0], inputs[:, 2]]))
+        velocity, place = self._speed(inputs[:, 0]), self.chart.place(inputs[:, 1])[0]
+        return self._covered(np.column_stack([velocity, place, inputs[:, 2]]))
 
     def predict(self, inputs: Array) -> tuple[BoolArray, Prediction | None]:
         """Which of the pushes (n, 3) the table contains, and the predictions if it contains all of them."""
         velocity, contact, angle = inputs.T
         place, box = self.chart.place(contact)
-        points = np.column_stack([velocity, place, angle])
+        points = np.column_stack([self._speed(velocity), place, angle])
         covered = self._covered(points)
         if not covered.all():
             return covered, None
@@ -93,12 +98,17 @@ class TabulatedDomain(FeatureBox):
         velocity, contact, angle = push
         place, box = self.chart.place_one(contact)
         (slow, start, left), (fast, end, right) = self._ends
-        if not (slow <= velocity <= fast and start <= place <= end and left <= angle <= right):
+        speed = min(max(velocity, slow), fast) if self.limited else velocity
+        if not (slow <= speed <= fast and start <= place <= end and left <= angle <= right):
             return None
-        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
+        numbers = np.array(self.table.moments_one((speed, place, angle), box))
         covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
         inside = np.array([self._contains(velocity, place, box, angle)])
         return Prediction(numbers[None, :3], covariance, process_covariance, inside)
+
+    def _speed(self, velocity: Array) -> Array:
+        """Velocities (n,) at which the table is asked."""
+        return np.clip(velocity, self._ends[0][0], self._ends[1][0]) if self.limited else velocity
 
     def _covered(self, points: Array) -> BoolArray:
         low, high = self._ends
@@ -111,9 +121,18 @@ class TabulatedDomain(FeatureBox):
 
 
 def wide_box(model: PushModel) -> tuple[Array, Array]:
-    """Least and most velocity, place and angle (3,) of a table for all pushes up to FASTEST times the training's."""
-    fastest = FASTEST * float(model.training.inputs[:, 0].max())
-    return np.array([0.0, 0.0, -0.5 * pi]), np.array([fastest, 1.0, 0.5 * pi])
+    """Least and most velocity, place and angle (3,) of a table for all pushes.
+
+    Up to FASTEST times the training's speeds, unless the predictions beyond these are those of the nearest one.
+    """
+    fastest = float(model.training.inputs[:, 0].max())
+    slow, fast = _speeds(model) or (0.0, FASTEST * fastest)
+    return np.array([slow, 0.0, -0.5 * pi]), np.array([fast, 1.0, 0.5 * pi])
+
+
+def _speeds(model: PushModel) -> tuple[float, float] | None:
+    predictor = model.predictor.base
+    return predictor.scaling.speeds if isinstance(predictor, GaussianProcessPredictor) else None
 
 
 def narrow_box(model: PushModel) -> tuple[Array, Array]:
@@ -137,7 +156,7 @@ def tabulated_domain(
     """
     box = feature_box(model)
     table = tabulate(predictor, posteriors, box.chart, *ends, refinement)
-    return TabulatedDomain(box.chart, box.low, box.high, table, *ends)
+    return TabulatedDomain(box.chart, box.low, box.high, table, *ends, _speeds(model) is not None)
 
 
 def domain_from_nodes(
@@ -145,4 +164,5 @@ def domain_from_nodes(
 ) -> TabulatedDomain:
     """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
     box = feature_box(model)
-    return TabulatedDomain(box.chart, box.low, box.high, from_nodes(nodes, predictor, box.chart, *ends), *ends)
+    table = from_nodes(nodes, predictor, box.chart, *ends)
+    return TabulatedDomain(box.chart, box.low, box.high, table, *ends, _speeds(model) is not None)

@@ -167,8 +167,8 @@ class TabulatedModel:
 
     @cached_property
     def _residual(self) -> PushModel:
-        """The model of what is tabulated: the base, without the mechanics about which it has learnt residuals."""
-        return without_mean(self.model.base)
+        """The model of what is tabulated, in place of the base."""
+        return of_targets(self.model.base)
 
     @cached_property
     def _factor(self) -> Array:
@@ -203,16 +203,16 @@ class TabulatedModel:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)
         else:
             learnt = self._learnt(self.domain, push.inputs, push.duration)
-        if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+        if not isinstance(predictor, GaussianProcessPredictor):
             return learnt
-        return Prediction(*predictor.mean.scaled(push, _moments(learnt)), learnt.in_domain)
+        return Prediction(*predictor.scaled(_moments(learnt), push), learnt.in_domain)
 
     def _of_base(self, learnt: Prediction, push: Push) -> Prediction:
         """Predictions of the base from those of what it has learnt."""
         predictor = self._exact.predictor.base
-        if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+        if not isinstance(predictor, GaussianProcessPredictor):
             return learnt
-        return Prediction(*predictor.about_mean(_moments(learnt), push), learnt.in_domain)
+        return Prediction(*predictor.of_outcomes(_moments(learnt), push), learnt.in_domain)
 
     def _learnt(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         """Predictions of what the base has learnt, from the table where it can."""
@@ -229,7 +229,7 @@ class TabulatedModel:
 
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
-    learnt = without_mean(model.base)
+    learnt = of_targets(model.base)
     if isinstance(learnt.predictor, PriorPredictor):
         table, how = tabulated_prior(learnt.predictor)
         return TabulatedModel(model if table is None else with_base(model, table), how)
@@ -289,12 +289,12 @@ def with_base(model: PushModel, base: PriorPredictor) -> PushModel:
     return replace(model, predictor=predictor)
 
 
-def without_mean(model: PushModel) -> PushModel:
-    """The model of what is tabulated: without the mechanics about which it has learnt residuals."""
+def of_targets(model: PushModel) -> PushModel:
+    """The model of what is tabulated: what was learnt, at one path length and without the mechanics."""
     predictor = model.predictor
-    if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+    if not isinstance(predictor, GaussianProcessPredictor):
         return model
-    return replace(model, predictor=predictor.without_mean())
+    return replace(model, predictor=predictor.of_targets())
 
 
 def _moments(prediction: Prediction) -> Moments:

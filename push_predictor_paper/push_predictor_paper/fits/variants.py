@@ -74,7 +74,7 @@ def score_variant(pushes: PushSet, fit: Fit, choice: KernelChoice) -> Score:
         pushes.rig,
         fit.kind,
         name=fit.kind,
-        options=TrainingOptions(n_train=fit.n, seed=fit.seed, kernels=choice, tails=False),
+        options=TrainingOptions(n_train=fit.n, seed=fit.seed, kernels=choice, mean="zero", per_path=False, tails=False),
     )
     cpu = time.process_time() - start
     return Score(fit, push_scores(compare(model, pushes.table.take(split.test))), cpu)

@@ -126,7 +126,7 @@ class EffectSource:
         """Displacement (n, 3) of the base's mechanics if anchored, else zero."""
         base = self.predictor.base
         if isinstance(base, GaussianProcessPredictor):
-            return np.zeros((len(push.inputs), 3)) if base.mean is None else base.mean.displacement(push)
+            return base.displacement(push)
         return base.moments(push).mean if self.anchored else np.zeros((len(push.inputs), 3))
 
     def _push(self, inputs: Array, heading: Array) -> Push:
