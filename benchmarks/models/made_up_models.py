@@ -27,7 +27,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
@@ -59,7 +59,7 @@ def square_physics() -> AnalyticalPush:
 
 def base_model() -> PushModel:
     """A GP of 300 windows."""
-    return train_model(made_up_table(300, 0), square_rig(), "gp", name="base")
+    return train_model(made_up_table(300, 0), square_rig(), "gp", name="base", options=TrainingOptions(mean="zero"))
 
 
 def analytical_model(table: PushTable) -> PushModel:
@@ -71,7 +71,7 @@ def informed_model(base: PushModel) -> PushModel:
     """A GP of the same windows about mechanics with the square's pressure and a shifted centre."""
     mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
     fitted = FittedMechanics(mechanics, {"contact_friction": 0.28, "centre_x": 0.001})
-    options = TrainingOptions(about=MechanicsMean(fitted, 0.004))
+    options = TrainingOptions(about=fitted)
     return train_model(base.training, square_rig(), "gp", name="informed", options=options)
 
 

@@ -35,7 +35,6 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
-    MechanicsMean,
     MechanicsPredictor,
 )
 from push_predictor.models.push_model import PushModel
@@ -49,7 +48,7 @@ TABLE = noisy_pushes(36)
 
 
 def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:
-    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**options))
+    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**{"mean": "zero", **options}))
 
 
 @cache
@@ -148,7 +147,7 @@ def within(name: str, value: float) -> tuple[float, float]:
 
 
 def test_residuals_and_mechanics_add_up() -> None:
-    model, push = trained("gp", about=MechanicsMean(fitted(), 0.004)), some()
+    model, push = trained("gp", about=fitted()), some()
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.mean is not None
     mean = model.predictor.mean
     certain = replace(mean, fitted=replace(mean.fitted, covariance=0.0 * mean.fitted.covariance))

@@ -69,9 +69,16 @@ TABLES = {
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     rows, rig = pushes(25), square_rig()
-    found = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "vhgp")}
+    found = {
+        kind: train_model(rows, rig, kind, name=kind, options=TrainingOptions(mean="zero"))
+        for kind in ("analytical", "vhgp")
+    }
     matern = train_model(
-        noisy_pushes(60), rig, "gp", name="matern", options=TrainingOptions(kernels=KernelChoice("matern52"))
+        noisy_pushes(60),
+        rig,
+        "gp",
+        name="matern",
+        options=TrainingOptions(kernels=KernelChoice("matern52"), mean="zero"),
     )
     return {
         **found,

@@ -63,7 +63,9 @@ def pushes(n: int, seed: int, strength: float) -> PushTable:
 
 
 def trained(kind: str = "gp", strength: float = 0.8, n: int = 300) -> PushModel:
-    return train_model(pushes(n, 0, strength), square_rig(), kind, name="a", options=TrainingOptions(tails=False))
+    return train_model(
+        pushes(n, 0, strength), square_rig(), kind, name="a", options=TrainingOptions(tails=False, mean="zero")
+    )
 
 
 trained_once = cache(trained)

@@ -52,7 +52,7 @@ from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.effect_tables import build
 from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
@@ -91,7 +91,14 @@ def small_tables() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
     models = {
-        kind: train_model(pushes(16 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS
+        kind: train_model(
+            pushes(16 if kind == "prior" else 25),
+            square_rig(),
+            kind,
+            name=f"a_{kind}",
+            options=TrainingOptions(mean="zero"),
+        )
+        for kind in KINDS
     }
     prior = models["prior"].predictor
     assert isinstance(prior, PriorPredictor)

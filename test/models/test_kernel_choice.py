@@ -252,7 +252,11 @@ def test_every_kernel_choice_recovers_noise_even_from_a_third_of_the_rows(
 def models() -> dict[KernelChoice, PushModel]:
     return {
         c: train_model(
-            noisy_pushes(60), square_rig(), "vhgp", name="a model", options=TrainingOptions(kernels=c, tails=False)
+            noisy_pushes(60),
+            square_rig(),
+            "vhgp",
+            name="a model",
+            options=TrainingOptions(kernels=c, tails=False, mean="zero"),
         )
         for c in CHOICES
     }
@@ -276,7 +280,11 @@ def independent(model: PushModel) -> PushModel:
 
 def test_a_gp_keeps_its_family(tmp_path: Path) -> None:
     model = train_model(
-        noisy_pushes(60), square_rig(), "gp", name="g", options=TrainingOptions(kernels=KernelChoice("matern52"))
+        noisy_pushes(60),
+        square_rig(),
+        "gp",
+        name="g",
+        options=TrainingOptions(kernels=KernelChoice("matern52"), mean="zero"),
     )
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")

@@ -49,7 +49,7 @@ from push_predictor.models.tabulated.table_accuracy import (
 )
 from push_predictor.models.tabulated.tabulated_domain import FASTEST, tabulated_domain, wide_box
 from push_predictor.models.tabulated.tabulated_model import REFINEMENTS, TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -77,7 +77,7 @@ def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> 
 
 def trained(outline: Outline, kind: str, low: Array, high: Array, n: int = 100) -> PushModel:
     rig = Rig("made_up", outline, 0.00475, "plywood", 0.8)
-    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}")
+    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}", options=TrainingOptions(mean="zero"))
 
 
 WIDE = np.array([0.01, 0.0, -1.0]), np.array([0.05, 1.0, 1.0])

@@ -79,7 +79,7 @@ def shared_errors(pushes: int, seed: int) -> PushTable:
 
 @cache
 def trained(kind: str = "gp") -> PushModel:
-    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind)
+    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
 
 
 def tails_of(model: PushModel) -> Tails:
@@ -339,7 +339,7 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
 
 
 def test_training_without_tails_takes_windows_for_independent() -> None:
-    options = TrainingOptions(tails=False)
+    options = TrainingOptions(tails=False, mean="zero")
     assert train_model(shared_errors(12, 0), square_rig(), "gp", name="a", options=options).predictor.tails is None
 
 

@@ -34,7 +34,7 @@ from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.predictor import Moments, Shift
-from push_predictor.models.predictors.scaling import Scaling
+from push_predictor.models.predictors.scaling import DEVIATION, Scaling
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
 from push_predictor.recordings.rig import Rig
@@ -167,10 +167,11 @@ class GaussianProcessPredictor(WithoutEffects):
         return self._log_density(latent, push, outcomes)
 
     def latent(self, inputs: Array) -> list[LatentPrediction]:
-        """Per output, the latent predictions in standardised units, less certain beyond the training's speeds."""
-        features, more = self.scaling.features(self.rig.outline, inputs), self.scaling.deviation(inputs) ** 2
+        """Per output, the latent predictions in standardised units; beyond the training's speeds see scaling.py."""
+        features, beyond = self.scaling.features(self.rig.outline, inputs), self.scaling.beyond(inputs)
         found = [regression.predict(features) for regression in self.regressions]
-        return [replace(p, variance=p.variance + more) for p in found]
+        more = (DEVIATION * beyond) ** 2
+        return [replace(p, variance=p.variance + more, log_noise_mean=p.log_noise_mean - beyond) for p in found]
 
     def standardised(self, push: Push, outcomes: Array) -> Array:
         """Outcomes (n, 3) in the units of `latent`."""
@@ -191,10 +192,14 @@ class GaussianProcessPredictor(WithoutEffects):
         """The same about the displacement of the mechanics."""
         if self.scaling.travel is None:
             return learnt
-        size, more = self._size(push), self.scaling.deviation(push.inputs)[:, None] * self.scaling.outcome_sd
+        size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
+        mean, covariance, process = learnt
+        if beyond.any():
+            process = process * np.exp(-beyond)[:, :, None]
+            deviation = (DEVIATION * beyond * self.scaling.outcome_sd) ** 2
+            covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
         square = (size * size)[:, :, None]
-        covariance = learnt.covariance + (more * more)[:, :, None] * np.eye(3) if more.any() else learnt.covariance
-        return Moments(learnt.mean * size, covariance * square, learnt.process_covariance * square)
+        return Moments(mean * size, covariance * square, process * square)
 
     def of_targets(self) -> GaussianProcessPredictor:
         """The predictor of what was learnt, at a path of the scaling's travel; itself if that are the outcomes."""
