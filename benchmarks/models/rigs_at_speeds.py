@@ -44,7 +44,7 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 
 Write = Callable[[Path, int, int, int, Sequence[float]], None]
 PAIRS = (("rect1", "abs"), ("hex", "delrin"), ("ellip2", "plywood"), ("rect1", "plywood"))
-TRAVEL = 0.03  # m
+TRAVEL = 0.05  # m: fast pushes have a window too
 
 
 def session(

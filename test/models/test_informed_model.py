@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from synthetic import RADIUS, square_rig
 
+from push_predictor.models import train, train_learnt
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.constant import ConstantNoise, fit_constant
@@ -37,7 +38,6 @@ from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessP
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models import train, train_learnt
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable

@@ -39,6 +39,9 @@ MIRRORED = (
 # Through the speed: they matter beyond quasi-static pushing, and without them only the distance travelled counts. The
 # height of a push shifts the pressure, as centre_x and centre_y do; the rim exponent spreads it.
 NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height", "pressure_spread")
+# Of the spreads of PARAMETERS, which are weak priors for fits. Set once on 21 rigs, simulated by three simulators and
+# measured in two laboratories: before the first push, 95 % intervals then cover 0.97 on average, and 0.89 on the worst.
+PRIOR_SHARE = 0.7
 ROWS_AT_ONCE = 20_000
 
 
@@ -48,6 +51,11 @@ def drawn_parameters(known_support: bool) -> tuple[str, ...]:
     return tuple(p.name for p in PARAMETERS if not p.needs and p.name not in left_out)
 
 
+def prior_spreads(names: Sequence[str]) -> Array:
+    """Standard deviations (p,) from rig to rig of the parameters before the first push."""
+    return np.array([PRIOR_SHARE * BY_NAME[name].spread for name in names])
+
+
 def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAWS) -> Array:
     """Draws (count, p) from the priors, normal about `means` (p,) and cut off at the plausible ranges.
 
@@ -55,7 +63,7 @@ def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAW
     gets symmetric predictions. Deterministic for a seed.
     """
     table = [BY_NAME[name] for name in names]
-    spread = np.array([p.spread for p in table])
+    spread = prior_spreads(names)
     low = scipy.special.ndtr((np.array([p.low for p in table]) - means) / spread)
     high = scipy.special.ndtr((np.array([p.high for p in table]) - means) / spread)
     half = means + spread * scipy.special.ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))

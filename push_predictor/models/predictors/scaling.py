@@ -18,8 +18,8 @@ A quasi-static slider does not know the speed: a push twice as long moves it twi
 path length of the tip, and mean and noise of a prediction are in proportion to it. Where the speed does change them,
 training pushes of several speeds show it.
 
-Beyond the training's speeds the features are those of the nearest one. With x the logarithm of the ratio of the speed to
-it, the noise variance per path length is divided by exp(x), as friction that varies along the path averages out, and
+Beyond the training's speeds the features are those of the nearest one. With x the logarithm of the ratio of the speed
+to it, the noise variance per path length is divided by exp(x), as friction that varies along the path averages out, and
 (DEVIATION x)^2 is added, in units of the variance of what was learnt, for what changes with the speed.
 """
 
