@@ -19,8 +19,8 @@
 
 Every model learns from 100 pushes at 20 mm/s, and predicts 120 others at 10, 20, 40, 80 and 150 mm/s: at most two
 windows a push, so that slow pushes, which have more, count as much. "vhgp auto, all speeds" is trained on 120 pushes at
-these speeds. --count: of rigs of each simulator. --rows: random training windows. --work: where the recordings are kept,
-a temporary folder by default.
+these speeds. --count: of rigs of each simulator. --rows: random training windows. --work: where the recordings are
+kept, a temporary folder by default.
 
 The NMSE is the sum over three outputs, about the mean of the training pushes at all speeds for all models. Intervals
 resample whole pushes. The last column is the paired difference of the exact NLPD from the model of all speeds.

@@ -98,7 +98,7 @@ def test_spread_grows_with_the_distance_of_the_speed_and_noise_averages_out(slow
     (_, near, noise), (_, far, far_noise) = at(slow, 0.02), at(slow, 0.02 * ratio)
     np.testing.assert_allclose(far_noise, noise * ratio, rtol=1e-9, atol=1e-20)
     more = far / ratio**2 - (near - noise + noise / ratio)
-    expected = np.diag((DEVIATION * np.log(ratio) * learnt(slow).scaling.outcome_sd) ** 2)
+    expected = np.diag((DEVIATION * np.log(ratio) * learnt(slow).reported_sd) ** 2)
     np.testing.assert_allclose(more, np.broadcast_to(expected, more.shape), rtol=1e-6, atol=1e-6 * expected[0, 0])
 
 

@@ -68,7 +68,7 @@ def fitted(residuals: Array, push_ids: np.ndarray, counts: tuple[int, int, int] 
 
 
 def shared_errors(pushes: int, seed: int) -> PushTable:
-    """Five windows a push; each push has its own size of error, which its windows share in part."""
+    """Five windows a push; each push has its own size of error, which its windows share in part, of any path length."""
     table = noisy_pushes(5 * pushes, seed, windows_per_push=5)
     rng = np.random.default_rng([seed, 1])
     size = np.exp(0.6 * rng.standard_normal(pushes))
@@ -79,7 +79,8 @@ def shared_errors(pushes: int, seed: int) -> PushTable:
 
 @cache
 def trained(kind: str = "gp") -> PushModel:
-    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
+    options = TrainingOptions(mean="zero", per_path=False)
+    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind, options=options)
 
 
 def tails_of(model: PushModel) -> Tails:

@@ -196,7 +196,7 @@ class GaussianProcessPredictor(WithoutEffects):
         mean, covariance, process = learnt
         if beyond.any():
             process = process * np.exp(-beyond)[:, :, None]
-            deviation = (DEVIATION * beyond * self.scaling.outcome_sd) ** 2
+            deviation = (DEVIATION * beyond * self.reported_sd) ** 2
             covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
         square = (size * size)[:, :, None]
         return Moments(mean * size, covariance * square, process * square)

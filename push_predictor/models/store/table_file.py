@@ -50,7 +50,7 @@ from push_predictor.models.tabulated.tabulated_prior import TabulatedPrior, comp
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
-FORMAT_VERSION = 5  # also to be raised when a table's values change their meaning
+FORMAT_VERSION = 4  # also to be raised when a table's values change their meaning
 RECORD = "record"
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
 
