@@ -78,24 +78,21 @@ def train_learnt(
 ) -> GaussianProcessPredictor:
     """The predictor trained on the rows; of_mean: those of them that the mechanics are fitted to.
 
-    With the mean `auto`, these rows decide about it: see `zero_is_better`. Raises TrainingError for outcomes that do
-    not vary, and for options that the kind does not have.
+    With the mean `auto`, these rows decide about it, by a GP of each: see `zero_is_better`. Raises TrainingError for
+    outcomes that do not vary, and for options that the kind does not have.
     """
     _check_rows(rows, rig)
     about = None
     if options.mean != "zero":
         watch(f"train {options.kind}: mechanics as mean", 0.0)
         about = fitted_mean(of_mean, rig)
-    begin = 0.1
     if about is not None and options.mean == "auto":
-        plain = _trained(of_mean, rig, options, None, part_of(watch, 0.1, 0.25))
-        informed = _trained(of_mean, rig, options, about, part_of(watch, 0.25, 0.4))
-        if zero_is_better(plain.density(of_mean), informed.density(of_mean)):
-            about = None
-        if len(of_mean) == len(rows):
-            return _completed(plain if about is None else informed, rows, options, watch)
-        begin = 0.4
-    return _completed(_trained(rows, rig, options, about, part_of(watch, begin, 0.9)), rows, options, watch)
+        watch(f"train {options.kind}: choice of the mean", 0.2)
+        each = [_trained(of_mean, rig, replace(options, kind="gp", inducing=None), mean) for mean in (None, about)]
+        zero, mechanics = (trained.density(of_mean) for trained in each)
+        about = None if zero_is_better(zero, mechanics) else about
+    trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9))
+    return _completed(trained, rows, options, watch)
 
 
 def zero_is_better(zero: Array, mechanics: Array) -> bool:
@@ -113,7 +110,7 @@ def train_about(mean: FittedMechanics, rows: PushTable, rig: Rig, options: Learn
     """The predictor of residuals about mechanics that were fitted to other rows. Raises as `train_learnt`."""
     _check_rows(rows, rig)
     about = FittedMean(mean, rows.outcomes - _moved(mean, rows))
-    return _completed(_trained(rows, rig, options, about, no_watch), rows, options, no_watch)
+    return _completed(_trained(rows, rig, options, about), rows, options, no_watch)
 
 
 def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch: Watch) -> GaussianProcessPredictor:
@@ -184,7 +181,9 @@ class _Trained:
         return np.asarray(by_push - counts / len(by_push))
 
 
-def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch) -> _Trained:
+def _trained(
+    rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch = no_watch
+) -> _Trained:
     mean = None if about is None else about.mean
     path = rows.inputs[:, 0] * rows.duration
     size = (path / path.mean() if options.per_path else np.ones(len(path)))[:, None]

@@ -404,6 +404,8 @@ def test_list_models_describes_the_training_data(server, folder):
         "windows": "60",
         "covariates": "-",
         "duration": "0.2",
+        "speeds": "20..20 mm/s",
+        "mean": "zero",
         "file": str(folder / "vhgp.model"),
     }
 

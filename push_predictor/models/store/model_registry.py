@@ -139,10 +139,10 @@ class ModelRegistry:
             "surface": model.rig.surface,
             "pushes": len(model.training.pushes),
             "windows": len(model.training),
-            "speeds": _speeds(model.training.inputs[:, 0]),
-            "mean": mean_in_words(model.predictor),
             "covariates": ",".join(model.needs) or "-",  # that a request must contain
             "duration": _durations(model.training.duration),
+            "speeds": _speeds(model.training.inputs[:, 0]),
+            "mean": mean_in_words(model.predictor),
             "file": self._files[name],
         }
         return "; ".join(f"{key}={value}" for key, value in values.items())
