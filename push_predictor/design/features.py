@@ -85,7 +85,10 @@ def _process_covariance(base: Predictor, push: Push) -> Array:
 
 
 def _of_functions(base: GaussianProcessPredictor, push: Push, noise_sd: Array) -> Array:
-    """Features (n, 3, q) of what the regressions learn; each has weights of its own."""
+    """Features (n, 3, q) of what the regressions learn; each has weights of its own.
+
+    What speeds beyond the training's add is not among them: a single push does not teach it.
+    """
     at = base.scaling.features(base.rig.outline, push.inputs)
     unit = base.scaling.size(push.inputs, push.duration)[:, None] * base.reported_sd / noise_sd
     roots = [

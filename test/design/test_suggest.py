@@ -89,7 +89,7 @@ def few_pushes(count: int, about: FittedMechanics | None = None) -> PushModel:
     """A GP of so many pushes, about nothing or about mechanics."""
     table = noisy_pushes(90)
     rows = table.take(np.isin(table.push_id, table.pushes[:count]))
-    return train_model(rows, square_rig(), "gp", name="few", options=TrainingOptions(about=about))
+    return train_model(rows, square_rig(), "gp", name="few", options=TrainingOptions(mean="zero", about=about))
 
 
 def one_side(table: PushTable) -> PushTable:
