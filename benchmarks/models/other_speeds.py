@@ -72,16 +72,15 @@ class Case:
     test: PushTable
     rig: Rig
 
-    def scores(self, model: str, rows: int) -> list[PushScores]:
-        """Scores of a model on all test pushes, and on those of each speed."""
+    def scores(self, model: str, rows: int) -> PushScores:
+        """Scores of a model on the test pushes."""
         kind, options = MODELS[model]
         table = empty_table() if kind == "prior" else self.several if model == ALL_SPEEDS else self.one
         if len(table):
             options = replace(options, n_train=min(rows, len(table)))
         trained = train_model(table, self.rig, kind, name=model, options=options)
-        tests = [self.test, *(self.test.take(at_speed(self.test, speed)) for speed in ASKED)]
         mean = self.several.outcomes.mean(axis=0)
-        return [push_scores(replace(compare(trained, test), training_mean=mean)) for test in tests]
+        return push_scores(replace(compare(trained, self.test), training_mean=mean))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -100,11 +99,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def case_of(rig: str, number: int, work: Path) -> Case:
-    """The pushes of a rig; those of the test are named by its number."""
+    """The pushes of a rig; those of the test are named by its number and their speed."""
     one, known = session(rig, number, 0, PUSHES, (TRAINED,), work)
     several, test = (session(rig, number, which, TEST_PUSHES, ASKED, work)[0] for which in (1, 2))
     test = test.take(few_windows(test))
-    return Case(one, several, replace(test, push_id=np.char.add(f"{number} ", test.push_id)), known)
+    near = np.abs(np.log(test.inputs[:, :1] / np.array(ASKED))).argmin(axis=1)
+    names = [f"{number} {ASKED[k]} {push}" for k, push in zip(near, test.push_id, strict=True)]
+    return Case(one, several, replace(test, push_id=np.array(names)), known)
 
 
 def few_windows(table: PushTable) -> np.ndarray:
@@ -120,31 +121,31 @@ def few_windows(table: PushTable) -> np.ndarray:
     return np.sort(chosen)
 
 
-def at_speed(table: PushTable, speed: float) -> np.ndarray:
-    """Rows to whose speed this is the nearest of those asked."""
-    away = np.abs(np.log(table.inputs[:, :1] / np.array(ASKED)))
-    return np.flatnonzero(np.array(ASKED)[away.argmin(axis=1)] == speed)
+def at_speed(scores: PushScores, speed: float) -> PushScores:
+    """The scores of the pushes at one of the speeds."""
+    chosen = np.array([name.split()[1] == str(speed) for name in scores.push_id])
+    return PushScores(**{field: values[chosen] for field, values in vars(scores).items()})
 
 
 def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int) -> None:
     """Print the tables of a simulator."""
     found = {}
     for model in dict.fromkeys((*models, ALL_SPEEDS)):
-        each = [case.scores(model, rows) for case in cases]
-        found[model] = [pooled(list(scores)) for scores in zip(*each, strict=True)]
+        found[model] = pooled([case.scores(model, rows) for case in cases])
     pushes = sum(len(case.test.pushes) for case in cases)
     windows = sum(len(case.test) for case in cases)
     print(f"\n{rig}: {windows} windows of {pushes} pushes on {len(cases)} rigs\n\n{HEAD}\n{5 * '|---'}|")
-    best = found[ALL_SPEEDS][0]
-    for model, (scores, *_) in found.items():
+    best = found[ALL_SPEEDS]
+    for model, scores in found.items():
         nmse, nlpd = by_push(scores, total_nmse).text(".3f"), by_push(scores, total_exact_nlpd).text(".2f")
         change = "" if scores is best else difference_by_push(best, scores, total_exact_nlpd).text("+.2f")
         print(f"| {model} | {nmse} | {nlpd} | {within(scores)} | {change} |")
     if "vhgp auto" not in found:
         return
     print(f"\n{BY_SPEED}\n{5 * '|---'}|")
-    for speed, default, there in zip(ASKED, found["vhgp auto"][1:], found[ALL_SPEEDS][1:], strict=True):
-        count = sum(len(at_speed(case.test, speed)) for case in cases)
+    for speed in ASKED:
+        default, there = (at_speed(found[model], speed) for model in ("vhgp auto", ALL_SPEEDS))
+        count = int(default.windows.sum())
         nlpd = [f"{float(total_exact_nlpd(scores.totals())[0]):.2f}" for scores in (default, there)]
         print(f"| {1e3 * speed:g} | {count} | {nlpd[0]} | {within(default)} | {nlpd[1]} |", flush=True)
 
