@@ -146,8 +146,8 @@ def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int)
     for speed in ASKED:
         default, there = (at_speed(found[model], speed) for model in ("vhgp auto", ALL_SPEEDS))
         count = int(default.windows.sum())
-        nlpd = [f"{float(total_exact_nlpd(scores.totals())[0]):.2f}" for scores in (default, there)]
-        print(f"| {1e3 * speed:g} | {count} | {nlpd[0]} | {within(default)} | {nlpd[1]} |", flush=True)
+        own, best_there = (by_push(scores, total_exact_nlpd).text(".2f") for scores in (default, there))
+        print(f"| {1e3 * speed:g} | {count} | {own} | {within(default)} | {best_there} |", flush=True)
 
 
 def within(scores: PushScores) -> str:

@@ -19,11 +19,11 @@
 
 --bags: the standard recordings of `simulate`; the square trains on square_abs_train, the other outlines on four of
 five folds of their few pushes. --data: the folder of the measured data: mit_square is split by push in five folds, the
-logs of mlab test the model before the first push, each on its own support. --rigs: so many rigs of each of two other
-simulators, benchmarks/foreign and benchmarks/points_rig, before the first push. Training pushes are drawn at random, the
+logs of mlab test the model before the first push, each on its own support. --rigs: so many rigs of each of the
+simulators benchmarks/foreign and benchmarks/points_rig, before the first push. Training pushes are drawn at random, the
 same for all models. The reference of the NMSE is the mean of all training pushes that could have been drawn, the same
-for all models and n, or that of the test pushes where none can be drawn. Prints the tables of docs/results/prior.md, and
-the coverage before the first push on average over rigs and on the worst.
+for all models and n, or that of the test pushes where none can be drawn. Prints the tables of docs/results/prior.md,
+and the coverage before the first push on average over rigs and on the worst.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ VALUES = {"contact_friction": 0.25, "rim_exponent": 1.5}
 MECHANICS = FittedMechanics(PushMechanics(square_rig().outline, RADIUS), VALUES, 1e-4 * np.eye(2))
 
 
-def trained(kind: str, **options: object) -> PushModel:
+def trained(kind: str, **options: Any) -> PushModel:
     table = empty_table() if kind == "prior" else square_pushes(30)[0]
     return train_model(table, square_rig(), kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
 

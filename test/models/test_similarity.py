@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> P
     return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"{seed}-{k // 3}" for k in range(n)]))
 
 
-def trained(table: PushTable, kind: str = "gp", **options: object) -> PushModel:
+def trained(table: PushTable, kind: str = "gp", **options: Any) -> PushModel:
     return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
 
 
@@ -147,7 +148,7 @@ def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
 
 
 @pytest.mark.parametrize("options", ({}, {"per_path": False}, {"about": MECHANICS}))
-def test_a_file_keeps_it(options: dict[str, object], tmp_path: Path) -> None:
+def test_a_file_keeps_it(options: dict[str, Any], tmp_path: Path) -> None:
     model = trained(pushes(0.02, 0.03), **options)
     save_model(model, tmp_path / "m")
     again = load_model(tmp_path / "m")
