@@ -170,8 +170,8 @@ class GaussianProcessPredictor(WithoutEffects):
         """Per output, the latent predictions in standardised units; beyond the training's speeds see scaling.py."""
         features, beyond = self.scaling.features(self.rig.outline, inputs), self.scaling.beyond(inputs)
         found = [regression.predict(features) for regression in self.regressions]
-        more = (DEVIATION * beyond) ** 2
-        return [replace(p, variance=p.variance + more, log_noise_mean=p.log_noise_mean - beyond) for p in found]
+        more, growth = (DEVIATION * beyond) ** 2, self.scaling.noise_growth(inputs)
+        return [replace(p, variance=p.variance + more, log_noise_mean=p.log_noise_mean + growth) for p in found]
 
     def standardised(self, push: Push, outcomes: Array) -> Array:
         """Outcomes (n, 3) in the units of `latent`."""
@@ -195,7 +195,7 @@ class GaussianProcessPredictor(WithoutEffects):
         size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
         mean, covariance, process = learnt
         if beyond.any():
-            process = process * np.exp(-beyond)[:, :, None]
+            process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
             deviation = (DEVIATION * beyond * self.reported_sd) ** 2
             covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
         square = (size * size)[:, :, None]
