@@ -35,8 +35,8 @@ from push_predictor.models.features import push_features
 from push_predictor.types import Array
 
 # Measured on nine simulated rigs, three of each simulator of benchmarks/models/other_speeds.py, trained at 20 mm/s and
-# asked at 10 to 150 mm/s. Without mechanics 0.1 has the best mean NLPD, and 0.2 is the least with which the intervals of
-# every rig and speed cover 0.94 or more; about mechanics the NLPD of 0 to 0.3 differ by 0.1 nats.
+# asked at 10 to 150 mm/s. Without mechanics 0.1 has the best mean NLPD, and 0.2 is the least with which 95 % intervals
+# cover 0.94 or more on every rig and at every speed; about mechanics the NLPD of 0 to 0.3 differ by 0.1 nats.
 DEVIATION = 0.2
 
 
