@@ -138,8 +138,8 @@ def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int)
     best = found[ALL_SPEEDS]
     for model, scores in found.items():
         nmse, nlpd = by_push(scores, total_nmse).text(".3f"), by_push(scores, total_exact_nlpd).text(".2f")
-        change = "" if scores is best else difference_by_push(best, scores, total_exact_nlpd).text("+.2f")
-        print(f"| {model} | {nmse} | {nlpd} | {within(scores)} | {change} |")
+        difference = "" if scores is best else difference_by_push(best, scores, total_exact_nlpd).text("+.2f")
+        print(f"| {model} | {nmse} | {nlpd} | {within(scores)} | {difference} |")
     if "vhgp auto" not in found:
         return
     print(f"\n{BY_SPEED}\n{5 * '|---'}|")
