@@ -82,7 +82,7 @@ def train(
     model in the services; the first file's stem unless given. n_train: that many windows at random by the seed; by
     default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
     an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
-    auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
+    auto, which takes mechanics unless zero predicts held-out pushes clearly better. watch: called with each stage
     and the share of the work done; by default stages are printed to stderr. topics: of the recordings.
 
     The data are checked as by `push_predictor check`. A DataWarning names a probable mistake, or too few pushes for a

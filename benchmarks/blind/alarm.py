@@ -125,7 +125,11 @@ def case_of(seed: int) -> tuple[PushModel, PushTable, PushTable, int]:
     change = int(rng.integers(round(SHARES[0] * LATER), round(SHARES[1] * LATER)))
     rise = Changes(contact_friction=partial(_risen, change))
     model = train_model(
-        table_of(rig), simulated_rig(rig), "vhgp", name=f"{seed}", options=TrainingOptions(n_train=ROWS, seed=seed)
+        table_of(rig),
+        simulated_rig(rig),
+        "vhgp",
+        name=f"{seed}",
+        options=TrainingOptions(n_train=ROWS, seed=seed, mean="zero"),
     )
     return model, table_of(plain), table_of(replace(other, changes=rise)), change
 

@@ -93,7 +93,7 @@ def streams_of(seed: int, count: int) -> Iterator[Stream]:
     rig = rig_of(rng, f"{seed}", TRAINING)
     training = table_of(rig)
     later = [table_of(later_spec(rig, rng, LATER)) for _ in range(count)]
-    options = TrainingOptions(n_train=ROWS, seed=seed)
+    options = TrainingOptions(n_train=ROWS, seed=seed, mean="zero")
     for kind in KINDS:
         model = train_model(training, simulated_rig(rig), kind, name=f"{seed}", options=options)
         calibration = calibrate(model)

@@ -74,16 +74,18 @@ def make_recording(spec: RecordingSpec, data: Path, truth: Path) -> None:
     rig_rng, change_rng, training_rng, new_rng, first_rng, second_rng, other_rng = map(np.random.default_rng, seeds)
     simulate = _engine(spec.engine)
     rig = draw_rig(rig_rng, "rect1" if spec.engine == "mujoco" else None)
-    training = _draw_inputs(training_rng, rig, spec.training, PushDistribution())
+    training = draw_inputs(training_rng, rig, spec.training, PushDistribution())
     motion = simulate(rig, training.plan, training.facts, training.noise, ())
-    _write(first_rng, data / "training", rig, training, motion, Change("none"), FIRST_DAY + 3 * spec.number * DAY)
+    write_session(
+        first_rng, data / "training", rig, training, motion, Change("none"), FIRST_DAY + 3 * spec.number * DAY
+    )
 
     group = group_at(_share_of(spec))
     distribution, shifted = draw_distribution(change_rng, group)
-    new = _draw_inputs(new_rng, rig, spec.later, distribution)
+    new = draw_inputs(new_rng, rig, spec.later, distribution)
     change = draw_change(change_rng, group, rig, new.facts, spec.engine == "mujoco")
     motion = simulate(rig, new.plan, new.facts, new.noise.scaled(change.noise_ratio), change.effects)
-    _write(second_rng, data / "new", rig, new, motion, change, FIRST_DAY + (3 * spec.number + 1) * DAY)
+    write_session(second_rng, data / "new", rig, new, motion, change, FIRST_DAY + (3 * spec.number + 1) * DAY)
 
     ratio = clean_ratio(other_rng, simulate, rig, new, motion, change)
     answers = (shifted,) if group == "input_shift" else change.answers
@@ -107,7 +109,8 @@ def _share_of(spec: RecordingSpec) -> float:
     return float((ranks[spec.number] + 0.5) / spec.count)
 
 
-def _draw_inputs(rng: np.random.Generator, rig: Rig, count: int, distribution: PushDistribution) -> SessionInputs:
+def draw_inputs(rng: np.random.Generator, rig: Rig, count: int, distribution: PushDistribution) -> SessionInputs:
+    """Draw what is pushed in a recording, and the noise."""
     plan = draw_plan(rng, rig, count, distribution)
     scalars = draw_scalars(rng, rig, float(plan.release[-1]) + 1.5)
     noise = draw_process_noise(rng, rig.noise_levels, count)
@@ -128,7 +131,7 @@ def _facts(rig: Rig, plan: Plan, scalars: dict[str, Track]) -> PushFacts:
     )
 
 
-def _write(
+def write_session(
     rng: np.random.Generator,
     folder: Path,
     rig: Rig,
@@ -137,6 +140,7 @@ def _write(
     change: Change,
     start: int,
 ) -> None:
+    """Write the bag of a simulated recording; start: ns since 1970."""
     session = lay_out(rig, inputs.plan, motion)
     write_bag(folder, rig, sense(rng, rig, session, inputs.scalars, change.faults), start)
 

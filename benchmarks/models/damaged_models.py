@@ -72,8 +72,11 @@ def write_models(folder: Path) -> dict[str, Path]:
 def models_of_every_kind() -> dict[str, PushModel]:
     """A small model of every kind, by kind."""
     table, rig = made_up_table(WINDOWS, 0), square_rig()
-    models = {kind: train_model(table, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
-    models["sparse"] = train_model(table, rig, "vhgp", name="sparse", options=TrainingOptions(inducing=15))
+    models = {
+        kind: train_model(table, rig, kind, name=kind, options=TrainingOptions(mean="zero"))
+        for kind in ("analytical", "gp", "vhgp")
+    }
+    models["sparse"] = train_model(table, rig, "vhgp", name="sparse", options=TrainingOptions(inducing=15, mean="zero"))
     on_corners = replace(rig, support_points=CORNERS)
     models["prior"] = train_model(empty_table(), on_corners, "prior", name="prior")
     drifting = extended_model(models["gp"], drifting_effect("contact_friction", 0.1))

@@ -156,7 +156,9 @@ def _simulated(bags: Path, kind: str, sizes: Sequence[int]) -> None:
         parts = []
         for seed in range(FOLDS):
             start = time.process_time()
-            model = train_model(train, rig, kind, name=kind, options=TrainingOptions(n_train=n, seed=seed, tails=False))
+            model = train_model(
+                train, rig, kind, name=kind, options=TrainingOptions(n_train=n, seed=seed, tails=False, mean="zero")
+            )
             parts.append(judged(model, test, time.process_time() - start))
         print(_row(n, parts), flush=True)
 

@@ -25,7 +25,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
@@ -80,7 +80,7 @@ def fitted_model(table: PushTable) -> PushModel:
 
 def informed_model(table: PushTable, kind: str) -> PushModel:
     """A learnt model of these windows about the same mechanics."""
-    options = TrainingOptions(about=MechanicsMean(eight_fitted(), 0.004))
+    options = TrainingOptions(about=eight_fitted())
     return train_model(table, square_rig(), kind, name="informed", options=options)
 
 

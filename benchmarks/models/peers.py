@@ -245,7 +245,7 @@ def square_rows(data: Path, folds: int = 1) -> list[Measured]:
 
 def fitted_mechanics(rig: Rig, known: PushTable) -> FittedMechanics:
     """The mean of an informed model of these rows."""
-    return fitted_mean(known, rig).mean.fitted
+    return fitted_mean(known, rig).mean
 
 
 def standardised(title: str, inputs: Array, outcomes: Array, training: IntArray, test: IntArray) -> Rows:

@@ -14,13 +14,16 @@
 
 """A prior model before the first push and after few, next to GP and VHGP trained on the same pushes.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.prior --bags bags --data FOLDER [--kinds prior gp vhgp] [--quick]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.prior --bags bags --data FOLDER --rigs 4 [--kinds prior gp vhgp]
+        [--pushes 0 5 10 20 50]
 
 --bags: the standard recordings of `simulate`; the square trains on square_abs_train, the other outlines on four of
 five folds of their few pushes. --data: the folder of the measured data: mit_square is split by push in five folds, the
-logs of mlab test the model before the first push, each on its own support. Training pushes are drawn at random, the
+logs of mlab test the model before the first push, each on its own support. --rigs: so many rigs of each of the
+simulators benchmarks/foreign and benchmarks/points_rig, before the first push. Training pushes are drawn at random, the
 same for all models. The reference of the NMSE is the mean of all training pushes that could have been drawn, the same
-for all models and n, or that of the test pushes where none can be drawn. Prints the tables of docs/results/prior.md.
+for all models and n, or that of the test pushes where none can be drawn. Prints the tables of docs/results/prior.md,
+and the coverage before the first push on average over rigs and on the worst.
 """
 
 from __future__ import annotations
@@ -37,6 +40,7 @@ import numpy as np
 from benchmarks.measured.informed import OWN_FOLDS, Case
 from benchmarks.measured.scores import WITHIN
 from benchmarks.measured.square import imported_square
+from benchmarks.models.rigs_at_speeds import session
 from push_predictor.evaluation.estimate import by_push, total_exact_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.splits import FOLDS, push_folds
@@ -49,6 +53,7 @@ from push_predictor.recordings.table import PushTable, empty_table
 
 PUSHES = (0, 5, 10, 20, 50)
 SQUARE_TRAINING, SQUARE_TESTS = "square_abs_train", ("square_abs_test", "square_abs_repeats")
+OTHER_PUSHES, OTHER_SPEED = 100, 0.02  # m/s: on rigs of other simulators
 SEEDS = 3  # draws of training pushes for the square
 HEAD = "| pushes | windows | model | NMSE (95 %) | exact NLPD (95 %) | within 95 % (dx dy dtheta) | CPU, s |"
 
@@ -59,27 +64,37 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
     parser.add_argument("--data", type=Path, help="the folder of the measured data")
     parser.add_argument("--kinds", nargs="+", choices=("prior", "gp", "vhgp"), default=("prior", "gp", "vhgp"))
-    parser.add_argument("--quick", action="store_true", help="0 and 5 pushes only")
+    parser.add_argument("--rigs", type=int, default=0, help="number of rigs of each other simulator")
+    parser.add_argument("--pushes", nargs="+", type=int, default=PUSHES)
     options = parser.parse_args(arguments)
-    sizes = PUSHES[:2] if options.quick else PUSHES
-    for name, cases in (*_simulated(options.bags), *_measured(options.data)):
+    before = {}
+    for name, cases in (*_simulated(options.bags), *_measured(options.data), *_others(options.rigs)):
         print(f"\n{name}\n\n{HEAD}\n{7 * '|---'}|")
-        for n in sizes:
+        for n in options.pushes:
             if all(n <= len(case.training.pushes) for case in cases):
-                _rows(cases, n, options.kinds)
+                scores = _rows(cases, n, options.kinds)
+                if not n and scores is not None:
+                    before[name] = float(scores.totals().coverage[0, :, WITHIN].mean())
+    if before:
+        worst = min(before, key=before.__getitem__)
+        mean = np.mean(list(before.values()))
+        print(f"\nBefore the first push, 95 % intervals cover {mean:.3f} on average over {len(before)} rigs,")
+        print(f"and at least {before[worst]:.3f} ({worst}).")
 
 
-def _rows(cases: Sequence[Case], n: int, kinds: Sequence[str]) -> None:
+def _rows(cases: Sequence[Case], n: int, kinds: Sequence[str]) -> PushScores | None:
+    """Print a row for each kind; the scores of the prior model."""
+    of_prior = None
     for kind in kinds:
         if n == 0 and kind != "prior":
             continue
         parts = [_scored(case, n, kind) for case in cases]
         windows = np.mean([windows for _, windows, _ in parts])
         cpu = np.mean([cpu for *_, cpu in parts])
-        print(
-            f"| {n} | {windows:.0f} | {kind} | {_cells(pooled([scores for scores, *_ in parts]))} | {cpu:.1f} |",
-            flush=True,
-        )
+        scores = pooled([scores for scores, *_ in parts])
+        print(f"| {n} | {windows:.0f} | {kind} | {_cells(scores)} | {cpu:.1f} |", flush=True)
+        of_prior = scores if kind == "prior" else of_prior
+    return of_prior
 
 
 def _cells(scores: PushScores) -> str:
@@ -124,6 +139,14 @@ def _measured(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
         logs = {path.stem: _loaded(path) for path in sorted(Path(work).glob("*.csv"))}
     for name, (table, rig) in logs.items():
         yield f"mlab {name}", [Case(empty_table(), table, rig, 0)]
+
+
+def _others(count: int) -> Iterator[tuple[str, list[Case]]]:
+    with tempfile.TemporaryDirectory() as work:
+        for simulator in ("foreign", "points"):
+            for number in range(count):
+                table, rig = session(simulator, number, 0, OTHER_PUSHES, (OTHER_SPEED,), Path(work))
+                yield f"{simulator} {number}", [Case(empty_table(), table, rig, 0)]
 
 
 def _folds(table: PushTable, rig: Rig) -> list[Case]:

@@ -40,7 +40,7 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated.table_accuracy import outside_pushes
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictPush
@@ -190,4 +190,4 @@ def trained_vhgp(count: int) -> PushModel:
     outcomes = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
     outcomes += rng.normal(size=(count, 3)) @ NOISE * (0.3 + np.abs(inputs[:, 2:]))
     table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
-    return train_model(table, rig, "vhgp", name=f"vhgp_{count}")
+    return train_model(table, rig, "vhgp", name=f"vhgp_{count}", options=TrainingOptions(mean="zero"))

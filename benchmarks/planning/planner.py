@@ -182,7 +182,7 @@ def trained() -> PushModel:
         "vhgp",
         name="vhgp",
         sources=[TRAINING.name],
-        options=TrainingOptions(tails=False),
+        options=TrainingOptions(tails=False, mean="zero"),
     )
 
 

@@ -51,7 +51,7 @@ from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
 from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import rollout
@@ -94,7 +94,13 @@ def main() -> int:
 
 def trained() -> PushModel:
     """Train the default VHGP on the training recording."""
-    return train_model(load_data([TRAINING], None), load_rig_for([TRAINING], None), "vhgp", name="square_abs")
+    return train_model(
+        load_data([TRAINING], None),
+        load_rig_for([TRAINING], None),
+        "vhgp",
+        name="square_abs",
+        options=TrainingOptions(mean="zero"),
+    )
 
 
 def _repeated(number: int, contact: float, angle: float, count: int) -> Repeats:

@@ -60,8 +60,8 @@ def make_pair(seed: int, number: int, training: int, later: int) -> Pair:
     truth["clean_ratio"] = clean_ratio(rig, after, ratio_seed, scenario.effects, scenario.noise_ratio)
     return Pair(
         rig,
-        _record(random, rig, before, Scenario("none")),
-        _record(random, rig, after, scenario),
+        record(random, rig, before, Scenario("none")),
+        record(random, rig, after, scenario),
         (start, start + np.ceil(before.stop[-1]) + gap),
         truth,
     )
@@ -79,7 +79,8 @@ def write_pair(pair: Pair, data: Path, truth: Path) -> None:
     os.replace(draft, truth / f"{number}.json")
 
 
-def _record(random: np.random.Generator, rig: Rig, session: Session, scenario: Scenario) -> Streams:
+def record(random: np.random.Generator, rig: Rig, session: Session, scenario: Scenario) -> Streams:
+    """Simulate a session and what its sensors measure."""
     noise = draw_noise(random, rig, session, scenario.noise_ratio)
     tracks = simulate(rig, session, noise, scenario.effects)
     if tracks.failed.any():

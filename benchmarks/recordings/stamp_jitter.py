@@ -36,7 +36,7 @@ from push_predictor.evaluation.alarm.scores import Calibration, alarm_state, cal
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
@@ -114,7 +114,9 @@ def _line(jitter: str, stamps: str, found: list[list[float]]) -> None:
 
 
 def _trained() -> PushModel:
-    return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square")
+    return train_model(
+        load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square", options=TrainingOptions(mean="zero")
+    )
 
 
 if __name__ == "__main__":

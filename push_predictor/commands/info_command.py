@@ -95,6 +95,7 @@ def _write_rig(options: argparse.Namespace) -> None:
 
 
 def _describe_model(path: Path) -> dict[str, object]:
+    from push_predictor.models.mean_words import mean_of, mean_parameters
     from push_predictor.models.store.model_file import load_model
 
     model = load_model(path)
@@ -108,6 +109,8 @@ def _describe_model(path: Path) -> dict[str, object]:
         "pushes": model.provenance.pushes,
         "sources": list(model.provenance.sources),
         "written_by": model.provenance.version,
+        "mean": mean_of(model.predictor),
+        "mean_parameters": mean_parameters(model.predictor),
         "velocity_range": _range(velocity),
         "angle_range": _range(angle),
         "covariates": list(model.training.covariates),

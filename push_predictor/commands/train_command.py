@@ -87,7 +87,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--mean",
         choices=MEANS,
         help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero). auto, the "
-        "default, takes the one that predicts held-out training pushes better",
+        "default, takes mechanics unless zero predicts held-out training pushes clearly better",
     )
     add_seed(parser, "--n-train and of the draws of a prior model")
     parser.add_argument(

@@ -62,7 +62,7 @@ def features_of(model: PushModel, push: Push) -> Features:
     if isinstance(base, GaussianProcessPredictor):
         parts.append(_of_functions(base, push, noise_sd))
         if base.mean is not None:
-            parts.append(_of_parameters(base.mean.fitted, push) / noise_sd[:, :, None])
+            parts.append(_of_parameters(base.mean, push) / noise_sd[:, :, None])
     elif isinstance(base, MechanicsPredictor | PriorPredictor):
         parts.append(_of_parameters(base.fitted, push) / noise_sd[:, :, None])
     if isinstance(extended := model.predictor, ExtendedPredictor):  # its scale is on noise and base alike
@@ -82,10 +82,12 @@ def _process_covariance(base: Predictor, push: Push) -> Array:
 
 
 def _of_functions(base: GaussianProcessPredictor, push: Push, noise_sd: Array) -> Array:
-    """Features (n, 3, q) of what the regressions learn; each has weights of its own."""
+    """Features (n, 3, q) of what the regressions learn; each has weights of its own.
+
+    What speeds beyond the training's add is not among them: a single push does not teach it.
+    """
     at = base.scaling.features(base.rig.outline, push.inputs)
-    size = np.ones(len(at)) if base.mean is None else base.mean.size(push)
-    unit = size[:, None] * base.reported_sd / noise_sd
+    unit = base.scaling.size(push.inputs, push.duration)[:, None] * base.reported_sd / noise_sd
     roots = [
         _root(unit[:, k, None] * regression.function_covariance(at) * unit[:, k])
         for k, regression in enumerate(base.regressions)
@@ -103,8 +105,9 @@ def _of_parameters(fitted: FittedMechanics, push: Push) -> Array:
     n = len(push.inputs)
     if not np.any(fitted.covariance):
         return np.zeros((n, 3, 0))
-    slopes = fitted.slopes(dict.fromkeys(fitted.values, np.zeros(n)), push)
-    return np.asarray(np.stack(list(slopes.values()), axis=2) @ _symmetric_root(fitted.covariance))
+    names = tuple(fitted.values)
+    slopes = fitted.shifted(names, np.zeros((n, len(names))), push)[1]
+    return np.asarray(slopes.transpose(0, 2, 1) @ _symmetric_root(fitted.covariance))
 
 
 def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:

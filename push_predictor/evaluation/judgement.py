@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.recordings.table import OUTPUTS
 
 LEVEL = 0.95  # of the intervals that are judged
@@ -65,7 +66,8 @@ def judged(metrics: Mapping[str, Any]) -> Judgement:
         action = f"Do not rely on its intervals. {TRACE}, or train the model on such pushes."
         return Judgement("too sure", f"The model is too sure: {evidence}.", action)
     if metrics["nmse"]["total"] is not None and metrics["nmse"]["total"] >= len(OUTPUTS):
-        sentence = f"The model predicts no better than the training mean; {evidence}."
+        reference = nmse_reference(int(metrics["n_train"]))
+        sentence = f"The model predicts no better than {reference}; {evidence}."
         action = "Check slider, frames and units with `push_predictor check`, or train the model on such pushes."
         return Judgement("no better than the mean", sentence, action)
     if pushes < FEWEST:

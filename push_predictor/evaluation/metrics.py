@@ -26,6 +26,11 @@ from push_predictor.types import Array
 COVERAGE_LEVELS = (0.5, 0.9, 0.95)
 
 
+def nmse_reference(n_train: int) -> str:
+    """In words, what has an NMSE of 1 for every output: without training windows there is no mean of their outcomes."""
+    return "the training mean" if n_train else "predicting no motion"
+
+
 def nmse(mean: Array, outcomes: Array, training_mean: Array) -> Array:
     """Squared error (k,) of predictions (n, k), divided by that of the training mean (k,)."""
     error = np.sum((outcomes - mean) ** 2, axis=0)

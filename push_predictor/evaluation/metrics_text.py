@@ -19,8 +19,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from push_predictor.evaluation.metrics import nmse_reference
+
 LEGEND = (
-    "NMSE: 0 is perfect, 1 is no better than the training mean. The total is their sum, so 3 for the training mean.",
+    "NMSE: 0 is perfect, 1 is no better than {reference}. The total is their sum, so 3 for {reference}.",
     "NLPD: nats per window in SI units, lower is better.",
     "exact NLPD: of the model's own predictive density; NLPD is of the Gaussian with the same moments.",
     "in 90 %: share of outcomes inside the predicted 90 % interval.",
@@ -39,7 +41,8 @@ def metrics_lines(metrics: Mapping[str, Any]) -> list[str]:
     interval = metrics["interval"]
     if interval["nmse"] is not None:
         lines.append(f"95 % intervals of the totals: NMSE {_range(interval['nmse'])}, NLPD {_range(interval['nlpd'])}")
-    return [*lines, *LEGEND]
+    reference = nmse_reference(metrics["n_train"])
+    return [*lines, *(line.format(reference=reference) for line in LEGEND)]
 
 
 def _output_line(metrics: Mapping[str, Any], name: str) -> str:

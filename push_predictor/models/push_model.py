@@ -28,6 +28,7 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
+from push_predictor.models.mean_words import mean_in_words
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import InputLimits, Moments, Predictor
 from push_predictor.models.push import Push
@@ -78,6 +79,7 @@ class PushModel:
         return (
             f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
             f"{self._training_in_words()}"
+            f"  mean: {mean_in_words(self.predictor)}\n"
             f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
             f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
         )

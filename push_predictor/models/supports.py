@@ -45,7 +45,7 @@ def _mechanics(base: BasePredictor) -> PushMechanics | None:
     if isinstance(base, MechanicsPredictor):
         return base.fitted.mechanics
     if isinstance(base, GaussianProcessPredictor) and base.mean is not None:
-        return base.mean.fitted.mechanics
+        return base.mean.mechanics
     return None
 
 
@@ -54,4 +54,4 @@ def _with_mechanics(base: BasePredictor, mechanics: PushMechanics) -> BasePredic
         return replace(base, fitted=replace(base.fitted, mechanics=mechanics))
     assert isinstance(base, GaussianProcessPredictor)
     assert base.mean is not None
-    return replace(base, mean=replace(base.mean, fitted=replace(base.mean.fitted, mechanics=mechanics)))
+    return replace(base, mean=replace(base.mean, mechanics=mechanics))

@@ -25,13 +25,12 @@ from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING
-from push_predictor.models.mechanics.fitted import analytical_mechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import (
     GaussianProcessPredictor,
-    MechanicsMean,
     MechanicsPredictor,
     Predictor,
     PriorPredictor,
@@ -63,18 +62,20 @@ class TrainingOptions:
     covariate `recording`, where recordings had others than the rig; used with fit.
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
     that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about
-    which the residual is learnt, zero, or auto for the better of both by held-out pushes (what the command and the
-    front door take). about: mechanics to learn about, as they are; mean is then not used. tails: of a learnt model:
-    whether to fit the distribution of new pushes (predictors/tails.py); without it, windows of a push are taken for
-    independent.
+    which the residual is learnt, zero, or auto, which takes mechanics unless zero predicts held-out pushes clearly
+    better. about: mechanics to learn about, as they are; mean is then not used. per_path: of a learnt model: whether
+    outcomes are learnt per path length of the tip (predictors/scaling.py); without it, as they are, as in Bauza and
+    Rodriguez 2017. tails: of a learnt model: whether to fit the distribution of new pushes (predictors/tails.py);
+    without it, windows of a push are taken for independent.
     """
 
     n_train: int | None = None
     seed: int = 0
     fit: bool = False
     inducing: int | None = None
-    mean: MeanChoice = "zero"
-    about: MechanicsMean | None = None
+    mean: MeanChoice = "auto"
+    about: FittedMechanics | None = None
+    per_path: bool = True
     supports: Mapping[int, Array] = field(default_factory=dict)
     tails: bool = True
 
@@ -138,7 +139,7 @@ def _predictor(
         watch("train prior", 0.1)
         return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
-        learnt = LearntOptions(kind, inducing, options.mean, options.tails)
+        learnt = LearntOptions(kind, inducing, options.mean, options.tails, options.per_path)
         if options.about is not None:
             return train_about(options.about, rows, rig, learnt), []
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
@@ -162,15 +163,20 @@ def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted on at most 1000 rows drawn evenly over the pushes. Mechanics keep their
-    parameters, alone and as the mean of a learnt model: a change of these is what a trace looks for. The covariance of
-    an analytical model is estimated again. The priors of a prior model are updated by the table. Raises TrainingError
-    for too few rows.
+    A learnt one is refitted, per path length or not as before, on at most 1000 rows drawn evenly over
+    the pushes. Mechanics keep their parameters, alone and as the mean of a learnt model: a change of these is what a
+    trace looks for. The covariance of an analytical model is estimated again. The priors of a prior model are updated
+    by the table. Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
-        tails = predictor.tails is not None
-        options = TrainingOptions(seed=seed, about=predictor.mean, tails=tails)
+        options = TrainingOptions(
+            seed=seed,
+            mean="zero",
+            about=predictor.mean,
+            per_path=predictor.scaling.travel is not None,
+            tails=predictor.tails is not None,
+        )
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor

@@ -24,7 +24,8 @@ import numpy as np
 from push_predictor.errors import TrainingError
 from push_predictor.models.features import push_features
 from push_predictor.models.gaussian_process.gp import SHORTEST, fit_gp
-from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant, held_out_score
+from push_predictor.models.gaussian_process.prediction import exact_log_density
+from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant
 from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.fit import fit_jointly, held_out_residuals
@@ -33,8 +34,9 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import candidates
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, Scaling
+from push_predictor.models.predictors import GaussianProcessPredictor, Scaling
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
+from push_predictor.models.predictors.scaling import within
 from push_predictor.models.predictors.tails_fit import fit_tails
 from push_predictor.models.push import Push
 from push_predictor.models.train_mechanics import fit_rows
@@ -50,6 +52,7 @@ CONSTANT = 1e-9  # a feature whose range is below this fraction of its size coun
 # and deviate together: with shorter ones a regression learns the push.
 SHORTEST_OF_RESIDUAL = 0.7
 QUASI_STATIC = 0.06  # m/s: below, inertia moves a slider by less than 2 % of its path, and costs two thirds of the time
+ONE_SPEED = 1.2  # ratio of speeds up to which they count as one
 EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by less
 
 
@@ -57,13 +60,14 @@ EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by
 class LearntOptions:
     """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
 
-    tails: whether to fit the distribution of new pushes.
+    tails: whether to fit the distribution of new pushes. per_path: whether outcomes are learnt per path length.
     """
 
     kind: str
     inducing: int | None = None
-    mean: MeanChoice = "zero"
+    mean: MeanChoice = "auto"
     tails: bool = True
+    per_path: bool = True
 
 
 def train_learnt(
@@ -71,37 +75,39 @@ def train_learnt(
 ) -> GaussianProcessPredictor:
     """The predictor trained on the rows; of_mean: those of them that the mechanics are fitted to.
 
-    With the mean `auto`, the kind of which held-out pushes of these are more likely. Raises TrainingError for outcomes
-    that do not vary, and for options that the kind does not have.
+    With the mean `auto`, these rows decide about it, by a GP of each: see `zero_is_better`. Raises TrainingError for
+    outcomes that do not vary, and for options that the kind does not have.
     """
     _check_rows(rows, rig)
     about = None
     if options.mean != "zero":
         watch(f"train {options.kind}: mechanics as mean", 0.0)
         about = fitted_mean(of_mean, rig)
-    if options.mean == "auto":
-        better = _better(about, of_mean, rig, options, watch)
-        if len(of_mean) == len(rows):
-            return _completed(better, rows, options, watch)
-        about = None if better.predictor.mean is None else about
-    begin = 0.4 if options.mean == "auto" else 0.1
-    trained = _trained(rows, rig, options, about, part_of(watch, begin, 0.9))
+    if about is not None and options.mean == "auto":
+        watch(f"train {options.kind}: choice of the mean", 0.2)
+        each = [_trained(of_mean, rig, replace(options, kind="gp", inducing=None), mean) for mean in (None, about)]
+        zero, mechanics = (trained.density(of_mean) for trained in each)
+        about = None if zero_is_better(zero, mechanics) else about
+    trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9))
     return _completed(trained, rows, options, watch)
 
 
-def _better(about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch) -> _Trained:
-    """The predictor with or without the mean, trained on the rows that it was fitted to: by their held-out pushes."""
-    plain = _trained(rows, rig, options, None, part_of(watch, 0.1, 0.25), scored=True)
-    informed = _trained(rows, rig, options, about, part_of(watch, 0.25, 0.4), scored=True)
-    return max(plain, informed, key=lambda trained: trained.score)
+def zero_is_better(zero: Array, mechanics: Array) -> bool:
+    """Whether the mean zero is better than mechanics by more than the standard error of the difference over pushes.
+
+    zero, mechanics (pushes,): log density of each held-out push, in nats. In the domain of the training both means are
+    often as good, but only mechanics know what happens outside of it. So a tie goes to mechanics, and so does a single
+    push.
+    """
+    gain = zero - mechanics
+    return len(gain) > 1 and bool(gain.sum() > np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
-def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
+def train_about(mean: FittedMechanics, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
     """The predictor of residuals about mechanics that were fitted to other rows. Raises as `train_learnt`."""
     _check_rows(rows, rig)
-    push = Push(rows.inputs, rows.duration, rows.covariates)
-    about = FittedMean(mean, mean.residuals(push, rows.outcomes))
-    return _completed(_trained(rows, rig, options, about, no_watch), rows, options, no_watch)
+    about = FittedMean(mean, rows.outcomes - _moved(mean, rows))
+    return _completed(_trained(rows, rig, options, about), rows, options, no_watch)
 
 
 def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch: Watch) -> GaussianProcessPredictor:
@@ -112,17 +118,17 @@ def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch
         return predictor
     watch(f"train {options.kind}: tails", 0.95)
     push = Push(rows.inputs, rows.duration, rows.covariates)
-    residual = predictor.without_mean().held_out_moments(push, _blocks(rows))
+    learnt = predictor.of_targets().held_out_moments(push, _blocks(rows))
     counts = [regression.parameters.count for regression in predictor.regressions]
-    tails = fit_tails(trained.observed - residual.mean, residual.covariance, rows.push_id, counts)
+    tails = fit_tails(trained.observed - learnt.mean, learnt.covariance, rows.push_id, counts)
     return replace(predictor, tails=tails)
 
 
 @dataclass(frozen=True, eq=False)
 class FittedMean:
-    """Mechanics as mean. residuals (m, 3): of the rows that it was fitted to, each push under a fit without it."""
+    """Mechanics as mean. residuals (m, 3): of the rows that it was fitted to, each push under a fit without it, SI."""
 
-    mean: MechanicsMean
+    mean: FittedMechanics
     residuals: Array
 
 
@@ -138,49 +144,73 @@ def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
     if float(rows.inputs[:, 0].max()) < QUASI_STATIC:
         names = [name for name in names if name != "inertia"]
     fit = fit_jointly(mechanics, known, names)
-    mean = MechanicsMean(FittedMechanics(mechanics, fit.values, fit.covariance), _mean_travel(rows))
-    push = Push(rows.inputs, rows.duration, rows.covariates)
-    return FittedMean(mean, held_out_residuals(mechanics, fit) / mean.size(push)[:, None])
+    return FittedMean(FittedMechanics(mechanics, fit.values, fit.covariance), held_out_residuals(mechanics, fit))
 
 
-def _mean_travel(rows: PushTable) -> float:
-    return float(np.mean(rows.inputs[:, 0] * rows.duration))
+def _moved(mean: FittedMechanics, rows: PushTable) -> Array:
+    return mean.displacement(rows.inputs, rows.duration, rows.covariates)
 
 
 @dataclass(frozen=True, eq=False)
 class _Trained:
-    """A predictor, what held-out training pushes showed it to learn, and how well it predicts these pushes.
+    """A predictor, and what held-out training pushes showed it to learn.
 
-    observed (n, 3): outcomes, or residuals about the mean as it is without the push, SI. score, where asked for: log
-    density of held-out training pushes (SI) less the hyperparameters.
+    observed (n, 3): outcomes, or residuals about the mean as it is without the push, SI, at a path of the scaling's
+    travel.
     """
 
     predictor: GaussianProcessPredictor
     observed: Array
-    score: float
+
+    def density(self, rows: PushTable) -> Array:
+        """Log density (pushes,) of each held-out training push, less its share of the hyperparameters, nats.
+
+        In units of what was learnt, at the same path length for all means.
+        """
+        predictor, block = self.predictor, _blocks(rows)
+        density = np.zeros(len(rows))
+        for regression, seen in zip(predictor.regressions, predictor.scaling.outcomes(self.observed).T, strict=True):
+            density += exact_log_density(regression.held_out(block), seen)
+        push = np.unique(rows.push_id, return_inverse=True)[1]
+        counts = sum(regression.parameters.count for regression in predictor.regressions)
+        units = float(np.log(predictor.scaling.outcome_sd).sum())
+        by_push = np.bincount(push, density - units)
+        return np.asarray(by_push - counts / len(by_push))
 
 
 def _trained(
-    rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch, *, scored: bool = False
+    rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch = no_watch
 ) -> _Trained:
-    push, mean = Push(rows.inputs, rows.duration, rows.covariates), None if about is None else about.mean
-    targets = rows.outcomes if mean is None else mean.residuals(push, rows.outcomes)
+    mean = None if about is None else about.mean
+    path = rows.inputs[:, 0] * rows.duration
+    size = (path / path.mean() if options.per_path else np.ones(len(path)))[:, None]
+    targets = (rows.outcomes if mean is None else rows.outcomes - _moved(mean, rows)) / size
     # With more rows than the mechanics are fitted to, these are as good as held out.
-    observed = about.residuals if about is not None and len(about.residuals) == len(rows) else targets
-    scaling = _scaling(rows, rig, targets, centred=mean is None)
+    observed = about.residuals / size if about is not None and len(about.residuals) == len(rows) else targets
+    speeds = _speeds(rows) if options.per_path else None
+    scaling = _scaling(rows, rig, targets, speeds, centred=mean is None)
+    if options.per_path:
+        scaling = replace(scaling, travel=float(path.mean()))
     features, block = scaling.features(rig.outline, rows.inputs), _blocks(rows)
     regressions: list[Regression] = []
-    score = 0.0 if mean is None else -len(OUTPUTS) * float(np.log(mean.size(push)).sum())
     for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
         watch(f"train {options.kind}: {OUTPUTS[k]}", k / len(OUTPUTS))
         regression = _learnt(features, column, options, SHORTEST if mean is None else SHORTEST_OF_RESIDUAL)
         if mean is not None:
             constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
             regression = best_held_out([constant, regression], block, seen)
-        if scored:
-            score += held_out_score(regression, block, seen) - len(rows) * float(np.log(scaling.outcome_sd[k]))
         regressions.append(regression)
-    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), observed, score)
+    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), observed)
+
+
+def _speeds(rows: PushTable) -> tuple[float, float]:
+    """Slowest and fastest speed of the pushes; single windows are noisy, and so are single pushes."""
+    push = np.unique(rows.push_id, return_inverse=True)[1]
+    of_push = np.bincount(push, rows.inputs[:, 0]) / np.bincount(push)
+    low, high = np.quantile(of_push, [0.05, 0.95])
+    if high < ONE_SPEED * low:
+        low = high = np.median(of_push)
+    return float(low), float(high)
 
 
 def _blocks(rows: PushTable) -> IntArray:
@@ -196,16 +226,18 @@ def _learnt(features: Array, column: Array, options: LearntOptions, shortest: fl
     return fit_sparse_vhgp(features, column, options.inducing)
 
 
-def _scaling(rows: PushTable, rig: Rig, targets: Array, *, centred: bool) -> Scaling:
+def _scaling(
+    rows: PushTable, rig: Rig, targets: Array, speeds: tuple[float, float] | None, *, centred: bool
+) -> Scaling:
     """centred: whether the mean of the targets (n, 3) is subtracted; a residual has mean zero."""
-    features = push_features(rig.outline, rows.inputs)
+    features = push_features(rig.outline, within(speeds, rows.inputs))
     columns = _varying(features)
     used = features[:, columns]
     if centred:
         mean, sd = targets.mean(axis=0), targets.std(axis=0)
     else:
         mean, sd = np.zeros(len(OUTPUTS)), np.sqrt(np.mean(targets**2, axis=0)) + EXACT * rows.outcomes.std(axis=0)
-    return Scaling(tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), mean, sd)
+    return Scaling(tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), mean, sd, speeds=speeds)
 
 
 def _check_rows(rows: PushTable, rig: Rig) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameter_draws import drawn_parameters, normal_draws, prior_draws
+from push_predictor.models.mechanics.parameter_draws import drawn_parameters, normal_draws, prior_draws, prior_spreads
 from push_predictor.models.mechanics.parameter_update import updated
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.process_noise import ProcessNoise
@@ -42,8 +42,7 @@ def prior_predictor(mechanics: PushMechanics, rig: Rig, seed: int = 0) -> PriorP
     known = {} if rig.contact_friction is None else {"contact_friction": rig.contact_friction}
     means = {name: known.get(name, BY_NAME[name].textbook) for name in names}
     within = {name: float(np.clip(mean, BY_NAME[name].low, BY_NAME[name].high)) for name, mean in means.items()}
-    spread = np.array([BY_NAME[name].spread for name in names])
-    fitted = FittedMechanics(mechanics, within, np.diag(spread**2))
+    fitted = FittedMechanics(mechanics, within, np.diag(prior_spreads(names) ** 2))
     return PriorPredictor(fitted, prior_draws(names, _values(within), seed), ProcessNoise())
 
 

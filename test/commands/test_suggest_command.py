@@ -31,7 +31,7 @@ from push_predictor.design.batch import Suggested, suggest_pushes
 from push_predictor.design.limits import Limits
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.types import Array
@@ -51,7 +51,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model file, a rig file, and a table of pushes that matter."""
     folder = tmp_path_factory.mktemp("suggest")
     table = noisy_pushes(60)
-    train_model(table, square_rig(), "gp", name="square").save(folder / "gp.pushmodel")
+    train_model(table, square_rig(), "gp", name="square", options=TrainingOptions(mean="zero")).save(
+        folder / "gp.pushmodel"
+    )
     save_rig(square_rig(), folder / "rig.yaml")
     write_table(folder / "steep.csv", table.take(table.inputs[:, 2] > 0.6))
     return folder

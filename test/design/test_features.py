@@ -34,7 +34,6 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
-    MechanicsMean,
     MechanicsPredictor,
 )
 from push_predictor.models.push import Push
@@ -49,7 +48,7 @@ TABLE = noisy_pushes(36)
 
 
 def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:
-    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**options))
+    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**{"mean": "zero", **options}))
 
 
 @cache
@@ -67,8 +66,9 @@ def fitted() -> FittedMechanics:
 
 
 def some(count: int = 40, seed: int = 3) -> Push:
+    """Pushes at speeds between those of the training."""
     rng = np.random.default_rng(seed)
-    inputs = np.column_stack([rng.uniform(0.01, 0.05, count), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    inputs = np.column_stack([rng.uniform(0.025, 0.035, count), rng.random(count), rng.uniform(-1.0, 1.0, count)])
     return Push(inputs, np.full(count, 0.2), {})
 
 
@@ -147,10 +147,10 @@ def within(name: str, value: float) -> tuple[float, float]:
 
 
 def test_residuals_and_mechanics_add_up() -> None:
-    model, push = trained("gp", about=MechanicsMean(fitted(), 0.004)), some()
+    model, push = trained("gp", about=fitted()), some()
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.mean is not None
     mean = model.predictor.mean
-    certain = replace(mean, fitted=replace(mean.fitted, covariance=0.0 * mean.fitted.covariance))
+    certain = replace(mean, covariance=0.0 * mean.covariance)
     residual = features_of(replace(model, predictor=replace(model.predictor, mean=certain)), push)
     both = features_of(model, push)
     of_mechanics = squares(both.values[:, :, residual.values.shape[2] :])

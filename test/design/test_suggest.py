@@ -41,7 +41,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_update import CORRELATION
-from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, PriorPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
@@ -82,14 +82,14 @@ def suggested(untrained: PushModel) -> Suggested:
 
 @pytest.fixture(scope="module")
 def learnt() -> PushModel:
-    return train_model(noisy_pushes(90), square_rig(), "gp", name="gp")
+    return train_model(noisy_pushes(90), square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero"))
 
 
-def few_pushes(count: int, about: MechanicsMean | None = None) -> PushModel:
+def few_pushes(count: int, about: FittedMechanics | None = None) -> PushModel:
     """A GP of so many pushes, about nothing or about mechanics."""
     table = noisy_pushes(90)
     rows = table.take(np.isin(table.push_id, table.pushes[:count]))
-    return train_model(rows, square_rig(), "gp", name="few", options=TrainingOptions(about=about))
+    return train_model(rows, square_rig(), "gp", name="few", options=TrainingOptions(mean="zero", about=about))
 
 
 def one_side(table: PushTable) -> PushTable:
@@ -176,7 +176,7 @@ class TestSuggestedPushes:
         assert _spread_evenly(few_pushes(FIRST), 2) == [None, None]
         rig = square_rig()
         mechanics = FittedMechanics(PushMechanics(rig.outline, rig.pusher_radius), {"contact_friction": 0.25})
-        assert _spread_evenly(few_pushes(4, MechanicsMean(mechanics, 0.004)), 2) == [None, None]
+        assert _spread_evenly(few_pushes(4, mechanics), 2) == [None, None]
 
     def test_of_a_prior_model_are_spread_evenly_from_the_sixth_on(self, untrained: PushModel) -> None:
         short = Limits(travel=0.004)
@@ -188,7 +188,9 @@ class TestSuggestedPushes:
         assert _spread_evenly(many, 2) == [4, 5]  # after its last candidate the sequence starts again
 
     def test_are_where_the_model_was_not_trained(self) -> None:
-        known = train_model(one_side(noisy_pushes(90)), square_rig(), "gp", name="one side")
+        known = train_model(
+            one_side(noisy_pushes(90)), square_rig(), "gp", name="one side", options=TrainingOptions(mean="zero")
+        )
         found = suggest_pushes(known, 5, Limits(angle=(-1.0, 1.0)))
         assert np.mean(found.inputs[:, 2] < 0.0) >= 0.8
         assert 0.0 < found.variance_left[-1] < found.variance_left[0] < 1.0
@@ -228,7 +230,9 @@ class TestSuggestedPushes:
         assert noise[0, 1, 2, 0] == 0.0
 
     def test_the_windows_of_a_learnt_model_correlate_as_its_residuals_do(self) -> None:
-        known = train_model(drifting_pushes(40), square_rig(), "gp", name="shared")
+        known = train_model(
+            drifting_pushes(40), square_rig(), "gp", name="shared", options=TrainingOptions(mean="zero")
+        )
         tried = courses(known, np.array([[0.02, 0.1, 0.3]]), 0.012)
         found = information_of(known, tried, Push(tried.inputs[0], np.full(3, 0.2), {}))
         noise = found.noise[0].reshape(3, 3, 3, 3)
@@ -263,7 +267,10 @@ class TestSuggestedPushes:
 
     def test_an_extended_model_needs_its_covariates(self) -> None:
         table = drifting_pushes(40)
-        model = extended(train_model(table, square_rig(), "gp", name="base"), slippery(0.1, 0.05))
+        model = extended(
+            train_model(table, square_rig(), "gp", name="base", options=TrainingOptions(mean="zero")),
+            slippery(0.1, 0.05),
+        )
         with pytest.raises(RequestError, match="covariate elapsed_time"):
             suggest_pushes(model, 2)
         assert len(suggest_pushes(model, 2, covariates={"elapsed_time": 900.0})) == 2

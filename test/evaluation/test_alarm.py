@@ -43,7 +43,7 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import retrain_model, train_model
+from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -186,7 +186,10 @@ def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     table = made_up(80, 0)
-    return {kind: train_model(table, square_rig(), kind, name=kind) for kind in ("analytical", "gp")}
+    return {
+        kind: train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
+        for kind in ("analytical", "gp")
+    }
 
 
 def alarm_of(model: PushModel, table: PushTable):
@@ -246,7 +249,7 @@ def test_effects_are_kept_while_the_base_is_refitted_without_them(models: dict[s
 
 
 def test_hyperparameters_are_kept_where_half_the_rows_are_too_few_to_refit_them():
-    model = train_model(made_up(12, 3, windows=1), square_rig(), "gp", name="few")
+    model = train_model(made_up(12, 3, windows=1), square_rig(), "gp", name="few", options=TrainingOptions(mean="zero"))
     kept = model.held_out_moments(push_folds(model.training, FOLDS))
     assert np.array_equal(held_out_moments(model)[0], kept.mean)
     assert calibrate(model).scores.shape[0] == 12

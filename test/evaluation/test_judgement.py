@@ -29,7 +29,7 @@ ALARM: dict[str, Any] = {"fired": False}
 def metrics(share: float, pushes: int = 100, nmse: float = 0.2, **alarm: object) -> dict[str, Any]:
     """Metrics of a recording with this share of the outcomes inside 95 % intervals."""
     coverage = {"0.95": {"dx": share - 0.01, "dy": share, "dtheta": share + 0.01}}
-    return {"n_pushes": pushes, "coverage": coverage, "nmse": {"total": nmse}, "alarm": ALARM | alarm}
+    return {"n_train": 60, "n_pushes": pushes, "coverage": coverage, "nmse": {"total": nmse}, "alarm": ALARM | alarm}
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from push_predictor.recordings.load import load_data, load_rig_for
 @pytest.mark.long
 def test_example_reaches_the_region(capsys, tmp_path):
     recording, path = [plan_around_obstacles.TRAINING], tmp_path / "gp.pushmodel"
-    few = TrainingOptions(n_train=200)
+    few = TrainingOptions(n_train=200, mean="zero")
     save_model(train_model(load_data(recording), load_rig_for(recording), "gp", name="gp", options=few), path)
     assert plan_around_obstacles.main(["--model", str(path)]) == 0
     said = capsys.readouterr().out

@@ -67,7 +67,11 @@ def model(tmp_path_factory) -> Path:
     recording = [plan_pushes.TRAINING]
     save_model(
         train_model(
-            load_data(recording), load_rig_for(recording), "gp", name="gp", options=TrainingOptions(n_train=200)
+            load_data(recording),
+            load_rig_for(recording),
+            "gp",
+            name="gp",
+            options=TrainingOptions(n_train=200, mean="zero"),
         ),
         path,
     )

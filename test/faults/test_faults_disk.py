@@ -46,7 +46,7 @@ from push_predictor.evaluation.report.page import write_validation_report
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online import trace_process
 from push_predictor.recordings import atomic
 from push_predictor.recordings.atomic import write_whole
@@ -94,7 +94,7 @@ def table(rows: int) -> PushTable:
 
 @pytest.fixture(scope="module")
 def model() -> PushModel:
-    return train_model(noisy_pushes(60), square_rig(), "gp", name="m")
+    return train_model(noisy_pushes(60), square_rig(), "gp", name="m", options=TrainingOptions(mean="zero"))
 
 
 def bag(path: Path, count: int, compression: str = "none") -> None:

@@ -63,7 +63,10 @@ in_a_process = partial(node_process, "push_validator")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path, data = tmp_path_factory.mktemp("model") / "gp.pushmodel", [HEXAGON]
     save_model(
-        train_model(load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=30)), path
+        train_model(
+            load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=30, mean="zero")
+        ),
+        path,
     )
     return path
 

@@ -104,7 +104,9 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
 def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours(tmp_path: Path):
     """The long form: 24 recorded hours. A few seconds are too short for memory."""
     data = [HEXAGON]
-    model = train_model(load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=40))
+    model = train_model(
+        load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=40, mean="zero")
+    )
     save_model(model, tmp_path / "gp.pushmodel")
     done = benchmark(
         "endurance", "--minutes", "0.14", "--rate", "10", "--every", "0.1", "--warm-up", "0.1", "--most-growth", "60",

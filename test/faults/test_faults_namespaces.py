@@ -124,7 +124,7 @@ def _models(folder: Path) -> dict[str, Path]:
     for cell, recording in CELLS.items():
         data = [recording]
         model = train_model(
-            load_data(data), load_rig_for(data), "gp", name="robot", options=TrainingOptions(n_train=30)
+            load_data(data), load_rig_for(data), "gp", name="robot", options=TrainingOptions(n_train=30, mean="zero")
         )
         paths[cell] = folder / f"{cell.strip('/')}.pushmodel"
         save_model(model, paths[cell])

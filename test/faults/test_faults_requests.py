@@ -46,7 +46,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import FARTHEST, PushRequest, check_request, check_requests
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.parameters import Param, declare
 from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
@@ -68,7 +68,10 @@ TABLES = {
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     rows, rig = pushes(25), square_rig()
-    found = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "vhgp")}
+    found = {
+        kind: train_model(rows, rig, kind, name=kind, options=TrainingOptions(mean="zero"))
+        for kind in ("analytical", "vhgp")
+    }
     return {
         **found,
         "drifting": replace(extended(found["vhgp"], slippery(0.1, 0.05)), name="drifting"),

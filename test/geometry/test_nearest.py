@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from push_predictor.geometry.nearest import nearest_on
 from synthetic import triangle
 
-from push_predictor.geometry.nearest import nearest_on
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 

@@ -47,7 +47,7 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.files.window_log import window_log
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
@@ -163,7 +163,10 @@ def served(
     runs = [imported[HEXAGON]] if slider == "hex" else block_runs(imported, slider)[:3]
     table = load_data(runs, None, WindowOptions(stride=0.01 if slider == "hex" else None))
     rig, folder, domain = load_rig_for(runs), tmp_path_factory.mktemp("models"), free_domain()
-    models = {f"{slider}_{kind}": train_model(table, rig, kind, name=f"{slider}_{kind}") for kind in kinds}
+    models = {
+        f"{slider}_{kind}": train_model(table, rig, kind, name=f"{slider}_{kind}", options=TrainingOptions(mean="zero"))
+        for kind in kinds
+    }
     for name, model in models.items():
         save_model(model, folder / f"{name}.pushmodel")
     with hosted_node("predict_server", domain=domain, params={"models": [str(folder)]}) as node:

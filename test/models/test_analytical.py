@@ -22,16 +22,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from push_predictor.models.mechanics.analytical import ACCURACY, AnalyticalPush, fit_analytical
+from push_predictor.models.mechanics.limit_surface import Support, contact_force, uniform_support
+from push_predictor.models.mechanics.motion.recorded_push import TruePush
 from support_points import support_of_points
 
 from push_predictor.errors import RequestError, RigError, TrainingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square, transformed
-from push_predictor.models.mechanics.analytical import ACCURACY, AnalyticalPush, fit_analytical
 from push_predictor.models.mechanics.forward import Motion
-from push_predictor.models.mechanics.limit_surface import Support, contact_force, uniform_support
-from push_predictor.models.mechanics.motion.recorded_push import TruePush
 from push_predictor.models.mechanics.parameters import RowValues
 from push_predictor.models.mechanics.pressure import patch
 

@@ -22,17 +22,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import triangle
-
-from push_predictor.errors import RequestError
 from push_predictor.geometry.nearest import nearest_on
-from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import shape_outline, transformed
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP
 from push_predictor.models.mechanics.scalar.mechanics import FEW
+from synthetic import triangle
+
+from push_predictor.errors import RequestError
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline, transformed
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array
 

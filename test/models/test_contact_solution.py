@@ -22,13 +22,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from supports import FOUR_POINTS, THREE_POINTS
-
-from push_predictor.geometry.shapes import square
 from push_predictor.models.mechanics.limit_surface import contact_force
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, TwistOf, driven, driven_on_ellipsoid
+from supports import FOUR_POINTS, THREE_POINTS
+
+from push_predictor.geometry.shapes import square
 from push_predictor.models.mechanics.pressure import patch
 from push_predictor.types import Array
 

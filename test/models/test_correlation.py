@@ -26,6 +26,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import square_rig
 
 from push_predictor.errors import ModelFileError
@@ -33,11 +34,10 @@ from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
@@ -63,7 +63,9 @@ def pushes(n: int, seed: int, strength: float) -> PushTable:
 
 
 def trained(kind: str = "gp", strength: float = 0.8, n: int = 300) -> PushModel:
-    return train_model(pushes(n, 0, strength), square_rig(), kind, name="a", options=TrainingOptions(tails=False))
+    return train_model(
+        pushes(n, 0, strength), square_rig(), kind, name="a", options=TrainingOptions(tails=False, mean="zero")
+    )
 
 
 trained_once = cache(trained)

@@ -29,7 +29,7 @@ from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push import Push
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
@@ -112,7 +112,11 @@ def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units(
     outcomes = rng.standard_normal((n, 3)) * [1e-3, 1e-3, 1e-2] + [4e-3, 0.0, 0.0]
     push_id = np.array([f"push-{k // 4}" for k in range(n)])
     predictor = train_model(
-        PushTable(inputs, np.full(n, 0.2), outcomes, push_id), square_rig(), "gp", name="gp"
+        PushTable(inputs, np.full(n, 0.2), outcomes, push_id),
+        square_rig(),
+        "gp",
+        name="gp",
+        options=TrainingOptions(mean="zero"),
     ).predictor
     assert isinstance(predictor, GaussianProcessPredictor)
     block = np.arange(n) // 4 % BLOCKS
@@ -127,7 +131,7 @@ def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units(
 
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_push_model_holds_out_one_push_by_default(kind: str) -> None:
-    model = train_model(noisy_pushes(60), square_rig(), kind, name=kind)
+    model = train_model(noisy_pushes(60), square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
     push = np.unique(model.training.push_id, return_inverse=True)[1]
     for found, expected in zip(model.held_out_moments(), model.held_out_moments(push), strict=True):
         np.testing.assert_array_equal(found, expected)
@@ -137,7 +141,7 @@ def test_push_model_holds_out_one_push_by_default(kind: str) -> None:
 
 
 def test_held_out_moments_of_extended_model_include_its_effects() -> None:
-    base = train_model(pushes(20), square_rig(), "gp", name="gp")
+    base = train_model(pushes(20), square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero"))
     model, rows = extended(base, slippery(0.2, 0.05)), base.training
     shift = model.predictor.shift(Push(rows.inputs, rows.duration, rows.covariates))
     found, plain = model.held_out_moments(), base.held_out_moments()

@@ -25,6 +25,9 @@ import numpy as np
 import pytest
 from coarse import coarse_effects
 from drifting_models import pushes
+from push_predictor.models.tabulated.effect_tables import accuracy, build
+from push_predictor.models.tabulated.effect_tables.axes import change_axes
+from push_predictor.models.tabulated.effect_tables.table import EffectTable
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis
@@ -33,14 +36,11 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import table_cache
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated.effect_tables import accuracy, build
-from push_predictor.models.tabulated.effect_tables.axes import change_axes
-from push_predictor.models.tabulated.effect_tables.table import EffectTable
 from push_predictor.models.tabulated.table_accuracy import TableAccuracy, relative_error
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 from push_predictor.models.train import TrainingOptions, train_model
@@ -104,7 +104,7 @@ def base(kind: str) -> PushModel:
         model = train_model(rows, square_rig(), "analytical", name=kind)
         covariance = np.diag(np.array([1e-4, 1e-4, 3e-3]) ** 2)
         return model if kind == "analytical" else replace(model, predictor=MechanicsPredictor(fitted, covariance))
-    options = TrainingOptions(about=MechanicsMean(fitted, 0.004)) if kind == "about mechanics" else TrainingOptions()
+    options = TrainingOptions(about=fitted) if kind == "about mechanics" else TrainingOptions(mean="zero")
     return train_model(rows, square_rig(), "gp", name=kind, options=options)
 
 

@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drifting_models import DRIFT, extended, physics, pushes, slippery
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.effects.exact import Mechanics, joint, joint_shift, joint_shifts, undisturbed
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME

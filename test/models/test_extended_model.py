@@ -29,6 +29,7 @@ import ros_harness as harness
 from coarse import coarse_effects
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, physics, pushes, slippery
 from hosted_nodes import hosted_node
+from push_predictor.models.tabulated.effect_tables import build
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -40,19 +41,18 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
 from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated import tabulated_prior
-from push_predictor.models.tabulated.effect_tables import build
 from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
@@ -91,7 +91,14 @@ def small_tables() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def bases() -> dict[str, PushModel]:
     models = {
-        kind: train_model(pushes(16 if kind == "prior" else 25), square_rig(), kind, name=f"a_{kind}") for kind in KINDS
+        kind: train_model(
+            pushes(16 if kind == "prior" else 25),
+            square_rig(),
+            kind,
+            name=f"a_{kind}",
+            options=TrainingOptions(mean="zero"),
+        )
+        for kind in KINDS
     }
     prior = models["prior"].predictor
     assert isinstance(prior, PriorPredictor)

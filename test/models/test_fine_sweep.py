@@ -20,10 +20,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
 from push_predictor.models.mechanics.motion.fine_sweep import AFTER, DIFFERENCE, KindRateOf, KindRates, swept_finely
 from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, swept
 from push_predictor.models.mechanics.scalar import sweep as scalar
+
 from push_predictor.types import Array, IntArray
 
 ACCURACY, LENGTH, TRAVEL = 1e-4, 0.03, 0.02

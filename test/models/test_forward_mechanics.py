@@ -23,15 +23,15 @@ import pytest
 from forward_pushes import IN_METRES, RADIUS, SQUARE, ellipsoid, mechanics, one, pushes, size
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.sweep import Rates, swept
 from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import EXPONENT_KNOTS, PushMechanics
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.sweep import Rates, swept
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, MechanicsParameter
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.types import Array, IntArray

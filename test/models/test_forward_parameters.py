@@ -21,12 +21,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from forward_pushes import IN_METRES, RADIUS, SQUARE, mechanics, moved, one, pushes, size
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from supports import THREE_POINTS
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution

@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from synthetic import RADIUS, square_rig
 
+from push_predictor.models import train, train_learnt
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import fit_gp
@@ -31,13 +32,13 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, bes
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
 from push_predictor.models.push import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, MechanicsMean, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
-from push_predictor.models.train_learnt import fitted_mean
+from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
@@ -84,7 +85,7 @@ def with_function() -> PushModel:
     table = pushes(40, 1)
     outcomes = table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])
     mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), TRUE, 1e-6 * np.eye(3))
-    options = TrainingOptions(about=MechanicsMean(mechanics, 0.004))
+    options = TrainingOptions(about=mechanics)
     return train_model(replace(table, outcomes=outcomes), RIG, "gp", name="m", options=options)
 
 
@@ -114,6 +115,43 @@ def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: Pu
     again = load_model(tmp_path / "sparse.pushmodel").predict_rows(later.inputs, later.duration)
     np.testing.assert_allclose(again.mean, found.mean, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-6)
+
+
+def test_a_tie_goes_to_mechanics_and_so_does_what_pushes_cannot_decide() -> None:
+    zero, rng = np.zeros(40), np.random.default_rng(0)
+    assert not zero_is_better(zero, zero)
+    assert not zero_is_better(np.array([5.0]), np.array([0.0]))
+    noise = rng.standard_normal(40)
+    noise -= noise.mean()
+    error = noise.std(ddof=1) / np.sqrt(40)
+    assert not zero_is_better(noise + 0.9 * error, zero)
+    assert zero_is_better(noise + 1.1 * error, zero)
+    assert not zero_is_better(zero, noise + 1.1 * error)
+
+
+def test_auto_is_decided_by_held_out_pushes_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same pushes under both means, one number a push; the answer is followed, with few rows and with many."""
+    seen: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def answer(zero: np.ndarray, mechanics: np.ndarray) -> bool:
+        seen.append((zero, mechanics))
+        return better
+
+    monkeypatch.setattr(train_learnt, "zero_is_better", answer)
+    table = pushes(40, 3)
+    for most, better in ((500, True), (500, False), (20, True), (20, False)):
+        monkeypatch.setattr(train, "MOST_MEAN_ROWS", most)
+        predictor = learnt(trained(table, "gp", mean="auto"))
+        assert (predictor.mean is None) == better
+        assert len(predictor.regressions[0].outputs) == 40
+    assert [zero.shape for zero, _ in seen] == [mechanics.shape for _, mechanics in seen]
+    assert [len(zero) for zero, _ in seen] == [20, 20, *2 * [len(set(drawn(table, 20).push_id))]]
+    # The densities are in the same units: with mechanics these pushes are more likely, by nats, not by orders.
+    assert 0.0 < float(np.mean(seen[0][1] - seen[0][0])) < 20.0
+
+
+def drawn(table: PushTable, count: int) -> PushTable:
+    return table.take(train.training_rows(replace(table), None, 0, count))
 
 
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
@@ -168,7 +206,7 @@ def test_covariates_of_the_mechanics_bound_the_domain_of_the_table_too() -> None
     table = pushes(40, 1)
     heading = np.linspace(0.0, 0.5, len(table))
     mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.15, "grain_x": 0.3})
-    options = TrainingOptions(about=MechanicsMean(mechanics, 0.004))
+    options = TrainingOptions(about=mechanics)
     model = train_model(replace(table, covariates={"push_heading": heading}), RIG, "gp", name="m", options=options)
     served, given = tabulate(model), np.array([0.2, 2.0])
     assert served.tabulated, served.how
@@ -210,7 +248,7 @@ def test_a_shift_of_prediction_and_outcome_leaves_the_density(informed: PushMode
 def test_it_needs_no_covariate_that_requests_lack() -> None:
     table = pushes(12, 13)
     headed = replace(table, covariates={"push_heading": np.linspace(-3.0, 3.0, 12)})
-    assert fitted_mean(headed, RIG).mean.fitted.needs == ()
+    assert fitted_mean(headed, RIG).mean.needs == ()
 
 
 def test_retrained_it_keeps_its_mean_and_learns_the_residual_again(informed: PushModel) -> None:
@@ -218,8 +256,19 @@ def test_retrained_it_keeps_its_mean_and_learns_the_residual_again(informed: Pus
     table = replace(table, outcomes=table.outcomes + [1e-3, 0.0, 0.0])
     again, mean = learnt(retrain_model(informed, table)), learnt(informed).mean
     assert again.mean is mean and mean is not None
-    push = Push(table.inputs, table.duration, {})
-    np.testing.assert_allclose(again.targets, mean.residuals(push, table.outcomes), rtol=1e-9, atol=1e-12)
+    path = table.inputs[:, :1] * 0.2
+    residual = (table.outcomes - mean.displacement(table.inputs, table.duration)) * path.mean() / path
+    np.testing.assert_allclose(again.targets, residual, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("per_path", (True, False))
+def test_retrained_without_mechanics_it_learns_what_it_did(per_path: bool) -> None:
+    table = pushes(30, 10, (0.02, 0.05))
+    plain = trained(table, "gp", mean="zero", per_path=per_path)
+    again = learnt(retrain_model(plain, table))
+    assert again.mean is None
+    np.testing.assert_allclose(again.targets, learnt(plain).targets, rtol=1e-12)
+    assert np.allclose(again.targets, table.outcomes, rtol=1e-9, atol=0.0) == (not per_path)
 
 
 def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:

@@ -19,13 +19,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from forward_pushes import SQUARE
-from supports import THREE_POINTS
-
 from push_predictor.models.mechanics.limit_surfaces.direction_dependence import root_of
 from push_predictor.models.mechanics.limit_surfaces.load_map import load_map
 from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
 from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
+from supports import THREE_POINTS
+
 from push_predictor.models.mechanics.pressure import patch
 from push_predictor.types import Array
 

@@ -20,6 +20,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from push_predictor.models.mechanics.limit_surface import uniform_support
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
@@ -27,8 +29,6 @@ from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_r
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation
 from push_predictor.models.mechanics.ladder import Rung, candidates, climb, worthwhile
-from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 
 pytestmark = pytest.mark.usefixtures("coarse_integration")
 

@@ -21,17 +21,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.perturbed import Change, State, displaced, no_change
 from repository import REPOSITORY
 from scipy.optimize import fsolve
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism, Push
-from push_predictor.models.mechanisms.perturbed import Change, State, displaced, no_change
 from push_predictor.recordings.table import PushTable
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
 

@@ -25,9 +25,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from push_predictor.models.mechanics.analytical import ACCURACY
 
 from push_predictor.errors import ModelFileError
-from push_predictor.models.mechanics.analytical import ACCURACY
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,

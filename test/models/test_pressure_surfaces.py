@@ -22,16 +22,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from supports import FOUR_POINTS, THREE_POINTS, TWO_POINTS
-
-from push_predictor.errors import RigError
-from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
 from push_predictor.models.mechanics.limit_surface import uniform_support
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
 from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist, twist_of_load
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
 from push_predictor.models.mechanics.limit_surfaces.surfaces import DIRECTIONS, PowerSurface, spread_by_direction
+from supports import FOUR_POINTS, THREE_POINTS, TWO_POINTS
+
+from push_predictor.errors import RigError
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch, supported_at
 from push_predictor.types import Array
 

@@ -30,7 +30,7 @@ from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements
+from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements, prior_spreads
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.mechanics.process_noise import ProcessNoise
@@ -118,7 +118,7 @@ def test_intervals_cover_outcomes_of_sliders_drawn_from_the_priors(untrained: Pu
     predictor, rng = predictor_of(untrained), np.random.default_rng(5)
     names = tuple(predictor.fitted.values)
     table = [BY_NAME[name] for name in names]
-    sliders = rng.normal([p.textbook for p in table], [p.spread for p in table], (400, len(names)))
+    sliders = rng.normal([p.textbook for p in table], prior_spreads(names), (400, len(names)))
     sliders = sliders[np.all((sliders > [p.low for p in table]) & (sliders < [p.high for p in table]), axis=1)]
     inputs, duration = some_inputs(15, 0), np.full(15, 0.2)
     found = displacements(predictor.fitted.mechanics, names, sliders, inputs, duration, {})
@@ -149,7 +149,7 @@ def test_estimates_are_the_most_probable_given_priors_and_pushes(untrained: Push
     precision = np.linalg.inv(after_ten.predict_rows(rows.inputs, rows.duration).process_covariance) / 1.5
 
     names = tuple(means)
-    spread = np.array([BY_NAME[name].spread for name in names])
+    spread = prior_spreads(names)
     found = np.array([predictor.fitted.values[name] for name in names])
     steps = 0.4 * np.concatenate([np.zeros((1, len(names))), np.eye(len(names)), -np.eye(len(names))])
     tried = found + steps * spread
@@ -206,7 +206,7 @@ def test_estimates_stay_within_the_plausible_ranges() -> None:
     mechanics = PushMechanics(RIG.outline, RIG.pusher_radius, supported_at(CORNERS))
     inputs, duration = some_inputs(24, 9), np.full(24, 0.2)
     none, some = (mechanics.displacement({"contact_friction": value}, inputs, duration) for value in (0.0, 0.2))
-    beyond = none + 0.5 * (none - some)  # as if friction were negative
+    beyond = none + (none - some)  # as if friction were negative
     predictor = predictor_of(trained(PushTable(inputs, duration, beyond, np.arange(24).astype(str))))
     assert predictor.fitted.values["contact_friction"] == 0.0
     for k, name in enumerate(predictor.fitted.values):

@@ -44,7 +44,15 @@ pytestmark = pytest.mark.usefixtures("coarse_integration")
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     return {
-        kind: train_model(noisy_pushes(75), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
+        kind: train_model(
+            noisy_pushes(75),
+            square_rig(),
+            kind,
+            name=f"a_{kind}",
+            sources=["made up"],
+            options=TrainingOptions(mean="zero"),
+        )
+        for kind in KINDS
     }
 
 
@@ -112,12 +120,19 @@ def test_a_number_of_rows_is_drawn_by_the_seed() -> None:
 def test_constant_inputs_are_dropped_and_constant_outcomes_rejected() -> None:
     table = noisy_pushes(60)
     table.inputs[:, 0] = 0.02
-    assert len(train_model(table, square_rig(), "gp", name="g").predictor.scaling.columns) == 2
+    assert (
+        len(
+            train_model(
+                table, square_rig(), "gp", name="g", options=TrainingOptions(mean="zero")
+            ).predictor.scaling.columns
+        )
+        == 2
+    )
     table.outcomes[:, 1] = 0.0
     with pytest.raises(TrainingError, match="dy: does not vary"):
-        train_model(table, square_rig(), "gp", name="g")
+        train_model(table, square_rig(), "gp", name="g", options=TrainingOptions(mean="zero"))
     with pytest.raises(TrainingError, match="'forest' is not accepted"):
-        train_model(table, square_rig(), "forest", name="g")
+        train_model(table, square_rig(), "forest", name="g", options=TrainingOptions(mean="zero"))
 
 
 @pytest.mark.parametrize(

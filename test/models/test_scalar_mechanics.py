@@ -21,21 +21,21 @@ from functools import cache
 
 import numpy as np
 import pytest
-from supports import FOUR_POINTS, THREE_POINTS
-
 from push_predictor.geometry.nearest import contact_on
-from push_predictor.geometry.shapes import shape_outline, transformed
-from push_predictor.models.mechanics.fitted import NO_CHANGES, FittedMechanics
-from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.contact_solution import RESTS
-from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.mechanics.scalar.contact import (
     LastContact,
     driven_on_ellipsoid,
     driven_scalar,
 )
 from push_predictor.models.mechanics.scalar.mechanics import FEW, scalar_mechanics
+from supports import FOUR_POINTS, THREE_POINTS
+
+from push_predictor.geometry.shapes import shape_outline, transformed
+from push_predictor.models.mechanics.fitted import NO_CHANGES, FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.types import Array
 
 SQUARE = shape_outline("rect1")

@@ -20,17 +20,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import square_rig
 
 from push_predictor.models.effects import scalar_shift
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, mechanism_named
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
+from push_predictor.models.push import Push
 from push_predictor.types import Array
 
 PHYSICS = AnalyticalPush(square_rig().outline, square_rig().pusher_radius, 0.25)

@@ -218,7 +218,9 @@ def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
 @pytest.mark.slow
 def test_sparse_push_model_is_trained_saved_loaded_and_tabulated(tmp_path: Path) -> None:
     rows = table(400)
-    model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=20))
+    model = train_model(
+        rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=20, mean="zero")
+    )
     assert isinstance(model.predictor, GaussianProcessPredictor)
     assert all(isinstance(regression, SparseVHGP) for regression in model.predictor.regressions)
     save_model(model, tmp_path / "sparse.pushmodel")

@@ -47,7 +47,7 @@ from push_predictor.models.store.table_cache import (
 )
 from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import empty_table
 
 pytestmark = pytest.mark.usefixtures("coarse_integration")
@@ -64,7 +64,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="module")
 def model() -> PushModel:
     """A small VHGP."""
-    return train_model(noisy_pushes(45), square_rig(), "vhgp", name="small")
+    return train_model(noisy_pushes(45), square_rig(), "vhgp", name="small", options=TrainingOptions(mean="zero"))
 
 
 @pytest.fixture

@@ -24,12 +24,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.regression import fit_constant
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
@@ -49,7 +49,7 @@ from push_predictor.models.tabulated.table_accuracy import (
 )
 from push_predictor.models.tabulated.tabulated_domain import FASTEST, tabulated_domain, wide_box
 from push_predictor.models.tabulated.tabulated_model import REFINEMENTS, TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -75,9 +75,9 @@ def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> 
     return PushTable(inputs, duration, exact + noise, np.array([f"p{k}" for k in range(n)]))
 
 
-def trained(outline: Outline, kind: str, low: Array, high: Array, n: int = 100) -> PushModel:
-    rig = Rig("made_up", outline, 0.00475, "plywood", 0.8)
-    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}")
+def trained(outline: Outline, kind: str, low: Array, high: Array, n: int = 100, *, per_path: bool = True) -> PushModel:
+    rig, options = Rig("made_up", outline, 0.00475, "plywood", 0.8), TrainingOptions(mean="zero", per_path=per_path)
+    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}", options=options)
 
 
 WIDE = np.array([0.01, 0.0, -1.0]), np.array([0.05, 1.0, 1.0])
@@ -294,8 +294,8 @@ def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_faster_pushes_are_predicted_by_the_model(shape: str) -> None:
-    model = tabulated(shape, "coupled gp")
+def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: str) -> None:
+    model = tabulate(coupled(trained(OUTLINES[shape], "gp", *WIDE, n=80, per_path=False)))
     fast = inside(model.model, 30)
     fast[:, 0] = 1.001 * FASTEST * model.model.training.inputs[:, 0].max()
     table, exact = of(model, fast), of(model.model, fast)
@@ -308,7 +308,7 @@ def test_faster_pushes_are_predicted_by_the_model(shape: str) -> None:
 
 
 def test_the_table_is_of_the_domain_alone_where_a_wide_one_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    wide = tabulated("square", "gp")
+    wide = tabulate(independent(trained(OUTLINES["square"], "gp", *WIDE, per_path=False)))
     assert wide.domain is not None
     monkeypatch.setattr(prediction_table, "MOST_KNOTS", wide.domain.table.knots - 1)
     narrow, outside = tabulate(wide.model), outside_pushes(wide.model, 50)

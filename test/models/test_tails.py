@@ -24,18 +24,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from scipy import stats
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.predictors.tails import INTERVAL_KINDS, STEPS, Tails, half_widths, joint_radius
 from push_predictor.models.predictors.tails_fit import FEWEST_PUSHES, fit_tails
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
@@ -68,7 +68,7 @@ def fitted(residuals: Array, push_ids: np.ndarray, counts: tuple[int, int, int] 
 
 
 def shared_errors(pushes: int, seed: int) -> PushTable:
-    """Five windows a push; each push has its own size of error, which its windows share in part."""
+    """Five windows a push; each push has its own size of error, which its windows share in part, of any path length."""
     table = noisy_pushes(5 * pushes, seed, windows_per_push=5)
     rng = np.random.default_rng([seed, 1])
     size = np.exp(0.6 * rng.standard_normal(pushes))
@@ -79,7 +79,8 @@ def shared_errors(pushes: int, seed: int) -> PushTable:
 
 @cache
 def trained(kind: str = "gp") -> PushModel:
-    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind)
+    options = TrainingOptions(mean="zero", per_path=False)
+    return train_model(shared_errors(40, 0), square_rig(), kind, name=kind, options=options)
 
 
 def tails_of(model: PushModel) -> Tails:
@@ -339,7 +340,7 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
 
 
 def test_training_without_tails_takes_windows_for_independent() -> None:
-    options = TrainingOptions(tails=False)
+    options = TrainingOptions(tails=False, mean="zero")
     assert train_model(shared_errors(12, 0), square_rig(), "gp", name="a", options=options).predictor.tails is None
 
 

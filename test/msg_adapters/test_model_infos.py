@@ -27,14 +27,14 @@ from synthetic import square_pushes, square_rig
 from msg_adapters.model_infos import model_to_info
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.server.model_services import handle_list_models
 from push_predictor_interfaces.srv import ListModels
 
 
 def test_the_fields_are_those_of_the_model() -> None:
     table, rig = square_pushes(60)
-    model = train_model(table, rig, "gp", name="in the file")
+    model = train_model(table, rig, "gp", name="in the file", options=TrainingOptions(mean="zero"))
     info = model_to_info("gp", Path("/models/gp.model"), model, is_default=True)
     assert (info.name, info.file, info.kind, info.is_default) == ("gp", "/models/gp.model", "gp", True)
     assert info.n_train == len(model.training) == 60 and info.n_pushes == len(model.training.pushes)
@@ -59,7 +59,9 @@ def test_an_extended_model_lists_its_covariates_with_unit_and_range() -> None:
 def test_list_models_describes_each_model_in_text_and_fields(tmp_path: Path) -> None:
     table, rig = square_pushes(60)
     for name in ("one", "two"):
-        save_model(train_model(table, rig, "gp", name=name), tmp_path / f"{name}.model")
+        save_model(
+            train_model(table, rig, "gp", name=name, options=TrainingOptions(mean="zero")), tmp_path / f"{name}.model"
+        )
     registry = ModelRegistry()
     registry.load_all([str(tmp_path)])
     registry.choose_default("two")

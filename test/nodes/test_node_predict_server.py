@@ -49,7 +49,7 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server, runtime
 from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
@@ -70,7 +70,9 @@ def folder(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("models")
     table, rig = square_pushes(60)
     for kind in ("analytical", "gp", "vhgp"):
-        save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
+        save_model(
+            train_model(table, rig, kind, name=kind, options=TrainingOptions(mean="zero")), place / f"{kind}.model"
+        )
     whole = (place / "gp.model").read_bytes()
     (place / "damaged.model").write_bytes(whole[: len(whole) // 2])
     return place
@@ -402,6 +404,8 @@ def test_list_models_describes_the_training_data(server, folder):
         "windows": "60",
         "covariates": "-",
         "duration": "0.2",
+        "speeds": "20..20 mm/s",
+        "mean": "zero",
         "file": str(folder / "vhgp.model"),
     }
 

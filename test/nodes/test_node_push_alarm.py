@@ -86,7 +86,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         rig,
         "gp",
         name="gp",
-        options=TrainingOptions(n_train=100),
+        options=TrainingOptions(n_train=100, mean="zero"),
     )
     save_model(model, folder / "gp.pushmodel")
     windows = find_windows(read_recording(unchanged), rig)

@@ -107,7 +107,8 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     table, rig = load_data(data), load_rig_for(data)
     for kind in ("gp", "analytical"):
         save_model(
-            train_model(table, rig, kind, name=kind, options=TrainingOptions(n_train=30)), folder / f"{kind}.pushmodel"
+            train_model(table, rig, kind, name=kind, options=TrainingOptions(n_train=30, mean="zero")),
+            folder / f"{kind}.pushmodel",
         )
     return {kind: folder / f"{kind}.pushmodel" for kind in ("gp", "analytical")}
 

@@ -33,7 +33,7 @@ from synthetic import square_pushes
 
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor_interfaces.srv import PredictSliderPose
 
@@ -50,7 +50,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs are correlated
     table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
     for kind in ("gp", "analytical"):
-        save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
+        save_model(
+            train_model(table, rig, kind, name=kind, options=TrainingOptions(mean="zero")), place / f"{kind}.model"
+        )
     return place
 
 

@@ -36,7 +36,7 @@ from push_predictor.evaluation.validation import Comparison, compare, metrics_js
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.predictors.tails import STEPS, Tails
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.files.window_log import write_window_log
 from push_predictor.online.files.window_rows import WindowRows
 from push_predictor.online.live_validation import LiveValidation
@@ -48,7 +48,10 @@ from push_predictor.recordings.windows.push_window import PushWindow, windows_to
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     table = windows_to_table(made_up_windows(40, seed=1))
-    return {kind: train_model(table, square_rig(), kind, name=kind) for kind in ("gp", "analytical")}
+    return {
+        kind: train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
+        for kind in ("gp", "analytical")
+    }
 
 
 def answered(models: dict[str, PushModel], windows: list[PushWindow], shuffle: int = 0) -> LiveValidation:

@@ -36,7 +36,7 @@ from push_predictor.models.mechanics.fitted import ANALYTICAL_ACCURACY, analytic
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import Provenance, PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.particles import Deviations
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
@@ -277,7 +277,7 @@ def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
 @pytest.fixture(scope="module")
 def learnt() -> PushModel:
     """A GP of 40 windows of 0.2 s."""
-    return train_model(rows(), square_rig(), "gp", name="learnt")
+    return train_model(rows(), square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
 
 
 @pytest.mark.parametrize(
@@ -394,7 +394,7 @@ def test_pose_covariates_are_those_of_each_sample() -> None:
 def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
     table = rows(100)
     table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
-    base = train_model(table, square_rig(), "gp", name="learnt")
+    base = train_model(table, square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
     form, size = DriverBasis("constant"), np.array([0.4, 0.2])
     effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
     model = replace(base, predictor=ExtendedPredictor(base.predictor.base, (effect,), np.ones(3)))

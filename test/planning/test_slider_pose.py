@@ -37,7 +37,7 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter, WorldPush, slider_after
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.read import read_recording
@@ -66,7 +66,7 @@ def model_of(shape: str, kind: str = "analytical") -> PushModel:
     table = PushTable(
         inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(60)]), {"slider_x": rng.random(60)}
     )
-    return train_model(table, rig, kind, name=f"{shape}_{kind}")
+    return train_model(table, rig, kind, name=f"{shape}_{kind}", options=TrainingOptions(mean="zero"))
 
 
 def push_at(

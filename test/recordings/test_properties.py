@@ -37,7 +37,7 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor.recordings.rig import Rig
@@ -185,7 +185,7 @@ def model_of(shape: str, kind: str) -> PushModel:
     noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
     outcomes = analytical_mechanics(rig.outline, RADIUS).displacement(inputs, duration) + noise
     table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(n)]))
-    return train_model(table, rig, kind, name=f"{shape}_{kind}")
+    return train_model(table, rig, kind, name=f"{shape}_{kind}", options=TrainingOptions(mean="zero"))
 
 
 @cache

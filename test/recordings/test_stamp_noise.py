@@ -267,7 +267,7 @@ def table_of(recording: Recording) -> PushTable:
 @cache
 def model() -> PushModel:
     return train_model(
-        table_of(half(0)), require_rig(half(0)), "gp", name="square", options=TrainingOptions(n_train=60)
+        table_of(half(0)), require_rig(half(0)), "gp", name="square", options=TrainingOptions(n_train=60, mean="zero")
     )
 
 

@@ -27,7 +27,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
@@ -125,7 +125,9 @@ def test_a_real_effect_is_a_gain_over_both_models(deployed: PushModel) -> None:
 
 def test_the_gain_is_over_the_better_model(deployed: PushModel) -> None:
     """A refit that is far off is no reference: what beats it need not beat the deployed model."""
-    far_off = train_model(pushes(40, 7, slippery(0.6)), square_rig(), "gp", name="far off")
+    far_off = train_model(
+        pushes(40, 7, slippery(0.6)), square_rig(), "gp", name="far off", options=TrainingOptions(mean="zero")
+    )
     found = held_out_gain(deployed, far_off, with_idle_effect(overconfident(deployed, 1.0), 1e-6), ANALYSIS, HELD_OUT)
     assert found.reference == "deployed" and found.nlpd.high > -0.05
     turned = held_out_gain(far_off, deployed, with_idle_effect(overconfident(deployed, 1.0), 1e-6), ANALYSIS, HELD_OUT)
@@ -133,7 +135,7 @@ def test_the_gain_is_over_the_better_model(deployed: PushModel) -> None:
 
 
 def test_held_out_calibration_does_not_take_the_fit_for_the_noise() -> None:
-    model = train_model(noisy_pushes(40), square_rig(), "gp", name="learned")
+    model = train_model(noisy_pushes(40), square_rig(), "gp", name="learned", options=TrainingOptions(mean="zero"))
     found = held_out_windows(model).calibrated()
     mean, covariance, _ = found.held_out_moments()
     square = (found.training.outcomes - mean) ** 2 / np.diagonal(covariance, axis1=1, axis2=2)
@@ -145,7 +147,9 @@ def test_uncertainty_of_a_model_without_effects_is_zero(deployed: PushModel) -> 
 
 
 def test_a_refit_takes_as_many_rows_as_the_model_had_within_bounds() -> None:
-    small = train_model(noisy_pushes(40), square_rig(), "gp", name="small")  # 120 rows
+    small = train_model(
+        noisy_pushes(40), square_rig(), "gp", name="small", options=TrainingOptions(mean="zero")
+    )  # 120 rows
     many = noisy_pushes(1200)
     assert len(spread_rows(small, many)) == 300
     large = replace(small, training=noisy_pushes(700))

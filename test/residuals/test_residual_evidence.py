@@ -33,7 +33,7 @@ from push_predictor.types import Array
 
 
 def trained(table: PushTable, kind: str = "analytical") -> PushModel:
-    return train_model(table, square_rig(), kind, name="deployed", options=TrainingOptions())
+    return train_model(table, square_rig(), kind, name="deployed", options=TrainingOptions(mean="zero"))
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
@@ -96,7 +96,7 @@ ANALYTICAL = train_model(pushes(60, 1), RIG, "analytical", name="textbook")
 
 @pytest.fixture(scope="module")
 def learnt():
-    return train_model(pushes(COUNT, 2), RIG, "gp", name="learnt")
+    return train_model(pushes(COUNT, 2), RIG, "gp", name="learnt", options=TrainingOptions(mean="zero"))
 
 
 @pytest.fixture(autouse=True)
@@ -165,7 +165,13 @@ class TestNoEffect:
     def test_effect_that_training_shows_too_is_not_selected(self) -> None:
         """A slider whose sides differ, learned by a model that folds them, has not changed since training."""
         shift = DriverBasis("constant"), 0.003, -0.002
-        base = train_model(with_effect(pushes(COUNT, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
+        base = train_model(
+            with_effect(pushes(COUNT, 2), "centre_of_friction", *shift),
+            RIG,
+            "gp",
+            name="folds",
+            options=TrainingOptions(mean="zero"),
+        )
         same = searched(base, with_effect(pushes(COUNT, 3), "centre_of_friction", *shift))
         assert not same.terms
         assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.unchanged)
@@ -399,7 +405,9 @@ class TestVariance:
 
     @pytest.mark.slow
     def test_variance_that_grew_with_the_covariate_in_training_too_is_not_reported(self) -> None:
-        model = train_model(louder_to_the_right(COUNT, 403), RIG, "gp", name="uneven")
+        model = train_model(
+            louder_to_the_right(COUNT, 403), RIG, "gp", name="uneven", options=TrainingOptions(mean="zero")
+        )
         evidence = seen(model, louder_to_the_right(COUNT, 404))
         assert not variance_effects(model, evidence, evidence.z, 0.01, baseline=baseline(model)).found
         alone = variance_effects(model, evidence, evidence.z, 0.01).found

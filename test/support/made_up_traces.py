@@ -29,7 +29,7 @@ from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
@@ -105,7 +105,7 @@ def slippery(size: float) -> Effect:
 
 def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", **other: Any) -> Trace:
     """A trace that found exactly these effects; other: fields to replace."""
-    model = train_model(pushes(60, 1), square_rig(), kind, name="deployed")
+    model = train_model(pushes(60, 1), square_rig(), kind, name="deployed", options=TrainingOptions(mean="zero"))
     table = pushes(count, 2, *effects)
     held = held_out_rows(table)
     return replace(traced(model, table.take(~held), table.take(held), effects), **other)

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.evaluation.judgement import judged
+from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.evaluation.report.figures.coverage import SYMBOLS
 from push_predictor.evaluation.report.tables import interval_of, paired_difference, row_weights
 from push_predictor.evaluation.validation import Comparison, trained_on
@@ -48,9 +49,8 @@ def error_sentence(metrics: Mapping[str, Any]) -> str:
     if total is None:
         return "The outcomes do not vary, so the squared error has no scale (NMSE)."
     ends = "" if interval is None else f" (95 % CI {_rounded(interval['low'])} to {_rounded(interval['high'])})"
-    return (
-        f"Its squared error (total NMSE) is {_rounded(total)}{ends}, where 0 is perfect and 3 is the mean of training."
-    )
+    reference = nmse_reference(metrics["n_train"])
+    return f"Its squared error (total NMSE) is {_rounded(total)}{ends}, where 0 is perfect and 3 is {reference}."
 
 
 def calibration_sentence(comparison: Comparison) -> str:

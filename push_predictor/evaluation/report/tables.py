@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd, nmse_reference
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import OUTPUTS
@@ -67,8 +67,9 @@ def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     for c, m in pairs:
         counts = [str(m[name]) for name in ("n_train", "n_test", "n_pushes")]
         rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c, row_weights(c)))])
+    reference = nmse_reference(max(c.n_train for c, _ in pairs))
     caption = (
-        "Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than the training mean. "
+        f"Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than {reference}. "
         "The total is the sum over the outputs. In brackets, in all tables: 95 % intervals from resampling pushes."
     )
     return html.folded_table(caption, ("model", "training windows", "windows", "pushes", *COLUMNS), rows)

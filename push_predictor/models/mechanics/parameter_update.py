@@ -27,7 +27,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameter_draws import displacements
+from push_predictor.models.mechanics.parameter_draws import displacements, prior_spreads
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.process_noise import ProcessNoise
 from push_predictor.types import Array
@@ -52,7 +52,7 @@ class ParameterUpdate:
 def updated(
     mechanics: PushMechanics, names: tuple[str, ...], means: Array, rows: FitRows, length: float
 ) -> ParameterUpdate:
-    """The parameters' posterior, from normal priors about `means` (p,) with the spreads of parameters.PARAMETERS.
+    """The parameters' posterior, from normal priors about `means` (p,) with the spreads of `prior_spreads`.
 
     length: c of the support in m, for the noise of the turn. Gauss-Newton steps within the plausible ranges, each
     shortened until the posterior grows; the noise's factor is estimated again after each. Deterministic.
@@ -76,7 +76,7 @@ class _Update:
         self.mechanics, self.names, self.means, self.rows = mechanics, names, means, rows
         table = [BY_NAME[name] for name in names]
         self.low, self.high = np.array([p.low for p in table]), np.array([p.high for p in table])
-        self.spread = np.array([p.spread for p in table])
+        self.spread = prior_spreads(names)
         windows = np.bincount(rows.push)[rows.push]
         self.weight = 1.0 / (1.0 + (windows - 1.0) * CORRELATION)
         self.travel, self.length = rows.inputs[:, 0] * rows.duration, np.full(len(rows.push), length)

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from push_predictor.models.predictors.extended_predictor import ExtendedPredictor
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
-from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.mechanics_predictor import MechanicsPredictor
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
@@ -35,7 +34,6 @@ __all__ = [
     "ExtendedPredictor",
     "GaussianProcessPredictor",
     "InputLimits",
-    "MechanicsMean",
     "MechanicsPredictor",
     "Moments",
     "Predictor",

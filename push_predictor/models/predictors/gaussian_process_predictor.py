@@ -27,9 +27,8 @@ from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors.correlation import Correlation, covariances
-from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.predictor import Moments, Shift
-from push_predictor.models.predictors.scaling import Scaling
+from push_predictor.models.predictors.scaling import DEVIATION, Scaling
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
 from push_predictor.models.push import Push
@@ -43,15 +42,15 @@ class GaussianProcessPredictor(WithoutEffects):
 
     correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
     regressions have learnt the residuals; None where they have learnt the outcomes themselves. The scaling is that of
-    what they have learnt. tails: the distribution of new pushes, to which the covariances are widened; None where the
-    training pushes were too few, and in files before format 8.
+    what they have learnt, which is per path length of the tip unless the scaling has no travel. tails: the distribution
+    of new pushes, to which the covariances are widened; None where the training pushes were too few.
     """
 
     rig: Rig
     scaling: Scaling
     regressions: tuple[Regression, ...]
     correlation: Correlation | None = None
-    mean: MechanicsMean | None = None
+    mean: FittedMechanics | None = None
     tails: Tails | None = None
 
     @property
@@ -78,13 +77,13 @@ class GaussianProcessPredictor(WithoutEffects):
     def mechanics(self) -> FittedMechanics:
         """See Predictor: the mean, or the textbook's analytical model."""
         if self.mean is not None:
-            return self.mean.fitted
+            return self.mean
         return analytical_mechanics(self.rig.outline, self.rig.pusher_radius)
 
     @property
     def needs(self) -> tuple[str, ...]:
         """See Predictor: those of the mean."""
-        return self.mean.fitted.needs if self.mean is not None else ()
+        return self.mean.needs if self.mean is not None else ()
 
     @property
     def covariates(self) -> tuple[str, ...]:
@@ -107,7 +106,7 @@ class GaussianProcessPredictor(WithoutEffects):
         """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
-        return self.about_mean(
+        return self.of_outcomes(
             self._moments_of(latent, self.correlation.at(features) if self.correlation else None), push
         )
 
@@ -116,7 +115,7 @@ class GaussianProcessPredictor(WithoutEffects):
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
         correlation = self.correlation.held_out(features, block) if self.correlation else None
-        return self.about_mean(self._moments_of(latent, correlation), rows)
+        return self.of_outcomes(self._moments_of(latent, correlation), rows)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""
@@ -151,21 +150,45 @@ class GaussianProcessPredictor(WithoutEffects):
         return self._log_density(latent, push, outcomes)
 
     def latent(self, inputs: Array) -> list[LatentPrediction]:
-        """Per output, the latent predictions in standardised units."""
-        features = self.scaling.features(self.rig.outline, inputs)
-        return [regression.predict(features) for regression in self.regressions]
+        """Per output, the latent predictions in standardised units; beyond the training's speeds see scaling.py."""
+        features, beyond = self.scaling.features(self.rig.outline, inputs), self.scaling.beyond(inputs)
+        found = [regression.predict(features) for regression in self.regressions]
+        more, growth = (DEVIATION * beyond) ** 2, self.scaling.noise_growth(inputs)
+        return [replace(p, variance=p.variance + more, log_noise_mean=p.log_noise_mean + growth) for p in found]
 
     def standardised(self, push: Push, outcomes: Array) -> Array:
         """Outcomes (n, 3) in the units of `latent`."""
-        return self.scaling.outcomes(outcomes if self.mean is None else self.mean.residuals(push, outcomes))
+        return self.scaling.outcomes((outcomes - self.displacement(push)) / self._size(push))
 
-    def about_mean(self, residuals: Moments, push: Push) -> Moments:
-        """Moments of the outcomes from those of what was learnt."""
-        return residuals if self.mean is None else self.mean.outcomes(push, residuals)
+    def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
+        """Moments of the outcomes from those of what was learnt, which know the training's speeds alone."""
+        mean, covariance, process_covariance = self.scaled(learnt, push)
+        return Moments(mean + self.displacement(push), covariance, process_covariance)
 
-    def without_mean(self) -> GaussianProcessPredictor:
-        """The predictor of the residuals alone; itself if it has no mean."""
-        return self if self.mean is None else replace(self, mean=None)
+    def displacement(self, push: Push) -> Array:
+        """Displacement (n, 3) of the mean, zero if it has none."""
+        if self.mean is None:
+            return np.zeros((len(push.inputs), 3))
+        return self.mean.displacement(push.inputs, push.duration, push.covariates)
+
+    def scaled(self, learnt: Moments, push: Push) -> Moments:
+        """The same about the displacement of the mechanics."""
+        if self.scaling.travel is None:
+            return learnt
+        size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
+        mean, covariance, process = learnt
+        if beyond.any():
+            process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
+            deviation = (DEVIATION * beyond * self.reported_sd) ** 2
+            covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
+        square = (size * size)[:, :, None]
+        return Moments(mean * size, covariance * square, process * square)
+
+    def of_targets(self) -> GaussianProcessPredictor:
+        """The predictor of what was learnt, at a path of the scaling's travel; itself if that are the outcomes."""
+        if self.mean is None and self.scaling.travel is None:
+            return self
+        return replace(self, mean=None, scaling=self.scaling.without_path())
 
     def free_matrices(self) -> None:
         """Free what predictions would compute again."""
@@ -177,10 +200,13 @@ class GaussianProcessPredictor(WithoutEffects):
         """See Predictor."""
         return replace(self, correlation=None)
 
+    def _size(self, push: Push) -> Array:
+        """Factor (n, 1) on what was learnt."""
+        return self.scaling.size(push.inputs, push.duration)[:, None]
+
     def _units(self, push: Push) -> Array:
-        """Standard deviations of what was learnt, in units of the outcomes, (3,) or (n, 3)."""
-        sd = self.scaling.outcome_sd
-        return sd if self.mean is None else np.asarray(self.mean.size(push)[:, None] * sd)
+        """Standard deviations (n, 3) of what was learnt, in units of the outcomes."""
+        return np.asarray(self._size(push) * self.scaling.outcome_sd)
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""

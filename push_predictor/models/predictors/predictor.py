@@ -146,5 +146,5 @@ class BasePredictor(Predictor, Protocol):
     def with_independent_outputs(self) -> BasePredictor:
         """See Predictor."""
 
-    def about_mean(self, learnt: Moments, push: Push) -> Moments:
+    def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
         """Moments of the outcomes from those of what was learnt, which a table may contain."""

@@ -68,7 +68,7 @@ class WithoutEffects:
         """See Predictor."""
         return moments
 
-    def about_mean(self, learnt: Moments, push: Push) -> Moments:
+    def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
         """See BasePredictor."""
         return learnt
 

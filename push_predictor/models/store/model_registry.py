@@ -21,6 +21,7 @@ from pathlib import Path
 from threading import Lock
 
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
+from push_predictor.models.mean_words import mean_in_words
 from push_predictor.models.store.model_file import is_model_file
 from push_predictor.models.store.table_cache import completed, load_at_once, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
@@ -130,7 +131,7 @@ class ModelRegistry:
         return problems
 
     def describe(self, name: str) -> str:
-        """One line of `key=value; ...` about a loaded model: kind, outline, surface, training, covariates, file."""
+        """One line of `key=value; ...` about a loaded model: kind, rig, training, mean, covariates, file."""
         model = self._models[name].model
         values = {
             "kind": model.kind,
@@ -140,6 +141,8 @@ class ModelRegistry:
             "windows": len(model.training),
             "covariates": ",".join(model.needs) or "-",  # that a request must contain
             "duration": _durations(model.training.duration),
+            "speeds": _speeds(model.training.inputs[:, 0]),
+            "mean": mean_in_words(model.predictor),
             "file": self._files[name],
         }
         return "; ".join(f"{key}={value}" for key, value in values.items())
@@ -150,6 +153,10 @@ class ModelRegistry:
         except PushPredictorError as error:
             return [str(error)]
         return []
+
+
+def _speeds(speed: Array) -> str:
+    return f"{1e3 * speed.min():.3g}..{1e3 * speed.max():.3g} mm/s" if len(speed) else "none"
 
 
 def _durations(duration: Array) -> str:

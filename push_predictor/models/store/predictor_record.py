@@ -27,18 +27,17 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.process_noise import VARYING, ProcessNoise
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
-    MechanicsMean,
     MechanicsPredictor,
     Predictor,
     PriorPredictor,
     Scaling,
 )
-from push_predictor.models.push import Push
 from push_predictor.models.store.correlation_record import correlation_of, correlation_record
 from push_predictor.models.store.effects_record import cross_of, cross_record, effects_of, effects_record
 from push_predictor.models.store.mechanics_record import mechanics_of, mechanics_record
@@ -100,16 +99,14 @@ def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.nda
     for k, regression in enumerate(predictor.regressions):
         put_regression(regression, k, arrays)
     return {
-        "scaling": {key: np.asarray(value).tolist() for key, value in vars(predictor.scaling).items()},
+        "scaling": {
+            key: np.asarray(value).tolist() for key, value in vars(predictor.scaling).items() if value is not None
+        },
         "regressions": [regression_record(regression) for regression in predictor.regressions],
         **({"correlation": correlation_record(predictor.correlation, arrays)} if predictor.correlation else {}),
-        **({"mean": _mean_record(predictor.mean)} if predictor.mean else {}),
+        **({"mean": {"mechanics": mechanics_record(predictor.mean)}} if predictor.mean else {}),
         **({"tails": tails_record(predictor.tails, arrays)} if predictor.tails else {}),
     }
-
-
-def _mean_record(mean: MechanicsMean) -> dict[str, Any]:
-    return {"mechanics": mechanics_record(mean.fitted), "travel": mean.travel}
 
 
 def predictor_of(record: dict[str, Any], source: Source) -> Predictor:
@@ -171,12 +168,15 @@ def _covariance(record: dict[str, Any]) -> Array:
 
 
 def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:
-    found = dict(record["scaling"])
-    columns = tuple(int(c) for c in found.pop("columns"))
-    scaling = Scaling(columns, **{key: np.array(value, dtype=np.float64) for key, value in found.items()})
-    mean = _mean(record["mean"], source) if "mean" in record else None
-    features = scaling.features(source.rig.outline, source.training.inputs)
-    targets = scaling.outcomes(_targets(source, mean))
+    mean, scaling = _mean(record["mean"], source) if "mean" in record else None, _scaling(record)
+    rows = source.training
+    features = scaling.features(source.rig.outline, rows.inputs)
+    if source.targets is None:
+        moved = mean.displacement(rows.inputs, rows.duration, rows.covariates) if mean else 0.0
+        targets = (rows.outcomes - moved) / scaling.size(rows.inputs, rows.duration)[:, None]
+    else:
+        targets = source.targets
+    targets = scaling.outcomes(targets)
     regressions = [
         regression_of(parameters, source.kind, features, targets[:, k], k, source.arrays)
         for k, parameters in enumerate(record["regressions"])
@@ -188,20 +188,23 @@ def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:
     return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation, mean, tails)
 
 
-def _mean(record: dict[str, Any], source: Source) -> MechanicsMean:
-    mean = MechanicsMean(mechanics_of(record["mechanics"], source.rig), float(record["travel"]))
-    if not (np.isfinite(mean.travel) and mean.travel > 0.0):
-        raise ValueError(f"travel {mean.travel!r} of the mean, a finite number above 0 is needed")
-    if missing := [name for name in mean.fitted.needs if name not in source.training.covariates]:
+def _scaling(record: dict[str, Any]) -> Scaling:
+    found = dict(record["scaling"])
+    columns = tuple(int(c) for c in found.pop("columns"))
+    travel, speeds = found.pop("travel", record.get("mean", {}).get("travel")), found.pop("speeds", None)
+    if travel is not None and not 0.0 < float(travel) < np.inf:
+        raise ValueError(f"travel {travel!r}, a finite number above 0 is needed")
+    if speeds is not None:
+        slowest, fastest = speeds
+        if not 0.0 < slowest <= fastest < np.inf:
+            raise ValueError(f"speeds {speeds!r}, two finite numbers above 0 in order are needed")
+        speeds = (float(slowest), float(fastest))
+    arrays = {key: np.array(value, dtype=np.float64) for key, value in found.items()}
+    return Scaling(columns, **arrays, travel=None if travel is None else float(travel), speeds=speeds)
+
+
+def _mean(record: dict[str, Any], source: Source) -> FittedMechanics:
+    mean = mechanics_of(record["mechanics"], source.rig)
+    if missing := [name for name in mean.needs if name not in source.training.covariates]:
         raise ValueError(f"the mechanics need the covariate {missing[0]}, which the training rows lack")
     return mean
-
-
-def _targets(source: Source, mean: MechanicsMean | None) -> Array:
-    """What the regressions were trained on (n, 3)."""
-    if source.targets is not None:
-        return source.targets
-    rows = source.training
-    if mean is None:
-        return rows.outcomes
-    return mean.residuals(Push(rows.inputs, rows.duration, rows.covariates), rows.outcomes)

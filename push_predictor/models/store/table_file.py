@@ -36,7 +36,7 @@ from push_predictor.models.store.arrays_record import read_arrays
 from push_predictor.models.tabulated.prediction_table import TableNodes
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, with_domain, without_mean
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, with_domain
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
@@ -80,12 +80,12 @@ def _base_record(tabulated: TabulatedModel, arrays: dict[str, Array]) -> dict[st
         "ends": [domain.least.tolist(), domain.most.tolist()],
         "nodes": [nodes.cells, nodes.coarse, nodes.least],
         "error": astuple(tabulated.error),
-        "probes": _probes_record(probed(without_mean(base), CHECKED)),
+        "probes": _probes_record(probed(of_targets(base), CHECKED)),
     }
 
 
 def _base(model: PushModel, record: Mapping[str, Any], arrays: Mapping[str, Array]) -> TabulatedModel | None:
-    learnt = without_mean(model.base)
+    learnt = of_targets(model.base)
     assert isinstance(learnt.predictor, GaussianProcessPredictor)
     cells, coarse, least_variances = record["nodes"]
     nodes = TableNodes(cells, coarse, least_variances, [arrays[f"nodes_{k}"] for k in range(9)])

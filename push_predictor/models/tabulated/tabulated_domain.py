@@ -34,12 +34,16 @@ FASTEST = 2.0  # largest training speeds, up to which a wide table reaches
 
 @dataclass(frozen=True, eq=False)
 class TabulatedDomain:
-    """A table of a box that contains the domain: from least to most (3,) of velocity, place and angle."""
+    """A table of a box that contains the domain: from least to most (3,) of velocity, place and angle.
+
+    limited: whether beyond the table's speeds the predictions are those of the nearest one.
+    """
 
     chart: Chart
     table: PredictionTable
     least: Array
     most: Array
+    limited: bool
 
     def covered(self, inputs: Array) -> BoolArray:
         """Which of the pushes (n, 3) the table contains, (n,)."""
@@ -55,6 +59,9 @@ class TabulatedDomain:
         place, box = self.chart.place(inputs[:, 1])
         points = inputs.copy()
         points[:, 1] = place
+        if self.limited:
+            (slowest, *_), (fastest, *_) = self._ends
+            points[:, 0] = np.minimum(np.maximum(points[:, 0], slowest), fastest)
         return points, box
 
     def _inside(self, points: Array) -> BoolArray:
@@ -68,9 +75,18 @@ class TabulatedDomain:
 
 
 def wide_box(model: PushModel) -> tuple[Array, Array]:
-    """Least and most velocity, place and angle (3,) of a table for all pushes up to FASTEST times the training's."""
-    fastest = FASTEST * float(model.training.inputs[:, 0].max())
-    return np.array([0.0, 0.0, -0.5 * pi]), np.array([fastest, 1.0, 0.5 * pi])
+    """Least and most velocity, place and angle (3,) of a table for all pushes.
+
+    Up to FASTEST times the training's speeds, unless the predictions beyond these are those of the nearest one.
+    """
+    fastest = float(model.training.inputs[:, 0].max())
+    slow, fast = _speeds(model) or (0.0, FASTEST * fastest)
+    return np.array([slow, 0.0, -0.5 * pi]), np.array([fast, 1.0, 0.5 * pi])
+
+
+def _speeds(model: PushModel) -> tuple[float, float] | None:
+    predictor = model.predictor.base
+    return predictor.scaling.speeds if isinstance(predictor, GaussianProcessPredictor) else None
 
 
 def narrow_box(model: PushModel) -> tuple[Array, Array]:
@@ -93,7 +109,8 @@ def tabulated_domain(
     posteriors: its regressions, see prediction_table.on_grid; refinement: of the table. Raises TooFineError.
     """
     chart = push_chart(model.rig.outline)
-    return TabulatedDomain(chart, tabulate(predictor, posteriors, chart, *ends, refinement), *ends)
+    table = tabulate(predictor, posteriors, chart, *ends, refinement)
+    return TabulatedDomain(chart, table, *ends, limited=_speeds(model) is not None)
 
 
 def domain_from_nodes(
@@ -101,4 +118,4 @@ def domain_from_nodes(
 ) -> TabulatedDomain:
     """The same from what was computed before. Raises ValueError or IndexError if that does not fit the model."""
     chart = push_chart(model.rig.outline)
-    return TabulatedDomain(chart, from_nodes(nodes, predictor, chart, *ends), *ends)
+    return TabulatedDomain(chart, from_nodes(nodes, predictor, chart, *ends), *ends, limited=_speeds(model) is not None)

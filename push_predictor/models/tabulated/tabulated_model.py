@@ -68,7 +68,7 @@ class TabulatedModel:
         if self.domain is None:
             return model.predict_rows(inputs, duration, covariates)
         predictor = model.predictor
-        moments = predictor.base.about_mean(self._learnt(inputs, duration), push)
+        moments = predictor.base.of_outcomes(self._learnt(inputs, duration), push)
         if predictor.effects:
             moments = predictor.with_effects(moments, push)
         return Prediction(*moments, model.in_domain(inputs) & model.covariates_seen(push), predictor.tails)
@@ -86,7 +86,7 @@ class TabulatedModel:
     @cached_property
     def _residual(self) -> PushModel:
         """The model of what is tabulated."""
-        return without_mean(self.model.base)
+        return of_targets(self.model.base)
 
     def _learnt(self, inputs: Array, duration: Array) -> Moments:
         """Moments of what the base has learnt, from the table where it can."""
@@ -102,7 +102,7 @@ class TabulatedModel:
 
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
-    learnt = without_mean(model.base)
+    learnt = of_targets(model.base)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, COMPUTED)
     exact, posteriors = probed(learnt), [on_grid(regression) for regression in learnt.predictor.regressions]
@@ -141,12 +141,12 @@ def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy)
     return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
 
 
-def without_mean(model: PushModel) -> PushModel:
-    """The model of what is tabulated: without the mechanics about which it has learnt residuals."""
+def of_targets(model: PushModel) -> PushModel:
+    """The model of what is tabulated: what was learnt, at one path length and without the mechanics."""
     predictor = model.predictor
-    if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+    if not isinstance(predictor, GaussianProcessPredictor):
         return model
-    return replace(model, predictor=predictor.without_mean())
+    return replace(model, predictor=predictor.of_targets())
 
 
 def _merged(chosen: BoolArray, one: Moments, other: Moments) -> Moments:

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.evaluation.report.tables import metrics_tables
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.recordings.table import OUTPUTS
@@ -87,12 +88,14 @@ def tested_tables(trace: Trace) -> list[str]:
 def held_out_table(trace: Trace) -> str:
     """Squared error, log density and coverage before, after the refit and with the effects."""
     head = ("model", "squared error (NMSE)", "NLPD (nats per window)", *(f"90 % coverage of {o}" for o in OUTPUTS))
+    shown = comparisons_of(trace)
     caption = (
-        "Held-out pushes. Squared error: 0 is perfect, 1 is no better than the training mean; summed over dx, dy and "
+        f"Held-out pushes. Squared error: 0 is perfect, 1 is no better than {nmse_reference(shown[0].n_train)}; summed "
+        "over dx, dy and "
         "dtheta. NLPD: negative log predictive density, lower is better. Coverage: should be 90 %. In brackets: 95 % "
         "intervals."
     )
-    return html.folded_table(caption, head, [_held_out_row(comparison) for comparison in comparisons_of(trace)])
+    return html.folded_table(caption, head, [_held_out_row(comparison) for comparison in shown])
 
 
 def metric_tables(trace: Trace) -> list[str]:

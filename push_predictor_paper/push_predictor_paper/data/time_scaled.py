@@ -106,7 +106,7 @@ def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> P
         rig,
         bracket.kind,
         name=bracket.kind,
-        options=TrainingOptions(n_train=len(table), tails=False),
+        options=TrainingOptions(n_train=len(table), mean="zero", per_path=False, tails=False),
     )
     held = concatenate([table.take(np.flatnonzero(fold_of(table) == bracket.fold)) for table in windows])
     return push_scores(compare(model, _scaled(held, bracket.with_speed)))

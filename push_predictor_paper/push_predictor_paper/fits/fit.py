@@ -128,7 +128,9 @@ def trained(pushes: PushSet, fit: Fit) -> PushModel:
     rows = np.sort(split_of(pushes, fit).first(fit.n))
     table = pushes.table.take(rows)
     informed = fit.kind in INFORMED.values()
-    options = TrainingOptions(n_train=len(rows), seed=fit.seed, mean="mechanics" if informed else "zero", tails=False)
+    options = TrainingOptions(
+        n_train=len(rows), seed=fit.seed, mean="mechanics" if informed else "zero", per_path=informed, tails=False
+    )
     return train_model(table, pushes.rig, fit.kind.removeprefix("informed "), name=fit.kind, options=options)
 
 
