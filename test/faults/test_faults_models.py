@@ -193,6 +193,15 @@ def test_array_with_a_huge_declared_size_costs_no_memory(
     assert peak_of(load) < MEMORY
 
 
+def test_array_with_surplus_bytes_is_refused(files: dict[str, Path], tmp_path: Path) -> None:
+    path, members = tmp_path / "m.model", {name: npy(array) for name, array in arrays_of(files["gp"]).items()}
+    write(path, members | {"training.inputs.npy": members["training.inputs"] + bytes(8)})
+    with pytest.raises(
+        ModelFileError, match=r"training\.inputs\.npy is declared as float64 \(75, 3\) and has 1808 bytes"
+    ):
+        load_model(path)
+
+
 LIES: list[tuple[str, tuple[Any, ...], Any]] = [
     ("gp", ("format_version",), FORMAT_VERSION + 1),
     ("gp", ("format_version",), 0),

@@ -49,7 +49,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.types import Array
 
-CORNERS = np.array([[0.04, 0.04, 0.2], [-0.04, 0.04, 0.3], [-0.04, -0.04, 0.1], [0.04, -0.03, 0.39]])
+CORNERS = np.array([[0.04, 0.04, 0.2], [-0.04, 0.04, 0.3], [-0.04, -0.04, 0.1], [0.04, -0.03, 0.39], [0.01, 0.0, 0.17]])
 INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5]])
 DURATION = np.full(3, 0.2)
 COVARIATES = {
@@ -86,6 +86,7 @@ def models() -> dict[str, PushModel]:
     trained["fitted on supports"] = replace(trained["analytical"], predictor=of_supports)
     trained |= {f"{kind}, extended": extended(trained[kind]) for kind in (*LEARNT, "analytical", "prior")}
     trained["with constant noise"] = with_constant_noise(trained["vhgp"])
+    trained["correlation of some rows"] = with_some_rows(trained["gp"])
     return trained
 
 
@@ -113,7 +114,15 @@ def with_constant_noise(model: PushModel) -> PushModel:
     return replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
 
 
-NAMES = [*LEARNT, "analytical", "prior", "fitted on supports", "with constant noise"]
+def with_some_rows(model: PushModel) -> PushModel:
+    predictor, rows = model.predictor, np.arange(0, 40, 3)[::-1].copy()
+    assert isinstance(predictor, GaussianProcessPredictor) and predictor.correlation is not None
+    known = predictor.correlation
+    some = replace(known, features=known.features[rows], residuals=known.residuals[rows], rows=rows)
+    return replace(model, predictor=replace(predictor, correlation=some))
+
+
+NAMES = ["correlation of some rows", *LEARNT, "analytical", "prior", "fitted on supports", "with constant noise"]
 NAMES += [f"{kind}, extended" for kind in (*LEARNT, "analytical", "prior")]
 
 
@@ -225,7 +234,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("fitted on supports", put("predictor.fitted.mechanics.accuracy", 1e-9), r"mechanics\.accuracy: numbers from"),
     (
         "fitted on supports",
-        put("predictor.fitted.mechanics.supports.0.1.points", [[9e9, 0.0], [0.0, 0.0]] * 2),
+        put("predictor.fitted.mechanics.supports.0.1.points", [[9e9, 0.0]] + [[0.0, 0.0]] * 4),
         "large",
     ),
     ("fitted on supports", put("predictor.fitted.mechanics.supports.0.1.spread", -0.1), "far too large"),

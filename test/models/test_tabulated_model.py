@@ -24,18 +24,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.constant import fit_constant
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.store.table_file import read_tables, write_tables
+from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.prediction_table import on_grid

@@ -47,7 +47,7 @@ class GaussianProcessPredictor(WithoutEffects):
     correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
     regressions have learnt the residuals; None where they have learnt the outcomes themselves. The scaling is that of
     what they have learnt. tails: the distribution of new pushes, to which the covariances are widened; None where the
-    training pushes were too few, and in files before format 8.
+    training pushes were too few.
     """
 
     rig: Rig

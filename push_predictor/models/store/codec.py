@@ -52,12 +52,13 @@ def encode(value: Any, place: str, arrays: dict[str, np.ndarray]) -> Any:
         value = list(value.items())
     if isinstance(value, list | tuple):
         return [encode(item, f"{place}.{k}", arrays) for k, item in enumerate(value)]
-    if type(value) in NAMES:
-        own = {name: _narrowed(type(value), name, getattr(value, name)) for name in _hints(type(value))}
-        return {CLASS: NAMES[type(value)]} | {name: encode(v, f"{place}.{name}", arrays) for name, v in own.items()}
+    cls: type = type(value)
+    if cls in NAMES:
+        own = {name: _narrowed(cls, name, getattr(value, name)) for name in _hints(cls)}
+        return {CLASS: NAMES[cls]} | {name: encode(v, f"{place}.{name}", arrays) for name, v in own.items()}
     if value is None or isinstance(value, str | bool | int | float):
         return value
-    raise TypeError(f"{place}: {type(value).__name__} is no class of a model file")
+    raise TypeError(f"{place}: {cls.__name__} is no class of a model file")
 
 
 @dataclass(frozen=True)
