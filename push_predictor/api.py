@@ -36,8 +36,7 @@ from push_predictor.errors import DataWarning, RequestError
 from push_predictor.evaluation.metrics_text import metrics_lines
 from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
 from push_predictor.evaluation.validation import Comparison, metrics_json
-from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.predictor_record import LEARNT
+from push_predictor.models.push_model import LEARNT, PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.planning import choose

@@ -38,7 +38,8 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
-KINDS = ("vhgp", "gp", "analytical", "prior")
+LEARNT = ("vhgp", "gp")
+KINDS = (*LEARNT, "analytical", "prior")
 USUAL_SPEED, USUAL_DURATION = 0.02, 0.2  # m/s, s: of the pushes of an untrained model
 DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
 SMALLEST_LARGE = 100  # rows of a matrix on which a BLAS may use several threads

@@ -143,7 +143,7 @@ def blas_threads() -> list[int]:
 @pytest.mark.parametrize(
     ("step", "call"),
     [
-        ("push_predictor.models.store.model_file.read_arrays", lambda model: load_model("resource/none.pushmodel")),
+        ("push_predictor.models.store.model_file.read_archive", lambda model: load_model("resource/none.pushmodel")),
         ("push_predictor.api.validate_recording", lambda model: validate(model, FEW)),
         (
             "push_predictor.api.model_repertoire",

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -26,15 +25,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import square_rig
 
-from push_predictor.errors import ModelFileError
 from push_predictor.evaluation.metrics import joint_nlpd
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
+from push_predictor.models.predictors import GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
 from push_predictor.models.push import Push
@@ -287,40 +282,3 @@ def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> No
     push = Push(inputs, np.full(len(inputs), 0.2), {})
     for ours, theirs in zip(model.predictor.moments(push), loaded.predictor.moments(push), strict=True):
         assert np.array_equal(ours, theirs)
-
-
-def test_only_a_correlation_needs_format_5(model: PushModel, tmp_path: Path) -> None:
-    physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
-    tip = Effect(
-        "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
-    )
-    for predictor, version in ((model.predictor, 5), (alone(model), 1)):
-        assert isinstance(predictor, GaussianProcessPredictor)
-        extended = ExtendedPredictor(predictor, physics, (tip,), np.array([1.0, 1.0, 2.0]))
-        for kind, least in ((predictor, 1), (extended, 3)):
-            save_model(replace(model, predictor=kind), tmp_path / "m")
-            with np.load(tmp_path / "m") as archive:
-                assert json.loads(archive["header"].tobytes())["format_version"] == max(version, least)
-            loaded = of(load_model(tmp_path / "m"), model.training.inputs)
-            expected = of(model, model.training.inputs) if version == 5 else np.zeros(len(loaded))
-            assert loaded == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"bandwidth": 0.0}, "bandwidth 0.0 of the correlation"),
-        ({"shrinkage": -1.0}, "shrinkage -1.0 of the correlation"),
-        ({"shrinkage": np.nan}, "shrinkage nan of the correlation"),
-        ({"residuals": np.zeros((7, 3))}, "residuals of the correlation are not 300 times three"),
-        ({"residuals": np.full((300, 3), np.inf)}, "residuals of the correlation are not 300 times three"),
-    ],
-)
-def test_rejects_damaged_correlation_with_a_clear_message(
-    model: PushModel, change: dict[str, object], message: str, tmp_path: Path
-) -> None:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    damaged = replace(correlation_of(model), **change)  # type: ignore[arg-type]  # the point of the test
-    save_model(replace(model, predictor=replace(model.predictor, correlation=damaged)), tmp_path / "m")
-    with pytest.raises(ModelFileError, match=message):
-        load_model(tmp_path / "m")

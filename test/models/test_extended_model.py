@@ -34,7 +34,7 @@ from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
 from push_predictor.cli import main
-from push_predictor.errors import ModelFileError, RequestError
+from push_predictor.errors import RequestError
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariate_range import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -42,7 +42,7 @@ from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
 from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
 from push_predictor.models.push import Push
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
@@ -360,71 +360,6 @@ def test_extended_model_survives_saving(
     if kind in ("gp", "vhgp"):  # which have more than the moments
         loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
         assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
-
-
-def test_file_with_effects_needs_a_reader_of_its_format(bases: dict[str, PushModel], tmp_path: Path) -> None:
-    apart = extended(bases["gp"], slippery(0.1), slippery(0.2))
-    assert isinstance(apart.predictor, ExtendedPredictor)
-    sharing = replace(apart, predictor=replace(apart.predictor, cross={(0, 1): np.zeros((1, 1))}))
-    tailed = bases["gp"].predictor
-    assert isinstance(tailed, GaussianProcessPredictor)
-    plain = replace(tailed, tails=None)
-    for name, model, version in (("base", bases["gp"], 1), ("more", apart, 3), ("sharing", sharing, 4)):
-        model = replace(model, predictor=model.predictor.with_base(plain))
-        save_model(model, tmp_path / name)
-        assert _header(tmp_path / name)["format_version"] == version
-
-
-@pytest.mark.parametrize(
-    ("pair", "shared", "message"),
-    [
-        ((0, 1), 2.0, "covariance of all effects is not positive semidefinite"),
-        ((0, 1), np.nan, "covariance of all effects: a value is not finite"),
-        ((0, 1), np.zeros((1, 2)), r"effects 0 and 1: covariance of shape \(1, 2\), \(1, 1\) is needed"),
-        ((1, 1), 0.0, "shared covariance of effects 1 and 1, give indices i < j below 2"),
-        ((0, 2), 0.0, "shared covariance of effects 0 and 2, give indices i < j below 2"),
-    ],
-)
-def test_rejects_damaged_shared_covariance(
-    bases: dict[str, PushModel], pair: tuple[int, int], shared: Any, message: str, tmp_path: Path
-) -> None:
-    model = extended(bases["analytical"], slippery(0.1, sd=1.0), slippery(0.2, sd=1.0))
-    assert isinstance(model.predictor, ExtendedPredictor)
-    save_model(replace(model, predictor=replace(model.predictor, cross={pair: np.atleast_2d(shared)})), tmp_path / "m")
-    with pytest.raises(ModelFileError, match=message):
-        load_model(tmp_path / "m")
-
-
-def _header(path: Path) -> dict[str, Any]:
-    with np.load(path) as archive:
-        return dict(json.loads(archive["header"].tobytes()))
-
-
-DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "mechanism": (lambda e: e.update(mechanism="os.system"), "effect 1: mechanism 'os.system' is not in the library"),
-    "form": (lambda e: e["form"].update(name="eval"), "effect 1: form 'eval' is not accepted, give one of constant"),
-    "drivers": (lambda e: e["form"].update(drivers=[]), r"effect 1: form 'linear' does not accept the drivers \(\)"),
-    "scale": (lambda e: e["form"].update(scale=[0.0]), "effect 1: form 'linear' has a scale of zero"),
-    "number": (lambda e: e.update(coefficients=[float("nan")]), r"effect 1: coefficients \[nan\], 1 finite numbers"),
-    "size": (lambda e: e.update(coefficients=[1.0, 2.0]), r"effect 1: coefficients \[1.0, 2.0\], 1 finite numbers"),
-    "absent": (lambda e: e.pop("outcome_scale"), "effect 1: 'outcome_scale'"),
-    "driver": (lambda e: e["form"].update(drivers=["moon"]), "covariate moon, which the training rows lack"),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str, tmp_path: Path) -> None:
-    harm, message = DAMAGES[damage]
-    save_model(extended(bases["analytical"], grain(0.1), slippery(0.1)), tmp_path / "m")
-    with np.load(tmp_path / "m") as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    header = json.loads(arrays["header"].tobytes())
-    harm(header["body"]["effects"][1])
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    with (tmp_path / "m").open("wb") as stream:
-        np.savez(stream, **arrays)
-    with pytest.raises(ModelFileError, match=message):
-        load_model(tmp_path / "m")
 
 
 # --- estimation -------------------------------------------------------------------------------------------------

@@ -12,94 +12,340 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Model files of every format, as the releases that introduced the format wrote them, still give their predictions.
-
-Each file in model_files/ was written by the last release that had its format as the newest, from 24 simulated windows;
-predictions.json contains what that release predicted.
-"""
+"""Model files: every kind of model predicts the same bits after saving and loading; what no model has is refused."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from push_predictor.models.mechanics.analytical import ACCURACY
+from drifting_models import pushes
+from push_predictor.models.gaussian_process.constant import ConstantNoise, ConstantParameters
+from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import (
-    AnalyticalPredictor,
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsPredictor,
+    PriorPredictor,
 )
-from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.archive import archived, read_archive
+from push_predictor.models.store.codec import Reader, encode
+from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, model_digest, save_model
+from push_predictor.models.store.stored import CLASSES, GIVEN
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable, empty_table
+from push_predictor.types import Array
 
-FILES = Path(__file__).parent / "model_files"
-FORMATS = [version for version in range(1, FORMAT_VERSION + 1) if version != 2]  # 2 has kernels that are gone
+CORNERS = np.array([[0.04, 0.04, 0.2], [-0.04, 0.04, 0.3], [-0.04, -0.04, 0.1], [0.04, -0.03, 0.39], [0.01, 0.0, 0.17]])
 INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5]])
 DURATION = np.full(3, 0.2)
-COVARIATES = {"elapsed_time": np.array([0.0, 10.0, 20.0])}
-PREDICTORS = {
-    1: GaussianProcessPredictor,
-    3: ExtendedPredictor,
-    4: ExtendedPredictor,
-    5: GaussianProcessPredictor,
-    6: MechanicsPredictor,
-    7: ExtendedPredictor,
-    8: GaussianProcessPredictor,
+COVARIATES = {
+    "elapsed_time": np.array([0.0, 10.0, 20.0]),
+    "push_heading": np.array([0.3, -2.0, 1.1]),
+    "recording": np.array([1.0, 2.0, 1.0]),
 }
+LEARNT = ("gp", "vhgp", "sparse vhgp", "gp about mechanics")
 
 
-def file_of(version: int) -> Path:
-    return FILES / f"format_{version}.pushmodel"
+def table() -> PushTable:
+    """Covariates have the seven digits that a file keeps of them."""
+    rows, rng = noisy_pushes(40), np.random.default_rng(3)
+    covariates = {name: np.round(64.0 * rng.uniform(0.0, 20.0, 40)) / 64.0 for name in ("elapsed_time", "push_heading")}
+    covariates["recording"] = 1.0 + np.arange(40) % 2
+    return replace(
+        rows, covariates={name: column.astype(np.float32).astype(np.float64) for name, column in covariates.items()}
+    )
 
 
-def header_of(path: Path) -> dict[str, object]:
-    with np.load(path) as archive:
-        header: dict[str, object] = json.loads(archive["header"].tobytes())
-    return header
+@pytest.fixture(scope="module")
+def models() -> dict[str, PushModel]:
+    """A small model of every kind."""
+    rows, rig = table(), square_rig()
+    trained = {kind: train_model(rows, rig, kind, name=kind) for kind in ("gp", "vhgp", "analytical")}
+    trained["sparse vhgp"] = train_model(rows, rig, "vhgp", name="s", options=TrainingOptions(inducing=10))
+    trained["gp about mechanics"] = train_model(rows, rig, "gp", name="m", options=TrainingOptions(mean="mechanics"))
+    on_corners = replace(rig, support_points=CORNERS)
+    trained["prior"] = train_model(empty_table(), on_corners, "prior", name="prior")
+    known = {1: supported_at(CORNERS), 2: supported_at(CORNERS * [1.1, 0.9, 1.0])}
+    mechanics = PushMechanics(rig.outline, rig.pusher_radius, None, known)
+    fitted = FittedMechanics(mechanics, {"contact_friction": 0.21, "grain_x": 0.1}, 1e-3 * np.eye(2))
+    of_supports = MechanicsPredictor(fitted, np.diag([1e-8, 1e-8, 1e-5]))
+    trained["fitted on supports"] = replace(trained["analytical"], predictor=of_supports)
+    trained |= {f"{kind}, extended": extended(trained[kind]) for kind in (*LEARNT, "analytical", "prior")}
+    trained["with constant noise"] = with_constant_noise(trained["vhgp"])
+    trained["correlation of some rows"] = with_some_rows(trained["gp"])
+    return trained
 
 
-@pytest.mark.parametrize("version", FORMATS)
-def test_file_has_the_format_in_its_name(version: int) -> None:
-    assert is_model_file(file_of(version)) and header_of(file_of(version))["format_version"] == version
+def extended(base: PushModel) -> PushModel:
+    """The base with two effects that share a covariance, and the generic one; its regressions learnt other outcomes."""
+    drift = DriverBasis("linear", ("elapsed_time",), (5.0,), (3.0,))
+    sizes = {"contact_friction": 1, "pusher_radius": 1, None: 18}
+    effects = tuple(
+        Effect(name, "elapsed_time", drift, np.full(m, 1e-3), 1e-8 * np.eye(m), np.array([0.02, 0.02, 0.5]))
+        for name, m in sizes.items()
+    )
+    predictor = base.predictor.base
+    if isinstance(predictor, GaussianProcessPredictor):
+        moved = replace(base, training=replace(base.training, outcomes=base.training.outcomes + [1e-4, 0.0, 1e-3]))
+        base = replace(moved, predictor=predictor)
+    cross = {(0, 1): np.array([[5e-9]])}
+    return replace(base, predictor=ExtendedPredictor(predictor, effects, np.array([0.9, 1.0, 1.2]), cross))
 
 
-@pytest.mark.parametrize("version", FORMATS)
-def test_model_of_every_format_predicts_what_it_did(version: int) -> None:
-    model = load_model(file_of(version))
-    assert isinstance(model.predictor, PREDICTORS[version])
-    expected = json.loads((FILES / "predictions.json").read_text())[f"format_{version}"]
-    found = model.predict_rows(INPUTS, DURATION, COVARIATES)
-    learnt_alone = isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.mean is None
-    np.testing.assert_allclose(found.mean, expected["mean"], rtol=1e-6 if learnt_alone else 0.1 * ACCURACY, atol=1e-9)
-    np.testing.assert_allclose(found.covariance, expected["covariance"], rtol=1e-6, atol=1e-13)
-    np.testing.assert_allclose(found.process_covariance, expected["process_covariance"], rtol=1e-6, atol=1e-13)
+def with_constant_noise(model: PushModel) -> PushModel:
+    predictor = model.predictor
+    assert isinstance(predictor, GaussianProcessPredictor)
+    first, second, third = predictor.regressions
+    constant = ConstantNoise(second.inputs, second.outputs, ConstantParameters(-0.3, 0.4))
+    return replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
 
 
-@pytest.mark.parametrize("version", FORMATS)
-def test_model_is_saved_in_the_format_it_was_loaded_from(version: int, tmp_path: Path) -> None:
-    model, path = load_model(file_of(version)), tmp_path / "again.pushmodel"
+def with_some_rows(model: PushModel) -> PushModel:
+    predictor, rows = model.predictor, np.arange(0, 40, 3)[::-1].copy()
+    assert isinstance(predictor, GaussianProcessPredictor) and predictor.correlation is not None
+    known = predictor.correlation
+    some = replace(known, features=known.features[rows], residuals=known.residuals[rows], rows=rows)
+    return replace(model, predictor=replace(predictor, correlation=some))
+
+
+NAMES = ["correlation of some rows", *LEARNT, "analytical", "prior", "fitted on supports", "with constant noise"]
+NAMES += [f"{kind}, extended" for kind in (*LEARNT, "analytical", "prior")]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_predicts_the_same_bits_after_saving_and_loading(
+    models: dict[str, PushModel], name: str, tmp_path: Path
+) -> None:
+    model = models[name]
+    if name == "prior, extended":  # whose effects need a covariate that its training rows have
+        model = replace(model, training=replace(table(), covariates={"elapsed_time": np.arange(40.0)}))
+    save_model(model, tmp_path / "m")
+    loaded = load_model(tmp_path / "m")
+    assert is_model_file(tmp_path / "m") and (loaded.kind, loaded.needs) == (model.kind, model.needs)
+    one, other = (m.predict_rows(INPUTS, DURATION, COVARIATES) for m in (model, loaded))
+    for part in ("mean", "covariance", "process_covariance", "in_domain"):
+        assert np.array_equal(getattr(one, part), getattr(other, part)), part
+    assert model_digest(loaded) == model_digest(model)
+    if model.predictor.learnt:
+        block = np.arange(40) % 4
+        for ours, theirs in zip(model.held_out_moments(block), loaded.held_out_moments(block), strict=True):
+            assert np.array_equal(ours, theirs)
+
+
+def test_outputs_are_stored_only_where_they_do_not_follow(models: dict[str, PushModel], tmp_path: Path) -> None:
+    for name, apart in (("gp about mechanics", False), ("vhgp", False), ("vhgp, extended", True)):
+        save_model(models[name], tmp_path / "m")
+        assert ("outputs" in read_archive(tmp_path / "m")[1]) == apart, name
+
+
+def test_models_have_the_digest_of_what_they_predict(models: dict[str, PushModel]) -> None:
+    digests = {model_digest(models[name]) for name in NAMES}
+    assert len(digests) == len(NAMES)
+    assert model_digest(replace(models["gp"], name="other")) == model_digest(models["gp"])
+
+
+@pytest.mark.parametrize("version", [8, FORMAT_VERSION + 1, 0, True, float(FORMAT_VERSION), str(FORMAT_VERSION), None])
+def test_another_format_is_refused_with_what_to_do(
+    models: dict[str, PushModel], version: object, tmp_path: Path
+) -> None:
+    with pytest.raises(ModelFileError, match=r"m: format version .* reads version 9 only: train the model again$"):
+        load_changed(models["gp"], lambda record, _: record.update(format_version=version), tmp_path / "m")
+
+
+Change = Callable[[dict[str, Any], dict[str, np.ndarray]], object]
+REGRESSION = "regressions.0"
+
+
+def load_changed(model: PushModel, change: Change, path: Path) -> PushModel:
     save_model(model, path)
-    before, after = header_of(file_of(version)), header_of(path)
-    assert {**after, "written_by": before["written_by"]} == before
+    record, arrays = read_archive(path)
+    change(record, arrays)
+    path.write_bytes(archived(record, arrays))
+    return load_model(path)
 
 
-def test_parts_of_each_format_are_loaded() -> None:
-    third, fourth, fifth, sixth, seventh, eighth = (load_model(file_of(v)).predictor for v in range(3, 9))
-    assert isinstance(third.base, AnalyticalPredictor)
-    assert [effect.mechanism for effect in third.effects] == ["contact_friction"] and not third.cross
-    assert [effect.mechanism for effect in fourth.effects] == ["contact_friction", "pusher_radius"]
-    assert list(fourth.cross) == [(0, 1)]
-    assert isinstance(fifth, GaussianProcessPredictor) and fifth.correlation is not None
-    assert isinstance(sixth, MechanicsPredictor) and "contact_friction" in sixth.fitted.values
-    assert not any(effect.exact for effect in (*third.effects, *fourth.effects))
-    assert isinstance(seventh.base, MechanicsPredictor) and all(effect.exact for effect in seventh.effects)
-    assert fifth.tails is None and eighth.tails is not None
+def put(place: str, value: object) -> Change:
+    """Sets what is at a place of the record: names and indices with points between."""
+
+    def change(record: dict[str, Any], _: object) -> None:
+        *path, last = place.split(".")
+        found: Any = record
+        for key in path:
+            found = found[int(key) if isinstance(found, list) else key]
+        found[int(last) if isinstance(found, list) else last] = value
+
+    return change
 
 
-def test_model_with_kernels_that_are_gone_is_refused() -> None:
-    with pytest.raises(ModelFileError, match="kernel family 'matern52' is not accepted, train the model again"):
-        load_model(file_of(2))
+EXTENDED = "analytical, extended"
+DAMAGES: list[tuple[str, Change, str]] = [
+    ("gp", put("predictor.class", "Popen"), "predictor: .*is not accepted, give an object of class Gaussian"),
+    ("gp", put("predictor.class", "PushTable"), "predictor: .*is not accepted, give an object of class Gaussian"),
+    ("gp", put("predictor.scaling.class", "Tails"), r"predictor\.scaling: .*give an object of class Scaling"),
+    ("gp", put("predictor.scaling.surplus", 1), r"predictor\.scaling: .*give the fields columns"),
+    ("gp", put("predictor.scaling.columns", [True]), r"predictor\.scaling\.columns\.0: 'True' .*give int"),
+    ("gp", put("predictor.scaling.outcome_sd", "array"), r"predictor\.scaling\.outcome_sd: the array is missing"),
+    ("gp", put("predictor.scaling.outcome_sd", ["a"] * 3), r"outcome_sd: .*give an array of float64"),
+    ("gp", put("regressions.0.parameters.log_noise_sd", float("nan")), r"log_noise_sd: a number is not finite"),
+    ("gp", put("regressions.0.parameters.log_noise_sd", "1"), r"parameters\.log_noise_sd: '1' .*give float"),
+    ("gp", put("regressions.0.class", "VHGP"), r"regressions\.0: .*GaussianProcess or ConstantNoise"),
+    ("gp", put("kind", "vhgp"), r"regressions\.0: .*VHGP or SparseVHGP"),
+    ("gp", put("kind", "prior"), "GaussianProcessPredictor is not accepted for kind 'prior'"),
+    ("gp", put("regressions", []), "regressions"),
+    ("gp", lambda record, _: record["regressions"].pop(), "regressions"),
+    ("gp", lambda _, arrays: arrays.update({"training.inputs": 1e9 * arrays["training.inputs"]}), "longer than 10 m"),
+    ("gp", lambda _, arrays: arrays.update({"training.outcomes": arrays["training.outcomes"] * np.nan}), "not finite"),
+    ("gp", lambda _, arrays: arrays.update(outputs=np.zeros((3, 3))), "outputs of shape"),
+    (
+        "vhgp, extended",
+        lambda _, arrays: arrays.update(outputs=np.nan * arrays["outputs"]),
+        r"regressions\.0\.outputs: a number is not finite",
+    ),
+    ("vhgp, extended", lambda _, arrays: arrays.update(outputs=arrays["outputs"].astype(str)), "outputs: .*of float64"),
+    ("gp", put("correlation.bandwidth", 0.0), r"correlation\.bandwidth: numbers from"),
+    ("gp", put("correlation.shrinkage", -1.0), r"correlation\.shrinkage: numbers from"),
+    ("gp", put("correlation.rows", [0, 40]), "correlation: rows does not contain indices below 40"),
+    ("gp", put("correlation.rows", [0, 1]), "correlation: residuals of shape"),
+    ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": -np.ones(40)}), r"site_precisions: numbers from"),
+    ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": np.ones(39)}), "site_precisions of shape"),
+    ("sparse vhgp", put("regressions.0.inducing_signal", [3, 3]), "inducing_signal does not contain distinct"),
+    ("sparse vhgp", put("regressions.0.inducing_noise", [-1]), "inducing_noise does not contain indices below 40"),
+    ("sparse vhgp", put("regressions.0.inducing_noise", [40]), "inducing_noise does not contain indices below 40"),
+    ("sparse vhgp", put("regressions.0.inducing_noise", [0.5]), "inducing_noise: .*give an array of int64"),
+    ("gp about mechanics", put("predictor.mean.travel", 0.0), r"predictor\.mean\.travel: numbers from"),
+    ("with constant noise", put("regressions.1.parameters.noise_spread", 11.0), "noise_spread: numbers from 0 to 10"),
+    ("fitted on supports", put("predictor.fitted.values", [["warmth", 0.1]]), "'warmth' is no parameter"),
+    ("fitted on supports", put("predictor.fitted.values.0.1", 9.0), "contact_friction 9, 9: 0.0 to 1.5 is accepted"),
+    ("fitted on supports", put("predictor.fitted.covariance", [[1.0]]), r"predictor\.fitted: covariance of shape"),
+    ("fitted on supports", put("predictor.fitted.mechanics.accuracy", 1e-9), r"mechanics\.accuracy: numbers from"),
+    (
+        "fitted on supports",
+        put("predictor.fitted.mechanics.supports.0.1.points", [[9e9, 0.0]] + [[0.0, 0.0]] * 4),
+        "large",
+    ),
+    ("fitted on supports", put("predictor.fitted.mechanics.supports.0.1.spread", -0.1), "far too large"),
+    ("fitted on supports", lambda record, _: record["training"]["covariates"].pop(), "needs the covariate recording"),
+    ("analytical", put("predictor.fitted.mechanics.support.length", 1e-9), "too close together"),
+    ("analytical", put("predictor.fitted.mechanics.support.centre", [1.0]), r"support\.centre: shape \(1,\)"),
+    ("analytical", put("predictor.fitted.mechanics.support.power", 1.0), r"support\.power: numbers from 1 to 100"),
+    ("analytical", put("predictor.covariance", [[0.0] * 3] * 3), "predictor: .*not positive definite"),
+    ("prior", put("predictor.noise.factor", [1.0, 0.0, 1.0]), r"predictor\.noise\.factor: numbers from"),
+    (
+        "prior",
+        lambda _, arrays: arrays.update({"predictor.draws": np.full((64, 16), 9.0)}),
+        "predictor: .* is accepted",
+    ),
+    ("prior", lambda _, arrays: arrays.update({"predictor.draws": np.zeros((1, 16))}), "2 to 10000 of 16 are needed"),
+    (EXTENDED, put("predictor.scale", [1.0, 1.0]), r"predictor\.scale: shape \(2,\) is not accepted, give \(3,\)"),
+    (EXTENDED, put("predictor.effects.1.mechanism", "os.system"), r"effects\.1: mechanism 'os.system' is not in"),
+    (EXTENDED, put("predictor.effects.1.coefficients", [0.1, 0.1]), r"effects\.1: 1 coefficients and their"),
+    (EXTENDED, put("predictor.effects.1.covariance", [[-1.0]]), r"effects\.1: the covariance is not positive"),
+    (EXTENDED, put("predictor.effects.1.outcome_scale", [1.0]), r"effects\.1\.outcome_scale: shape \(1,\)"),
+    (EXTENDED, put("predictor.effects.1.basis.name", "eval"), "name 'eval' is not accepted, give one of constant"),
+    (EXTENDED, put("predictor.effects.1.basis.drivers", []), r"effects\.1\.basis: drivers \(\) are not accepted"),
+    (EXTENDED, put("predictor.effects.1.basis.drivers", ["warmth"]), "needs the covariate warmth, which the"),
+    (EXTENDED, put("predictor.effects.1.basis.scale", [0.0]), r"effects\.1\.basis: a scale is zero"),
+    (EXTENDED, put("predictor.effects.1.basis.scale", []), r"effects\.1\.basis: centre and scale: 1 number"),
+    (EXTENDED, put("predictor.cross.0.1", [[2e-8]]), "predictor: the covariance is not positive semidefinite"),
+    (EXTENDED, put("predictor.cross.0.1", [[float("nan")]]), "predictor: the covariance is not positive semidefinite"),
+    (EXTENDED, put("predictor.cross.0.1", [[0.0, 0.0]]), r"cross 0, 1 of shape \(1, 2\)"),
+    (EXTENDED, put("predictor.cross.0.0", [1, 1]), "cross 1, 1 of shape"),
+    (EXTENDED, put("predictor.cross.0.0", [0, 3]), "cross 0, 3 of shape"),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "message"), DAMAGES, ids=[f"{k}-{d[0]}" for k, d in enumerate(DAMAGES)])
+def test_what_no_model_has_is_refused_and_named(
+    models: dict[str, PushModel], name: str, change: Change, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ModelFileError, match=rf"m: the model file is damaged \(.*{message}") as caught:
+        load_changed(models[name], change, tmp_path / "m")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("scale", [0.0, 1.0, 1.0], r"tails\.scale: numbers from"),
+        ("degrees", [2.0, 3.0, 3.0], r"tails\.degrees: numbers from 2"),
+        ("joint_scale", 0.0, r"tails\.joint_scale: numbers from"),
+        ("joint_degrees", 2.0, r"tails\.joint_degrees: numbers from 2"),
+        ("pushes", 0, r"tails\.pushes: numbers from 1"),
+        ("quantiles", [[1.0] * 3], r"tails\.quantiles: shape \(1, 3\)"),
+    ],
+)
+def test_damaged_tails_are_refused_and_named(
+    tailed: PushModel, field: str, value: object, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ModelFileError, match=message):
+        load_changed(tailed, put(f"predictor.tails.{field}", value), tmp_path / "m")
+
+
+def test_quantiles_of_tails_do_not_decrease(tailed: PushModel, tmp_path: Path) -> None:
+    name = "predictor.tails.quantiles"
+    with pytest.raises(ModelFileError, match="tails: quantiles decrease"):
+        load_changed(tailed, lambda _, arrays: arrays.update({name: arrays[name][::-1]}), tmp_path / "m")
+    with pytest.raises(ModelFileError, match=r"tails\.quantiles: numbers from 0"):
+        load_changed(tailed, lambda _, arrays: arrays.update({name: arrays[name] - 9.0}), tmp_path / "m")
+
+
+@pytest.fixture(scope="module")
+def tailed() -> PushModel:
+    """A model of enough pushes for tails."""
+    model = train_model(pushes(60), square_rig(), "gp", name="tailed")
+    assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.tails is not None
+    return model
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A class that is not in the table."""
+
+    value: float
+
+
+def test_only_the_classes_of_the_table_are_written_and_read() -> None:
+    with pytest.raises(TypeError, match="x: Unknown is no class of a model file"):
+        encode(Unknown(1.0), "x", {})
+    with pytest.raises(ValueError, match=r"x: .*is not accepted"):
+        Reader({}).read({"class": "Unknown", "value": 1.0}, Unknown, "x")
+
+
+def test_all_that_is_not_stored_is_an_argument_of_its_class() -> None:
+    """A field with another name would be written, and a table entry without effect would remain."""
+    for cls, name in GIVEN:
+        assert cls in CLASSES.values() and name in cls.__init__.__code__.co_varnames
+
+
+def test_numbers_keep_their_bits_and_arrays_their_shapes() -> None:
+    values = {"a": np.array([[0.1 + 0.2, 1e-300]]), "b": np.zeros((0, 3)), "c": np.arange(100.0)[::-1]}
+    arrays: dict[str, np.ndarray] = {}
+    record = json.loads(json.dumps(encode(values, "x", arrays)))
+    assert sorted(arrays) == ["x.1.1", "x.2.1"]
+    found = Reader(arrays).read(record, dict[str, Array], "x")
+    for name, value in values.items():
+        assert found[name].dtype == np.float64 and np.array_equal(found[name], value)
+        assert found[name].shape == value.shape
+
+
+def test_a_prior_of_few_draws_is_read(models: dict[str, PushModel], tmp_path: Path) -> None:
+    model = models["prior"]
+    assert isinstance(model.predictor, PriorPredictor)
+    few = replace(model, predictor=replace(model.predictor, draws=model.predictor.draws[:2]))
+    save_model(few, tmp_path / "m")
+    loaded = load_model(tmp_path / "m").predictor
+    assert isinstance(loaded, PriorPredictor) and np.array_equal(loaded.draws, model.predictor.draws[:2])

@@ -38,7 +38,7 @@ from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
-from push_predictor.models.store.arrays_record import read_arrays
+from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated import tabulated_prior
@@ -304,9 +304,9 @@ def test_trained_model_returns_from_its_file_with_its_noise(after_ten: PushModel
 )
 def test_rejects_damaged_draws(untrained: PushModel, tmp_path: Path, draws: Array) -> None:
     untrained.save(tmp_path / "m.pushmodel")
-    arrays = read_arrays(tmp_path / "m.pushmodel")
-    assert arrays["draws"].shape == (64, 16)
-    np.savez_compressed(tmp_path / "bad.npz", **{**arrays, "draws": draws})
+    record, arrays = read_archive(tmp_path / "m.pushmodel")
+    assert arrays["predictor.draws"].shape == (64, 16)
+    (tmp_path / "bad.npz").write_bytes(archived(record, {**arrays, "predictor.draws": draws}))
     with pytest.raises(ModelFileError, match="draws"):
         load_model(tmp_path / "bad.npz")
 

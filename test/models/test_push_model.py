@@ -220,11 +220,12 @@ def test_rejects_file_of_another_kind(tmp_path: Path) -> None:
         load_model(tmp_path / "absent")
 
 
-def test_error_of_newer_file_asks_the_user_to_update(models: dict[str, PushModel], tmp_path: Path) -> None:
+def test_error_of_another_version_asks_the_user_to_train_again(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     _rewrite_header(tmp_path / "m", {"format_version": FORMAT_VERSION + 1, "written_by": "9.9"})
     with pytest.raises(
-        ModelFileError, match=rf"format version {FORMAT_VERSION + 1}, written by push_predictor '9.9'.*update"
+        ModelFileError,
+        match=rf"format version {FORMAT_VERSION + 1}, written by push_predictor '9.9'.*train the model again",
     ):
         load_model(tmp_path / "m")
 
@@ -238,7 +239,7 @@ def test_no_code_from_a_file_is_executed(models: dict[str, PushModel], tmp_path:
     save_model(models["gp"], tmp_path / "m")
     buffer = io.BytesIO()
     np.save(buffer, np.array([_Bomb()], dtype=object), allow_pickle=True)
-    _rewrite(tmp_path / "m", {"inputs.npy": buffer.getvalue()})
+    _rewrite(tmp_path / "m", {"training.inputs.npy": buffer.getvalue()})
     with pytest.raises(ModelFileError):
         load_model(tmp_path / "m")
     (tmp_path / "p").write_bytes(pickle.dumps(_Bomb()))

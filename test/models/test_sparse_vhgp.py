@@ -32,7 +32,6 @@ from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING,
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
@@ -141,19 +140,6 @@ def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
         on_grid = posterior.moments(factors)
         np.testing.assert_allclose(on_grid[0].ravel() + prior, mean, atol=1e-9)
         np.testing.assert_allclose(on_grid[1].ravel(), variance, rtol=1e-7)
-
-
-def test_record_round_trips(fitted: SparseVHGP) -> None:
-    arrays: dict[str, np.ndarray] = {}
-    put_inducing(fitted, 1, arrays)
-    assert has_inducing(1, arrays) and not has_inducing(0, arrays)
-    known = fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions
-    again = sparse_regression(*known, 1, arrays)
-    new = rows(20, seed=8)[0]
-    np.testing.assert_array_equal(again.predict(new).outcome_variance, fitted.predict(new).outcome_variance)
-    for wrong in (np.array([3, 3]), np.array([-1]), np.array([MANY]), np.array([[1]]), np.empty(0)):
-        with pytest.raises(ValueError, match=f"distinct row indices below {MANY}"):
-            sparse_regression(*known, 1, {**arrays, "inducing_noise_1": wrong})
 
 
 def test_prediction_far_from_data_is_the_prior(fitted: SparseVHGP) -> None:

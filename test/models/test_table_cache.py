@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,10 +28,9 @@ from repository import REPOSITORY
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
-from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store import table_cache, table_file
-from push_predictor.models.store.arrays_record import read_arrays
+from push_predictor.models.store import table_cache
+from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model, model_digest, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import (
@@ -45,12 +43,9 @@ from push_predictor.models.store.table_cache import (
     table_folder,
     tables_of,
 )
-from push_predictor.models.tabulated import tabulated_prior
+from push_predictor.models.tabulated.table_accuracy import Probes
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.recordings.table import empty_table
-
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 
 @pytest.fixture
@@ -107,6 +102,7 @@ def once(model: PushModel) -> TabulatedModel:
 
 
 COMPUTED: dict[str, TabulatedModel] = {}
+NODES = "nodes.3.{}"  # arrays of a file
 
 
 def never(*_: object, **__: object) -> TabulatedModel:
@@ -120,12 +116,9 @@ def only(folder: Path) -> Path:
 
 def rewrite(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]) -> None:
     """Change the record and the arrays of a file of tables."""
-    arrays = read_arrays(path)
-    record = json.loads(arrays.pop("record").tobytes())
+    record, arrays = read_archive(path)
     change(record, arrays)
-    arrays["record"] = np.frombuffer(json.dumps(record).encode(), dtype=np.uint8)
-    with path.open("wb") as stream:
-        np.savez(stream, **arrays)
+    path.write_bytes(archived(record, arrays))
 
 
 @pytest.mark.usefixtures("computed_once")
@@ -236,33 +229,6 @@ def test_the_shipped_model_has_its_table(folder: Path, monkeypatch: pytest.Monke
     assert served.tabulated and not folder.exists()
 
 
-def test_a_prior_model_has_its_table_at_once_and_it_is_kept_and_checked(
-    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name, value in (("CELL", 0.1), ("ANGLE_CELLS", 4), ("FEWEST_CELLS", 4)):
-        monkeypatch.setattr(tabulated_prior, name, value)
-    for name in ("MEAN_TOLERANCE", "SPREAD_TOLERANCE"):
-        monkeypatch.setattr(tabulated_prior, name, 9.0)
-    corners = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
-    rig, file = replace(square_rig(), support_points=corners), tmp_path / "prior.pushmodel"
-    model = train_model(empty_table(), rig, "prior", name="prior")
-    assert isinstance(model.predictor, PriorPredictor)
-    few_draws = replace(model.predictor, draws=model.predictor.draws[:4])  # the table takes a fraction of the time
-    save_model(replace(model, predictor=few_draws), file)
-    computed = load_at_once(file)
-    assert computed.how.startswith("table of")
-    with monkeypatch.context() as patch:
-        patch.setattr(table_cache, "tabulate", never)
-        kept = load_served(file)
-        assert kept.how == computed.how
-        pushes, duration = np.array([[0.02, 0.1, 0.2], [0.03, 0.6, -0.3]]), np.full(2, 0.2)
-        one, other = (served.predict_rows(pushes, duration) for served in (computed, kept))
-        assert np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
-    rewrite(only(folder), lambda record, arrays: arrays.update(prior=1.5 * arrays["prior"] + 1.0))
-    again = load_served(file)
-    assert np.array_equal(again.predict_rows(pushes, duration).mean, one.mean)
-
-
 @pytest.mark.parametrize("content", [b"", b"{}", "cut", "flipped"])
 def test_a_damaged_table_is_computed_again(
     file: Path, kept: Path, tables: tuple[Path, str], content: bytes | str, monkeypatch: pytest.MonkeyPatch
@@ -286,16 +252,17 @@ def test_a_damaged_table_is_computed_again(
     [
         lambda record, arrays: record.update(format_version=2),
         lambda record, arrays: record.update(model="another"),
-        lambda record, arrays: record.update(nodes=[[16], [16], [0.0]]),
+        lambda record, arrays: record.update(nodes=[[16], [16], [0.0], []]),
         lambda record, arrays: record.update(nodes="none"),
         lambda record, arrays: record["nodes"].__setitem__(0, [100_000] * 3),
         lambda record, arrays: record["nodes"].__setitem__(2, None),
+        lambda record, arrays: record["nodes"][3].pop(),
         lambda record, arrays: record.update(error=[1.0]),
-        lambda record, arrays: record.update(probes={}),
-        lambda record, arrays: arrays.pop("nodes_8"),
-        lambda record, arrays: arrays.update(nodes_0=arrays["nodes_0"] + np.nan),
-        lambda record, arrays: arrays.update(nodes_4=arrays["nodes_4"] * 1.5),
-        lambda record, arrays: arrays.pop("record", record.clear()),
+        lambda record, arrays: record.update(probes=[]),
+        lambda record, arrays: arrays.pop(NODES.format(8)),
+        lambda record, arrays: arrays.update({NODES.format(0): arrays[NODES.format(0)] + np.nan}),
+        lambda record, arrays: arrays.update({NODES.format(4): arrays[NODES.format(4)] * 1.5}),
+        lambda record, arrays: record.clear(),
     ],
 )
 def test_a_file_that_does_not_fit_is_computed_again(
@@ -304,18 +271,20 @@ def test_a_file_that_does_not_fit_is_computed_again(
     tables: tuple[Path, str],
     change: Callable[[dict[str, Any], dict[str, np.ndarray]], object],
 ) -> None:
-    right = read_arrays(kept)
+    right = read_archive(kept)[0]
     rewrite(kept, change)
     assert load_served(file).how == tables[1]
-    assert read_arrays(kept)["record"].tobytes() == right["record"].tobytes()
+    assert read_archive(kept)[0] == right
 
 
 @pytest.mark.parametrize("name", ["mean", "covariance", "process_covariance"])
 def test_a_table_that_predicts_otherwise_than_the_model_is_not_used(
     file: Path, kept: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def change(record: dict[str, Any], arrays: object) -> None:
-        record["probes"][name] = (np.array(record["probes"][name]) * 1.02).tolist()
+    number = list(Probes.__dataclass_fields__).index(name)
+
+    def change(record: object, arrays: dict[str, np.ndarray]) -> None:
+        arrays[f"probes.{number}"] *= 1.02
 
     rewrite(kept, change)
     monkeypatch.setattr(table_cache, "tabulate", never)
@@ -340,7 +309,6 @@ def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, m
 def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_cache, "MOST_TABLES", 2)
     for version in (1, 2, 1, 3):
-        monkeypatch.setattr(table_file, "FORMAT_VERSION", version)
         monkeypatch.setattr(table_cache, "FORMAT_VERSION", version)
         load_served(file)
     digest = model_digest(load_model(file))

@@ -35,7 +35,7 @@ from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.store.table_file import read_tables, write_tables
+from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.prediction_table import on_grid

@@ -30,6 +30,7 @@ from push_predictor.types import Array
 
 RAYS, RADII = 40, 8  # of a patch whose rim is visible from its centroid
 GRID_POINTS = 400  # of any other, approximately
+ROUNDING = 1e-12
 RIM_EXPONENTS = (-4.0, 12.0)  # beyond it the pressure is practically a point or the rim alone
 
 
@@ -57,7 +58,9 @@ class PressureDistribution:
                 "support_points: fewer than two loaded points, a slider needs a support that resists turning"
             )
         object.__setattr__(self, "points", loaded)
-        object.__setattr__(self, "shares", shares[shares > 0.0] / shares.sum())
+        total = float(shares.sum())
+        known = abs(total - 1.0) < ROUNDING  # dividing again would change the last bits of shares from a file
+        object.__setattr__(self, "shares", shares[shares > 0.0] / (1.0 if known else total))
 
     @property
     def centre(self) -> Array:

@@ -12,7 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Model files: how models are saved, loaded and found by name.
-
-Import `model_file` and `model_registry`; the `*_record` modules define the parts of a file.
-"""
+"""Model files: how models are saved, loaded and found by name; `model_file`, `table_cache` and `model_registry`."""

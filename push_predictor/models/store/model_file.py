@@ -12,19 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Saving and loading push models: one zip archive of arrays and a JSON header, never pickle.
+"""Saving and loading push models: one zip archive of arrays and a JSON record, never pickle.
 
-The regressions' matrices are not stored (regression_record.py), so a file of 1000 windows stays under 200 kB and loads
-in well under a second.
+What follows from the rig and the training rows is not stored: matrices, standardised inputs and outputs. So a file of
+1000 windows stays under 200 kB and loads in well under a second.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import os
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,23 +33,38 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError, PushPredictorError
-from push_predictor.models.push_model import KINDS, Provenance, PushModel
-from push_predictor.models.store.arrays_record import read_arrays
-from push_predictor.models.store.predictor_record import Source, predictor_of, predictor_record
-from push_predictor.models.store.sparse_record import has_inducing
-from push_predictor.models.store.table_record import table_arrays, table_of
+from push_predictor.models.gaussian_process.constant import ConstantNoise
+from push_predictor.models.gaussian_process.gp import GaussianProcess
+from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.vhgp import VHGP
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.predictors import (
+    GaussianProcessPredictor,
+    MechanicsPredictor,
+    Predictor,
+    PriorPredictor,
+)
+from push_predictor.models.predictors.correlation import Correlation
+from push_predictor.models.push import Push
+from push_predictor.models.push_model import Provenance, PushModel
+from push_predictor.models.store.archive import ENDING, HEADER, archived, read_archive
+from push_predictor.models.store.codec import APART, Reader, encode
+from push_predictor.models.store.stored import REGRESSIONS
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.rig import rig_from_record
+from push_predictor.recordings.rig import Rig, rig_from_record
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
-# What each version added. 2: kernels other than the squared exponential, and a nugget. 3: effects. 4: effects that
-# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics, alone or as mean,
-# and draws of their parameters, with which a model may have no training rows. 7: effects that change these parameters.
-# 8: tails.
-FORMAT_VERSION = 8
+FORMAT_VERSION = 9  # 1 to 8 were never released
 PROBES = 5
-HEADER = "header"
-PREDICTOR = "body"  # the header's key of the predictor's record
+OUTPUTS = "outputs"  # the array of what regressions were trained on, where that does not follow from the training rows
+KINDS: dict[str, tuple[type, Any]] = {  # class of the base, and of its regressions
+    "vhgp": (GaussianProcessPredictor, VHGP | SparseVHGP | ConstantNoise),
+    "gp": (GaussianProcessPredictor, GaussianProcess | ConstantNoise),
+    "analytical": (MechanicsPredictor, None),
+    "prior": (PriorPredictor, None),
+}
 
 
 def save_model(model: PushModel, path: Path) -> None:
@@ -57,26 +72,35 @@ def save_model(model: PushModel, path: Path) -> None:
 
     Raises OSError that names the path.
     """
-    arrays = table_arrays(model.training)
-    header = _header(model, arrays)
-    buffer = io.BytesIO()
-    arrays[HEADER] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    write_whole(path, buffer.getvalue())
+    record, arrays = _encoded(model)
+    base = model.predictor.base
+    if isinstance(base, GaussianProcessPredictor):
+        training = Reader(arrays).read(record["training"], PushTable, "training")  # as it will be read
+        if np.array_equal(_outputs(base, training), arrays[OUTPUTS]):
+            del arrays[OUTPUTS]
+    about = {"format": FORMAT, "format_version": FORMAT_VERSION, "written_by": __version__, "name": model.name}
+    about["provenance"] = encode(model.provenance, "provenance", arrays)
+    write_whole(path, archived(about | record, arrays))
 
 
 @one_blas_thread()
 def load_model(path: str | os.PathLike[str], *, check: bool = True) -> PushModel:
-    """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of a newer version.
+    """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of another version.
 
     check: predict some training pushes, which computes the matrices of the regressions.
     """
     path = Path(path)
-    arrays = read_arrays(path)
-    header = _read_header(path, arrays)
+    record, arrays = read_archive(path)
+    if record.get("format") != FORMAT:
+        raise ModelFileError(f"{path}: format {record.get('format')!r} is not accepted, give a {FORMAT!r}")
+    if (version := record.get("format_version")) != FORMAT_VERSION or isinstance(version, bool | float):
+        raise ModelFileError(
+            f"{path}: format version {version!r}, written by push_predictor {record.get('written_by')!r}; "
+            f"push_predictor {__version__} reads version {FORMAT_VERSION} only: train the model again"
+        )
     try:
         with np.errstate(all="ignore"):
-            model = _model(header, arrays, str(path))
+            model = _model(record, arrays, str(path))
             if check:
                 _check_answers(model)
         return model
@@ -87,11 +111,9 @@ def load_model(path: str | os.PathLike[str], *, check: bool = True) -> PushModel
 
 
 def model_digest(model: PushModel) -> str:
-    """A hash of what determines the predictions of a model: the same for a model and its file, of whatever version."""
-    arrays = table_arrays(model.training)
-    header = _header(model, arrays)
-    known = {key: header[key] for key in ("kind", "rig", "covariates", PREDICTOR)}
-    digest = hashlib.sha256(json.dumps(known, sort_keys=True).encode())
+    """A hash of what determines the predictions of a model: the same for a model and its file."""
+    record, arrays = _encoded(model)
+    digest = hashlib.sha256(json.dumps(record, sort_keys=True).encode())
     for name in sorted(arrays):
         array = np.ascontiguousarray(arrays[name])
         digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
@@ -100,75 +122,86 @@ def model_digest(model: PushModel) -> str:
 
 def is_model_file(path: Path) -> bool:
     """Whether a file looks like a model file, whatever its version or state."""
+    member = f"{HEADER}{ENDING}"
     try:
         with path.open("rb") as stream:
-            start = stream.read(40)
-        if start[:4] == b"PK\3\4" and start[30:] == b"inputs.npy":
+            start = stream.read(30 + len(member))
+        if start[:4] == b"PK\3\4" and start[30:] == member.encode():
             return True  # even if the file is cut short: the list of a zip's members is at its end
         with zipfile.ZipFile(path) as archive:
-            return f"{HEADER}.npy" in archive.namelist()
+            return member in archive.namelist()
     except Exception:  # zipfile raises several classes of its own
         return False
 
 
-def _read_header(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    try:
-        header = json.loads(arrays.pop(HEADER).tobytes().decode())
-        found, version = header["format"], header["format_version"]
-    except (KeyError, TypeError, ValueError, RecursionError):
-        raise ModelFileError(f"{path}: contains no header of a push_predictor model") from None
-    if found != FORMAT:
-        raise ModelFileError(f"{path}: format {found!r} is not accepted, give a {FORMAT!r}")
-    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise ModelFileError(f"{path}: format version {version!r} is not accepted, give 1 to {FORMAT_VERSION}")
-    if version > FORMAT_VERSION:
-        raise ModelFileError(
-            f"{path}: format version {version!r}, written by push_predictor {header.get('written_by')!r}; "
-            f"this is push_predictor {__version__}, which reads up to version {FORMAT_VERSION}: update it"
-        )
-    return dict(header)
-
-
-def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    predictor = predictor_record(model.predictor, arrays)
-    return {
-        "format": FORMAT,
-        "format_version": _version(predictor, arrays),
-        "written_by": __version__,
-        "name": model.name,
-        "kind": model.kind,
-        "rig": model.rig.to_record(),
-        "provenance": {**vars(model.provenance), "sources": list(model.provenance.sources)},
-        "covariates": list(model.training.covariates),
-        PREDICTOR: predictor,
+def _encoded(model: PushModel) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """What determines the predictions of a model: record and arrays."""
+    arrays: dict[str, np.ndarray] = {}
+    base = model.predictor.base
+    learnt = base if isinstance(base, GaussianProcessPredictor) else None
+    parts = {
+        "training": model.training,
+        "predictor": model.predictor,
+        "regressions": learnt.regressions if learnt else (),
+        "correlation": learnt.correlation if learnt else None,
     }
+    record = {name: encode(part, name, arrays) for name, part in parts.items()}
+    if learnt:
+        arrays[OUTPUTS] = np.column_stack([regression.outputs for regression in learnt.regressions])
+    return {"kind": model.kind, "rig": model.rig.to_record(), **record}, arrays
 
 
-def _version(predictor: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
-    """The lowest version whose readers understand the record of a predictor."""
-    base = predictor.get("base", predictor)
-    if "tails" in base:
-        return 8
-    if any("exact" in effect for effect in predictor.get("effects", ())):
-        return 7
-    if {"mechanics", "mean"} & base.keys():
-        return 6
-    if "correlation" in base or has_inducing(0, arrays):
-        return 5
-    if "effects" in predictor:
-        return 4 if "cross" in predictor else 3
-    return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in predictor.get("regressions", ())) else 1
+def _model(record: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -> PushModel:
+    reader = Reader(arrays)
+    name, kind = (reader.read(record[key], str, key) for key in ("name", "kind"))
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is not accepted, give one of {', '.join(KINDS)}")
+    rig = rig_from_record(record["rig"], source)
+    training = reader.read(record["training"], PushTable, "training")
+    provenance = reader.read(record["provenance"], Provenance, "provenance")
+    predictor = _predictor(record, kind, rig, training, arrays)
+    return PushModel(name, kind, rig, predictor, training, provenance)
 
 
-def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -> PushModel:
-    if header["kind"] not in KINDS:
-        raise ValueError(f"kind {header['kind']!r} is not accepted, give one of {', '.join(KINDS)}")
-    rig = rig_from_record(header["rig"], source)
-    training = table_of(header["covariates"], arrays)
-    found = header["provenance"]
-    provenance = Provenance(tuple(found["sources"]), int(found["pushes"]), int(found["seed"]), str(found["version"]))
-    predictor = predictor_of(header[PREDICTOR], Source(header["kind"], rig, training, arrays))
-    return PushModel(str(header["name"]), str(header["kind"]), rig, predictor, training, provenance)
+def _predictor(
+    record: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
+) -> Predictor:
+    given: dict[tuple[type, str], Any] = {
+        (PushMechanics, "outline"): rig.outline,
+        (PushMechanics, "pusher_radius"): rig.pusher_radius,
+        (GaussianProcessPredictor, "rig"): rig,
+        (GaussianProcessPredictor, "regressions"): (),
+        (GaussianProcessPredictor, "correlation"): None,
+    }
+    predictor: Predictor = Reader(arrays, given).read(record["predictor"], Predictor, "predictor")
+    if missing := [name for name in predictor.needs if name not in training.covariates]:
+        raise ValueError(f"predictor: needs the covariate {missing[0]}, which the training rows lack")
+    of_base, of_regression = KINDS[kind]
+    if not isinstance(base := predictor.base, of_base):
+        raise ValueError(f"predictor: {type(base).__name__} is not accepted for kind {kind!r}, give {of_base.__name__}")
+    if not isinstance(base, GaussianProcessPredictor):
+        return predictor
+    inputs = base.scaling.features(rig.outline, training.inputs)
+    stored = OUTPUTS in arrays
+    outputs = Reader(arrays).read(APART, Array, OUTPUTS) if stored else _outputs(base, training)
+    if outputs.shape != training.outcomes.shape or len(record["regressions"]) != outputs.shape[1]:
+        raise ValueError(
+            f"{OUTPUTS} of shape {outputs.shape}, {training.outcomes.shape} and as many regressions needed"
+        )
+    regressions = []
+    for k, (found, column) in enumerate(zip(record["regressions"], outputs.T.copy(), strict=True)):
+        given = {(cls, name): x for cls in REGRESSIONS for name, x in (("inputs", inputs), ("outputs", column))}
+        regressions.append(Reader(arrays, given).read(found, of_regression, f"regressions.{k}"))
+    reader = Reader(arrays, {(Correlation, "features"): inputs})
+    correlation = reader.read(record["correlation"], Correlation | None, "correlation")
+    if correlation is not None and correlation.rows is not None:
+        correlation = replace(correlation, features=inputs[correlation.rows])
+    return predictor.with_base(replace(base, regressions=tuple(regressions), correlation=correlation))
+
+
+def _outputs(base: GaussianProcessPredictor, training: PushTable) -> Array:
+    """What the regressions of a base without effects were trained on (n, 3)."""
+    return base.standardised(Push(training.inputs, training.duration, training.covariates), training.outcomes)
 
 
 def _check_answers(model: PushModel) -> None:

@@ -14,6 +14,8 @@
 
 """Models as the server predicts with them. Their tables are kept on disk: computing takes a second, reading a tenth.
 
+A file of a table contains what the table is computed from. It is named by the digest of its model and by the version of
+its format, and checked when it is read: its checksums, and its predictions at some pushes against those of the model.
 `train` writes the tables of a model into a file next to the model file, and so does the package for the shipped model.
 Other tables are computed and kept in $PUSH_PREDICTOR_CACHE, else in $XDG_CACHE_HOME/push_predictor, else in
 ~/.cache/push_predictor. A table that cannot be read or written is computed; nothing else depends on the folder, so it
@@ -28,17 +30,34 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.archive import archived, read_archive
+from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import load_model, model_digest
-from push_predictor.models.store.table_file import FORMAT_VERSION, read_tables, write_tables
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.tabulated.prediction_table import TableNodes
+from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
+from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_domain
+from push_predictor.recordings.atomic import write_whole
+from push_predictor.types import Array
 
 FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
+FORMAT_VERSION = 6  # also to be raised when a table's values change their meaning
+CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
+PARTS: dict[str, Any] = {  # of a file: fields of TabulatedDomain, TableNodes, TableAccuracy and Probes, in their order
+    "ends": tuple[Array, Array],
+    "nodes": tuple[list[int], list[int], list[float], list[Array]],
+    "error": tuple[float, float],
+    "probes": tuple[Array, Array, Array, Array],
+}
 NO_TABLE_YET = "computed: its table is being computed"
 MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
@@ -105,8 +124,7 @@ def keep_tables(model: PushModel, path: Path) -> None:
     """
     if not path.is_file():
         return
-    served = _read(model, None) or tabulate(model)
-    write_tables(tables_of(path), model_digest(model), served)
+    write_tables(tables_of(path), model_digest(model), _read(model, None) or tabulate(model))
 
 
 def tables_of(path: Path) -> Path:
@@ -136,6 +154,40 @@ def _read(model: PushModel, path: Path | None) -> TabulatedModel | None:
     with suppress(OSError):
         os.utime(kept)  # the least recently used ones are deleted
     return served
+
+
+def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | None:
+    """The model with the tables of a file; None without a whole file of this model, or if they predict otherwise."""
+    learnt = of_targets(model.base)
+    if not isinstance(learnt.predictor, GaussianProcessPredictor):
+        return None
+    try:
+        record, arrays = read_archive(path)
+        if (record["format_version"], record["model"]) != (FORMAT_VERSION, digest):
+            return None
+        found = {name: Reader(arrays).read(record[name], hint, name) for name, hint in PARTS.items()}
+        domain = domain_from_nodes(learnt, learnt.predictor, found["ends"], TableNodes(*found["nodes"]))
+        accepted = Probes(*found["probes"]).error_of(domain).accepted
+    except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+        return None
+    return with_domain(model, domain, TableAccuracy(*found["error"])) if accepted else None
+
+
+def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
+    """Write the table of a model with this digest, if it has one. Raises OSError."""
+    domain, error = tabulated.domain, tabulated.error
+    if domain is None or error is None:
+        return
+    nodes, probes = domain.table.nodes, probed(of_targets(tabulated.model.base), CHECKED)
+    parts = {
+        "ends": (domain.least, domain.most),
+        "nodes": tuple(vars(nodes).values()),
+        "error": tuple(vars(error).values()),
+        "probes": tuple(vars(probes).values()),
+    }
+    arrays: dict[str, np.ndarray] = {}
+    record = {name: encode(part, name, arrays) for name, part in parts.items()}
+    write_whole(path, archived({"format_version": FORMAT_VERSION, "model": digest, **record}, arrays))
 
 
 def _without_tables(model: PushModel) -> TabulatedModel:
