@@ -28,7 +28,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse import coarse_sweeps
 from coarse_pictures import coarse_pictures
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
@@ -50,7 +49,7 @@ NEEDS_ROS = re.compile(
     r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
 )
 LONGEST = {  # files that take six seconds of processor time or more, or that wait as long: a third of the workers' time
-    "test_alarm", "test_checks", "test_cli", "test_effect_table", "test_extended_model", "test_measured_end_to_end",
+    "test_alarm", "test_checks", "test_cli", "test_extended_model", "test_measured_end_to_end",
     "test_outline_causes", "test_paper_report", "test_prior_model", "test_residual_search", "test_tabulated_model",
     "test_trace_verdicts",
     "test_faults_bags", "test_faults_kill", "test_faults_load", "test_faults_network_security", "test_node_lab_topics",
@@ -123,13 +122,6 @@ def _places(needs_ros: Mapping[Path, bool], slow: Collection[Path]) -> dict[Path
 def coarse_figures(request: pytest.FixtureRequest) -> Iterator[None]:
     """Figures in a quarter of the time, but for the files that look at them."""
     with nullcontext() if request.module.__name__ in DRAWN_AS_FOR_READERS else coarse_pictures():
-        yield
-
-
-@pytest.fixture(scope="module")
-def coarse_integration() -> Iterator[None]:
-    """Displacements to 1 %, for files whose pushes have noise far above such errors."""
-    with coarse_sweeps():
         yield
 
 

@@ -112,7 +112,7 @@ def _on_polygon(x: cython.double, y: cython.double, body: cython.pointer(Body)) 
     if found.corner:
         found.normal_x, found.normal_y = away_x / length, away_y / length
     if least >= 1e300:  # a point that is not finite has no nearest one
-        found.x = found.y = found.distance = (x - x) + (y - y)
+        found.x = found.y = found.normal_x = found.normal_y = found.distance = (x - x) + (y - y)
     return found
 
 

@@ -45,7 +45,6 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 PER_PUSH = 4
 

@@ -42,7 +42,6 @@ from push_predictor.residuals.candidates.coefficients import _Problem, estimated
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.basis_choice import simplest_basis
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 EXACT = [mechanism.name for mechanism in LIBRARY if mechanism.quantities]
 ALWAYS = DriverBasis("constant")

@@ -40,7 +40,6 @@ from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 ON_CORNERS = supported_at(
     np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])

@@ -41,7 +41,7 @@ from push_predictor.models.train import TrainingOptions, retrain_model, train_mo
 from push_predictor.models.train_learnt import fitted_mean
 from push_predictor.recordings.table import PushTable
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}

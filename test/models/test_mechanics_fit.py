@@ -30,7 +30,6 @@ from push_predictor.models.mechanics.ladder import Rung, candidates, climb, wort
 from push_predictor.models.mechanics.limit_surface import uniform_support
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 NOISE = np.array([3e-5, 3e-5, 1e-3])
 TRUE = {"contact_friction": 0.15, "centre_y": 0.006}

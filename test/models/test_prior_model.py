@@ -51,7 +51,7 @@ from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)

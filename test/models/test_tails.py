@@ -43,7 +43,6 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 SCALE, DEGREES = np.array([0.5, 0.9, 1.6]), np.array([3.0, 4.0, 8.0])
 COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 0.25]])

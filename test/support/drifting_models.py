@@ -23,11 +23,10 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import Mechanics, has_exact_effects, joint_shift
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.push import Push
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 
@@ -36,9 +35,9 @@ DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 GRAIN = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 
 
-def physics() -> AnalyticalPush:
+def mechanics() -> FittedMechanics:
     rig = square_rig()
-    return AnalyticalPush(rig.outline, rig.pusher_radius)
+    return analytical_mechanics(rig.outline, rig.pusher_radius)
 
 
 def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
@@ -48,15 +47,13 @@ def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
     duration = np.full(n, 0.2)
     shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
-    outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
+    outcomes = mechanics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
     covariates = {
         "elapsed_time": np.repeat(np.linspace(0.0, 1000.0, count), 3),
         "topic:/warmth": np.repeat(rng.standard_normal(count), 3),
         "slider_heading": rng.uniform(-np.pi, np.pi, n),
     }
-    acting = [replace(effect, exact=has_exact_effects(effect.mechanism)) for effect in effects]
-    on = Mechanics(physics(), mechanics_of(physics()))
-    shift = joint_shift(on, acting, Push(inputs, duration, covariates))
+    shift = joint_shift(mechanics(), effects, Push(inputs, duration, covariates))
     push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 
@@ -71,4 +68,4 @@ def grain(size: float) -> Effect:
 
 
 def extended(base: PushModel, *effects: Effect, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> PushModel:
-    return replace(base, predictor=ExtendedPredictor(base.predictor.base, physics(), effects, np.array(scale)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor.base, effects, np.array(scale)))

@@ -23,7 +23,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
@@ -43,7 +43,7 @@ def square_pushes(count: int, seed: int = 0) -> tuple[PushTable, Rig]:
     rng, rig = np.random.default_rng(seed), replace(square_rig(), surface="abs")
     inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
     duration = np.full(count, 0.2)
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
     outcomes += rng.standard_normal((count, 3)) * [1e-4, 2e-4, 5e-3] * (0.3 + np.abs(inputs[:, 2:]))
     return PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(count)])), rig
 
@@ -54,7 +54,7 @@ def noisy_pushes(n: int = 120, seed: int = 0, rig: Rig | None = None, windows_pe
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([rng.uniform(0.01, 0.05, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
     duration = np.full(n, 0.2)
-    exact = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    exact = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
     noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
     push_id = np.array([f"{seed}-{k // windows_per_push}" for k in range(n)])
     return PushTable(inputs, duration, exact + noise, push_id, {"elapsed_time": np.arange(float(n))})
