@@ -102,7 +102,8 @@ def _on_polygon(x: cython.double, y: cython.double, body: cython.pointer(Body)) 
         if square < least:
             least, away_x, away_y = square, off_x, off_y
             found.edge, found.share = k, share
-        if (from_y < 0.0) != (from_y < edge[3]) and from_x < from_y * edge[2] / edge[3]:
+        end_y: cython.double = body.edges[9 * (k + 1 if k + 1 < body.count else 0) + 1]  # bits of the next start
+        if (y < edge[1]) != (y < end_y) and from_x < from_y * edge[2] / edge[3]:
             inside = not inside
     edge = body.edges + 9 * found.edge
     length: cython.double = sqrt(least)

@@ -33,7 +33,6 @@ from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
@@ -287,13 +286,12 @@ def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> No
 
 
 def test_only_a_correlation_needs_format_5(model: PushModel, tmp_path: Path) -> None:
-    physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
     tip = Effect(
         "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
     )
     for predictor, version in ((model.predictor, 5), (alone(model), 1)):
         assert isinstance(predictor, GaussianProcessPredictor)
-        extended = ExtendedPredictor(predictor, physics, (tip,), np.array([1.0, 1.0, 2.0]))
+        extended = ExtendedPredictor(predictor, (tip,), np.array([1.0, 1.0, 2.0]))
         for kind, least in ((predictor, 1), (extended, 3)):
             save_model(replace(model, predictor=kind), tmp_path / "m")
             with np.load(tmp_path / "m") as archive:

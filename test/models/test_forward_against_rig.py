@@ -26,8 +26,8 @@ from supports import THREE_POINTS
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.surface import PowerSurface
 from push_predictor.simulation.changes import PLAIN, Changes
 from push_predictor.simulation.dynamics import run
 from push_predictor.simulation.physics import GRAVITY, Physics

@@ -187,7 +187,7 @@ def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel,
     effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
     base, table = learnt(with_function), pushes(5, 11)
     extended = replace(
-        with_function, predictor=ExtendedPredictor(base, base.physics, (effect,), np.array([1.5, 1.0, 1.0]))
+        with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0]))
     )
     expected = extended.predict_rows(table.inputs, table.duration)
     shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))

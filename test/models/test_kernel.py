@@ -41,9 +41,7 @@ OUTLINES = {
     ),
     "triangle": Outline(np.array([[-0.045, -0.026], [0.045, -0.026], [0.0, 0.052]])),
 }
-ON_THREE = PressureDistribution(
-    np.array([[-0.03, -0.02], [0.03, -0.02], [0.0, 0.03]]), np.array([0.3, 0.3, 0.4])
-)
+ON_THREE = PressureDistribution(np.array([[-0.03, -0.02], [0.03, -0.02], [0.0, 0.03]]), np.array([0.3, 0.3, 0.4]))
 # By the array code that the kernel replaced, at two accuracies; NaN where it took more than 4 s.
 KEPT = np.load(Path(__file__).parent / "data" / "displacements.npz")
 SLIDERS = [str(name) for name in KEPT["groups"]]

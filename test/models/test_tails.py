@@ -30,7 +30,6 @@ from synthetic import noisy_pushes, square_rig
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
@@ -305,11 +304,10 @@ def test_exact_density_is_the_t_density_of_the_reported_moments() -> None:
 
 def test_effects_shift_and_widen_the_t_density() -> None:
     model, test = trained("gp"), shared_errors(5, 3)
-    physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
     tip = Effect(
         "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
     )
-    extended = replace(model, predictor=ExtendedPredictor(learnt(model), physics, (tip,), np.array([2.0, 1.0, 0.5])))
+    extended = replace(model, predictor=ExtendedPredictor(learnt(model), (tip,), np.array([2.0, 1.0, 0.5])))
     tails, answer = tails_of(extended), predicted(extended, test)
     scale = answer.std * np.sqrt((tails.degrees - 2.0) / tails.degrees)
     expected = stats.t(tails.degrees, answer.mean, scale).logpdf(test.outcomes)
