@@ -178,14 +178,14 @@ def test_projection_on_an_ellipse_with_a_pose_is_its_nearest_point(
     assert abs(found.distance[0]) == pytest.approx(nearest, abs=max(a, b) * np.pi / 20000)
     assert abs(found.distance[0]) <= nearest + 1e-12
     assert found.point + found.distance[:, None] * found.normal == pytest.approx(point[None], abs=1e-12)
-    if nearest > 1e-6:
+    if abs(found.distance[0]) > 1e-9:
         assert (found.distance[0] < 0.0) == ((u / a) ** 2 + (v / b) ** 2 < 1.0)
 
 
 @EVERY_OUTLINE
 def test_points_level_with_a_corner_to_rounding_are_on_the_right_side(outline: Outline) -> None:
     """A ray from such a point runs through the corner."""
-    for x, y in outline.vertices:
+    for y in outline.vertices[:, 1]:
         level = np.array([0.0, 1e-300, -6e-26, 1e-17, -1e-17]) + y
         middle = np.column_stack([np.zeros(5), level])
         expected = [winds_around(outline, point) for point in middle]
@@ -198,7 +198,7 @@ def test_points_level_with_a_corner_to_rounding_are_on_the_right_side(outline: O
 @EVERY_OUTLINE
 def test_a_point_that_is_not_finite_has_no_nearest_one(outline: Outline, bad: float) -> None:
     found = outline.project(np.array([[0.1, 0.0], [bad, 0.01], [0.1, 0.0]]))
-    assert not np.isfinite(found.distance[1]) and np.isnan(found.normal[1]).any()
+    assert not np.isfinite(found.distance[1])
     assert np.isfinite(found.distance[[0, 2]]).all() and np.array_equal(found.point[0], found.point[2])
 
 

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -30,20 +29,18 @@ from synthetic import square_rig
 
 from push_predictor.errors import ModelFileError
 from push_predictor.evaluation.metrics import joint_nlpd
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.push import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
+from push_predictor.models.predictors import GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
+from push_predictor.models.tabulated.partial_correlation import unbounded
+from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
-
 
 PER_PUSH = 4
 
@@ -142,6 +139,14 @@ def test_many_points_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch, mod
     assert correlation.at(asked) == pytest.approx(whole, abs=1e-12)
 
 
+def bounded(numbers: Array) -> Array:
+    """The correlation matrices (n, 3, 3) of numbers (n, 3) in a table: covariances of unit variances."""
+    values = np.column_stack([np.ones((len(numbers), 6)), np.zeros((len(numbers), 3)), numbers])
+    found, of_process = np.empty((len(numbers), 3, 3)), np.empty((len(numbers), 3, 3))
+    table_moments(values, np.zeros(3), found, of_process)
+    return of_process
+
+
 @settings(max_examples=50, deadline=None)
 @given(
     numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
@@ -162,8 +167,6 @@ def test_outcome_process_and_their_difference_are_covariances(numbers: Array, la
 def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
     matrices = bounded(numbers)
     assert np.all(np.linalg.eigvalsh(matrices) > 0.0)
-    for one, matrix in zip(numbers, matrices, strict=True):
-        assert bounded_one(one.tolist()) == pytest.approx((matrix[0, 1], matrix[0, 2], matrix[1, 2]), abs=1e-12)
     assert bounded(unbounded(matrices)) == pytest.approx(matrices, abs=1e-7)
 
 
@@ -283,22 +286,6 @@ def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> No
     push = Push(inputs, np.full(len(inputs), 0.2), {})
     for ours, theirs in zip(model.predictor.moments(push), loaded.predictor.moments(push), strict=True):
         assert np.array_equal(ours, theirs)
-
-
-def test_only_a_correlation_needs_format_5(model: PushModel, tmp_path: Path) -> None:
-    tip = Effect(
-        "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
-    )
-    for predictor, version in ((model.predictor, 5), (alone(model), 1)):
-        assert isinstance(predictor, GaussianProcessPredictor)
-        extended = ExtendedPredictor(predictor, (tip,), np.array([1.0, 1.0, 2.0]))
-        for kind, least in ((predictor, 1), (extended, 3)):
-            save_model(replace(model, predictor=kind), tmp_path / "m")
-            with np.load(tmp_path / "m") as archive:
-                assert json.loads(archive["header"].tobytes())["format_version"] == max(version, least)
-            loaded = of(load_model(tmp_path / "m"), model.training.inputs)
-            expected = of(model, model.training.inputs) if version == 5 else np.zeros(len(loaded))
-            assert loaded == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -28,12 +28,11 @@ from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push import Push
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
-
 
 BLOCKS = 6
 TO = 1e-2  # nats, to which the noise of the remaining rows is solved for

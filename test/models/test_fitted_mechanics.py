@@ -40,7 +40,6 @@ from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-
 ON_CORNERS = supported_at(
     np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 )
@@ -165,7 +164,9 @@ def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None
 
 def test_ellipsoid_has_the_friction_and_the_pressure_of_the_mechanics(by_recording: PushModel) -> None:
     assert by_recording.predictor.mechanics.value("contact_friction") == 0.2
-    assert by_recording.predictor.mechanics.ellipsoid.length == pytest.approx(0.5 * (ON_CORNERS.length + IN_MIDDLE.length))
+    assert by_recording.predictor.mechanics.ellipsoid.length == pytest.approx(
+        0.5 * (ON_CORNERS.length + IN_MIDDLE.length)
+    )
     shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.mechanics.ellipsoid
     assert shifted.centre == pytest.approx((0.002, 0.0), abs=1e-12)
     assert shifted.length > 1.1 * mechanics_model({}).predictor.mechanics.ellipsoid.length

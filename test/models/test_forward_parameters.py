@@ -25,7 +25,6 @@ from supports import THREE_POINTS
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution

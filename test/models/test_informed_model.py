@@ -32,8 +32,8 @@ from push_predictor.models.gaussian_process.regression import best_held_out, hel
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.push import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, MechanicsMean, Shift
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
@@ -186,9 +186,7 @@ def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel,
     basis = DriverBasis("constant", (), (), (), 0.0, ())
     effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
     base, table = learnt(with_function), pushes(5, 11)
-    extended = replace(
-        with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0]))
-    )
+    extended = replace(with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0])))
     expected = extended.predict_rows(table.inputs, table.duration)
     shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))
     alone = with_function.predict_rows(table.inputs, table.duration)

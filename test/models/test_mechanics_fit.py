@@ -29,7 +29,6 @@ from push_predictor.models.mechanics.held_out import CrossValidation
 from push_predictor.models.mechanics.ladder import Rung, candidates, climb, worthwhile
 from push_predictor.models.mechanics.surface import uniform_ellipsoid
 
-
 NOISE = np.array([3e-5, 3e-5, 1e-3])
 TRUE = {"contact_friction": 0.15, "centre_y": 0.006}
 

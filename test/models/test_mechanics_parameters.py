@@ -32,5 +32,3 @@ def test_every_parameter_has_its_own_name_and_a_textbook_value_in_range() -> Non
         assert 0.0 < parameter.spread <= parameter.high - parameter.low
         assert parameter.unit and parameter.meaning
         assert parameter.part in ("contact", "pressure", "measurement", "world")
-
-

@@ -41,10 +41,8 @@ from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.arrays_record import read_arrays
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.planning.push_windows import windows_of
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
@@ -265,7 +263,6 @@ def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel
 # --- without training rows ---------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("coarse")
 def test_untrained_model_describes_itself(of_few_draws: PushModel, tmp_path: Path) -> None:
     assert "trained on no push" in repr(of_few_draws)
     of_few_draws.save(tmp_path / "before.pushmodel")

@@ -39,7 +39,6 @@ from push_predictor.models.train import TrainingOptions, train_model, training_r
 from push_predictor.recordings.table import PushTable
 
 
-
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     return {

@@ -30,18 +30,17 @@ from synthetic import noisy_pushes, square_rig
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.push import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.predictors.tails import INTERVAL_KINDS, STEPS, Tails, half_widths, joint_radius
 from push_predictor.models.predictors.tails_fit import FEWEST_PUSHES, fit_tails
+from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
-
 
 SCALE, DEGREES = np.array([0.5, 0.9, 1.6]), np.array([3.0, 4.0, 8.0])
 COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 0.25]])
