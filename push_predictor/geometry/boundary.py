@@ -130,7 +130,8 @@ def _on_polygon(x: cython.double, y: cython.double, body: cython.pointer(Body)) 
         if square < least:
             least, away_x, away_y = square, off_x, off_y
             found.edge, found.share = k, share
-        if (from_y < 0.0) != (from_y < edge[3]) and from_x < from_y * edge[2] / edge[3]:
+        end_y: cython.double = body.edges[9 * (k + 1 if k + 1 < body.count else 0) + 1]  # bits of the next start
+        if (y < edge[1]) != (y < end_y) and from_x < from_y * edge[2] / edge[3]:
             inside = not inside
     edge = body.edges + 9 * found.edge
     length: cython.double = sqrt(least)
@@ -140,7 +141,7 @@ def _on_polygon(x: cython.double, y: cython.double, body: cython.pointer(Body)) 
     if found.corner:
         found.normal_x, found.normal_y = away_x / length, away_y / length
     if least >= 1e300:  # a point that is not finite has no nearest one
-        found.x = found.y = found.distance = (x - x) + (y - y)
+        found.x = found.y = found.normal_x = found.normal_y = found.distance = (x - x) + (y - y)
     return found
 
 

@@ -25,6 +25,7 @@ from hypothesis import strategies as st
 from scipy.special import ellipe
 
 from push_predictor.errors import RigError
+from push_predictor.geometry.convex import is_convex
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import (
@@ -36,6 +37,7 @@ from push_predictor.geometry.shapes import (
     square,
     transformed,
 )
+from push_predictor.types import Array
 
 TRIANGLE = Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))
 ELL = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.1], [0.0, 0.1]]))
@@ -122,6 +124,84 @@ def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
     assert 0.0 <= found.contact[0] < 1.0
 
 
+@st.composite
+def polygons(draw: st.DrawFn) -> Outline:
+    """Stars about the origin of 3 to 9 corners, most of them not convex, somewhere in the plane."""
+    count = draw(st.integers(3, 9))
+    radius = np.array(draw(st.lists(st.floats(0.01, 0.1), min_size=count, max_size=count)))
+    turn = 2.0 * np.pi * np.arange(count) / count + draw(st.floats(-3.0, 3.0))
+    return Outline(radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]) + draw(st.floats(-0.1, 0.1)))
+
+
+def winds_around(outline: Outline, point: Array) -> bool:
+    """Whether the outline goes around a point, by the sum of the angles of its edges."""
+    x, y = (outline.vertices - point).T
+    turned = np.arctan2(x * np.roll(y, -1) - np.roll(x, -1) * y, x * np.roll(x, -1) + y * np.roll(y, -1))
+    return bool(abs(turned.sum()) > np.pi)
+
+
+@settings(max_examples=150, deadline=None)
+@given(polygons(), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
+def test_projection_on_any_polygon_is_the_nearest_point_of_all_edges(outline: Outline, x: float, y: float) -> None:
+    point, ends = np.array([x, y]), np.roll(outline.vertices, -1, axis=0)
+    found = outline.project(point[None])
+    fine = np.linspace(0.0, 1.0, 2001)[:, None]
+    nearest = min(
+        float(np.min(np.linalg.norm(a + fine * (b - a) - point, axis=1)))
+        for a, b in zip(outline.vertices, ends, strict=True)
+    )
+    longest = float(np.max(np.linalg.norm(ends - outline.vertices, axis=1)))
+    assert nearest - longest / 4000 - 1e-12 <= abs(found.distance[0]) <= nearest + 1e-12
+    assert np.linalg.norm(found.point[0] - point) == pytest.approx(abs(found.distance[0]), abs=1e-14)
+    assert np.linalg.norm(found.normal[0]) == pytest.approx(1.0)
+    if nearest > 1e-9:
+        assert (found.distance[0] < 0.0) == winds_around(outline, point)
+    if found.distance[0] > 1e-9:
+        assert found.point + found.distance[:, None] * found.normal == pytest.approx(point[None], abs=1e-12)
+    assert outline.point(found.contact) == pytest.approx(found.point, abs=1e-9)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.floats(0.01, 0.1), st.floats(0.01, 0.1), st.tuples(*[st.floats(-0.1, 0.1)] * 2, st.floats(-3.0, 3.0)),
+    st.floats(-0.2, 0.2), st.floats(-0.2, 0.2),
+)  # fmt: skip
+def test_projection_on_an_ellipse_with_a_pose_is_its_nearest_point(
+    a: float, b: float, pose: tuple[float, float, float], x: float, y: float
+) -> None:
+    outline, point = transformed(ellipse(a, b), pose[2], pose[:2]), np.array([x, y])
+    found = outline.project(point[None])
+    turn = np.linspace(0.0, 2.0 * np.pi, 20001)
+    curve = rotate(np.column_stack([a * np.cos(turn), b * np.sin(turn)]), np.array(pose[2])) + pose[:2]
+    nearest = float(np.min(np.linalg.norm(curve - point, axis=1)))
+    u, v = rotate(point - pose[:2], np.array(-pose[2]))
+    assert abs(found.distance[0]) == pytest.approx(nearest, abs=max(a, b) * np.pi / 20000)
+    assert abs(found.distance[0]) <= nearest + 1e-12
+    assert found.point + found.distance[:, None] * found.normal == pytest.approx(point[None], abs=1e-12)
+    if abs(found.distance[0]) > 1e-9:
+        assert (found.distance[0] < 0.0) == ((u / a) ** 2 + (v / b) ** 2 < 1.0)
+
+
+@EVERY_OUTLINE
+def test_points_level_with_a_corner_to_rounding_are_on_the_right_side(outline: Outline) -> None:
+    """A ray from such a point runs through the corner."""
+    for y in outline.vertices[:, 1]:
+        level = np.array([0.0, 1e-300, -6e-26, 1e-17, -1e-17]) + y
+        middle = np.column_stack([np.zeros(5), level])
+        expected = [winds_around(outline, point) for point in middle]
+        clear = np.abs(outline.project(middle).distance) > 1e-9
+        assert np.array_equal((outline.project(middle).distance < 0.0)[clear], np.array(expected)[clear])
+        assert np.all(outline.project(np.column_stack([np.full(5, -0.3), level])).distance > 0.0)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@EVERY_OUTLINE
+def test_a_point_that_is_not_finite_has_no_nearest_one(outline: Outline, bad: float) -> None:
+    found = outline.project(np.array([[0.1, 0.0], [bad, 0.01], [0.1, 0.0]]))
+    assert not np.isfinite(found.distance[1])
+    assert np.isfinite(found.distance[[0, 2]]).all() and np.array_equal(found.point[0], found.point[2])
+
+
 @settings(max_examples=100, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_normal_outside_points_from_the_nearest_point_to_the_query(outline, x, y):
@@ -168,7 +248,7 @@ def test_a_star_that_is_wound_twice_is_not_convex():
     """Though it turns to the left at each vertex."""
     angles = 0.8 * np.pi * np.arange(5)
     star = Outline(0.05 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    assert not star.is_convex
+    assert not is_convex(star.vertices)
     assert star.project(np.array([[0.06, 0.0]])).distance[0] == pytest.approx(0.01)
 
 

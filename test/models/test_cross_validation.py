@@ -33,8 +33,6 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
-
 BLOCKS = 6
 TO = 1e-2  # nats, to which the noise of the remaining rows is solved for
 FIELDS = ("mean", "variance", "log_noise_mean", "log_noise_variance")

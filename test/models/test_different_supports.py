@@ -31,7 +31,7 @@ from push_predictor.recordings.load import different_supports, load_data
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 MIDDLE = CORNERS * [0.25, 0.25, 1.0]

@@ -26,10 +26,8 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
-from coarse import coarse_effects
-from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, physics, pushes, slippery
+from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
 from hosted_nodes import hosted_node
-from push_predictor.models.tabulated.effect_tables import build
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -39,8 +37,7 @@ from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariate_range import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
-from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
-from push_predictor.models.mechanics.fitted import mechanics_of
+from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
 from push_predictor.models.push import Push
@@ -49,7 +46,6 @@ from push_predictor.models.request import PushRequest, check_request, check_tabl
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
@@ -74,18 +70,6 @@ def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: 
     """The base with terms (mechanism, covariate, basis), estimated on the residuals of the deployed model."""
     evidence = evidence_of(deployed or base, table)
     return extend(base, evidence, [candidate(evidence, *term) for term in terms])
-
-
-@pytest.fixture(scope="module", autouse=True)
-def small_tables() -> Iterator[None]:
-    """Tables of prior models and of effects are refused after some knots, and not built for seconds.
-
-    Displacements are accurate to a few percent of the noise.
-    """
-    with pytest.MonkeyPatch.context() as patch, coarse_effects():
-        patch.setattr(tabulated_prior, "MOST_KNOTS", 10)
-        patch.setattr(build, "ATTEMPTS", ((3_000, 1.0),))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -134,16 +118,18 @@ def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushM
     base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
     model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
     ours, theirs = predicted(model, table), predicted(base, table)
-    shifts, uncertainty = zip(*(effect.shift(physics(), push) for effect in effects), strict=True)
+    together = joint(mechanics(), effects, push)
+    pairs = zip(together.designs, effects, strict=True)
+    uncertainty = [design @ effect.covariance @ design.transpose(0, 2, 1) for design, effect in pairs]
     scale = np.diag([0.5, 1.0, 2.0])
-    np.testing.assert_allclose(ours.mean, theirs.mean + sum(shifts), rtol=1e-12)
+    np.testing.assert_allclose(ours.mean, theirs.mean + together.shift, rtol=1e-12)
     np.testing.assert_allclose(ours.covariance, scale @ theirs.covariance @ scale + sum(uncertainty), atol=1e-18)
     np.testing.assert_allclose(ours.process_covariance, scale @ theirs.process_covariance @ scale, atol=1e-18)
 
 
 def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
     base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
-    shift, _ = effect.shift(physics(), Push(table.inputs, table.duration, table.covariates))
+    shift = joint_shift(mechanics(), [effect], Push(table.inputs, table.duration, table.covariates))
     moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
     np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
 
@@ -186,8 +172,7 @@ def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
         whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
         whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
     push = Push(table.inputs, table.duration, table.covariates)
-    on = Mechanics(predictor.physics, predictor.mechanics)
-    design = np.concatenate(joint(on, predictor.effects, push).designs, axis=2)
+    design = np.concatenate(joint(predictor.mechanics, predictor.effects, push).designs, axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
 
 
@@ -290,7 +275,7 @@ def test_covariates_that_follow_from_the_push_are_not_needed(bases: dict[str, Pu
     inputs = table.inputs * [2.0, 1.0, 1.0]
     given = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
     push = Push(inputs, table.duration, given)
-    shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
+    shift = joint_shift(mechanics(), [faster, tip], push)
     ours, theirs = (m.predict_rows(inputs, table.duration).mean for m in (model, bases["gp"]))
     np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
     alone = tabulate(model).predict_rows(inputs[:1], table.duration[:1])
@@ -394,7 +379,7 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
     predictor = with_effects(refit_base(bases["analytical"], table), table, terms).predictor
     push = Push(table.inputs, table.duration, table.covariates)
     shift, _ = predictor.shift(push)
-    planted = joint_shift(Mechanics(physics(), mechanics_of(physics())), [replace(slippery(0.2), exact=True)], push)
+    planted = joint_shift(mechanics(), [slippery(0.2)], push)
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
 
 
@@ -450,7 +435,7 @@ def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[
     refit = refit_base(bases["analytical"], table)
     after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
     assert gain(refit, after, held_out)[1].high < 0.0
-    design = design_of(None, DRIFT, physics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
+    design = design_of(None, DRIFT, mechanics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
     assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 

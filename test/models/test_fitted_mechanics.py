@@ -40,8 +40,6 @@ from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
-
 ON_CORNERS = supported_at(
     np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 )
@@ -165,12 +163,13 @@ def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None
 
 
 def test_ellipsoid_has_the_friction_and_the_pressure_of_the_mechanics(by_recording: PushModel) -> None:
-    physics = by_recording.predictor.physics
-    assert physics.contact_friction == 0.2
-    assert physics.support.length == pytest.approx(0.5 * (ON_CORNERS.length + IN_MIDDLE.length))
-    shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.physics.support
+    assert by_recording.predictor.mechanics.value("contact_friction") == 0.2
+    assert by_recording.predictor.mechanics.ellipsoid.length == pytest.approx(
+        0.5 * (ON_CORNERS.length + IN_MIDDLE.length)
+    )
+    shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.mechanics.ellipsoid
     assert shifted.centre == pytest.approx((0.002, 0.0), abs=1e-12)
-    assert shifted.length > 1.1 * mechanics_model({}).predictor.physics.support.length
+    assert shifted.length > 1.1 * mechanics_model({}).predictor.mechanics.ellipsoid.length
 
 
 def test_effects_extend_it_and_are_saved(tmp_path: Path) -> None:
@@ -178,7 +177,7 @@ def test_effects_extend_it_and_are_saved(tmp_path: Path) -> None:
     basis = DriverBasis("constant", (), (), (), 0.0, ())
     effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
     base = model.predictor.base
-    extended = ExtendedPredictor(base, model.predictor.physics, (effect,), np.ones(3))
+    extended = ExtendedPredictor(base, (effect,), np.ones(3))
     assert extended.needs == ("push_heading",)
     again = saved(replace(model, predictor=extended), tmp_path)
     slipping = Pushes(0.02, 0.1, 1.0, covariates={"push_heading": 0.1})

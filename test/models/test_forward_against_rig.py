@@ -22,12 +22,12 @@ from functools import cache
 import numpy as np
 import pytest
 from even_physics import no_noise, uniform_field
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from supports import THREE_POINTS
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.surface import PowerSurface
 from push_predictor.simulation.changes import PLAIN, Changes
 from push_predictor.simulation.dynamics import run
 from push_predictor.simulation.physics import GRAVITY, Physics

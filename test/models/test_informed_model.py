@@ -41,7 +41,7 @@ from push_predictor.models.train import TrainingOptions, retrain_model, train_mo
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
@@ -223,9 +223,7 @@ def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel,
     basis = DriverBasis("constant", (), (), (), 0.0, ())
     effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
     base, table = learnt(with_function), pushes(5, 11)
-    extended = replace(
-        with_function, predictor=ExtendedPredictor(base, base.physics, (effect,), np.array([1.5, 1.0, 1.0]))
-    )
+    extended = replace(with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0])))
     expected = extended.predict_rows(table.inputs, table.duration)
     shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))
     alone = with_function.predict_rows(table.inputs, table.duration)

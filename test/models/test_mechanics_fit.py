@@ -20,8 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
@@ -29,8 +27,7 @@ from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_r
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation
 from push_predictor.models.mechanics.ladder import Rung, candidates, climb, worthwhile
-
-pytestmark = pytest.mark.usefixtures("coarse_integration")
+from push_predictor.models.mechanics.surface import uniform_ellipsoid
 
 NOISE = np.array([3e-5, 3e-5, 1e-3])
 TRUE = {"contact_friction": 0.15, "centre_y": 0.006}
@@ -38,8 +35,7 @@ TRUE = {"contact_friction": 0.15, "centre_y": 0.006}
 
 def ellipsoidal_mechanics() -> PushMechanics:
     rig = square_rig()
-    support = uniform_support(rig.outline)
-    return PushMechanics(rig.outline, rig.pusher_radius, PowerSurface(np.array(support.centre), support.length))
+    return PushMechanics(rig.outline, rig.pusher_radius, uniform_ellipsoid(rig.outline))
 
 
 def simulated(values: dict[str, float], n: int = 90, seed: int = 0, noise: float = 1.0) -> FitRows:

@@ -16,11 +16,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
 from repository import REPOSITORY
 
-from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, RowValues, parameter_table
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, parameter_table
 
 
 def test_the_docs_show_the_table_of_parameters() -> None:
@@ -34,15 +32,3 @@ def test_every_parameter_has_its_own_name_and_a_textbook_value_in_range() -> Non
         assert 0.0 < parameter.spread <= parameter.high - parameter.low
         assert parameter.unit and parameter.meaning
         assert parameter.part in ("contact", "pressure", "measurement", "world")
-
-
-def test_missing_values_are_the_textbooks_and_single_values_apply_to_all_pushes() -> None:
-    values = RowValues({"centre_x": 0.01, "centre_y": np.array([0.0, 0.0, 0.02])}, 3, {})
-    assert values.of("contact_friction").tolist() == [0.3, 0.3, 0.3]
-    assert values.pair("centre_x", "centre_y").tolist() == [[0.01, 0.0], [0.01, 0.0], [0.01, 0.02]]
-    assert values.active("centre_y") and not values.active("slope_x", "slope_y")
-
-
-def test_rejects_a_name_that_is_no_parameter() -> None:
-    with pytest.raises(KeyError, match="'friction' is no parameter of the mechanics: contact_friction"):
-        RowValues({"friction": 0.3}, 1, {})

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import pytest
 from drifting_models import pushes
-from push_predictor.models.gaussian_process.constant import ConstantNoise, ConstantParameters
+from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError

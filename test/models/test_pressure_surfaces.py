@@ -22,17 +22,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist, twist_of_load
-from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
-from push_predictor.models.mechanics.limit_surfaces.surfaces import DIRECTIONS, PowerSurface, spread_by_direction
 from supports import FOUR_POINTS, THREE_POINTS, TWO_POINTS
 
 from push_predictor.errors import RigError
+from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
+from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square, transformed
+from push_predictor.models.mechanics.load_map import AZIMUTHS, DIRECTIONS, ELEVATIONS, LoadMap, load_map, reach
+from push_predictor.models.mechanics.point_friction import power_of_twist, twist_of_load
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch, supported_at
+from push_predictor.models.mechanics.surface import uniform_ellipsoid
 from push_predictor.types import Array
 
 RADIUS = 0.05  # m, of a disc
@@ -69,9 +68,29 @@ def angle_between(one: Array, other: Array) -> Array:
     return np.asarray(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0)))
 
 
-def tabulated(surface: LoadMap | PowerSurface, load: Array) -> Array:
-    """Twists (n, 3: spin times length) of loads (n, 3: moment over length)."""
-    return np.stack(surface.twist(*load.T), axis=1)
+def loads() -> Array:
+    """The loads (n, 3: moment over length) at the nodes of a table, but for those of the last column."""
+    rise = np.linspace(0.0, 0.5 * np.pi, ELEVATIONS)
+    turn = np.arange(AZIMUTHS) * 2.0 * np.pi / AZIMUTHS
+    up, around = (grid.ravel() for grid in np.meshgrid(rise, turn, indexing="ij"))
+    return np.column_stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+
+
+def nodes(surface: LoadMap) -> tuple[Array, Array]:
+    """Unit twists (n, 3: spin times length) of these loads, and their sizes (n,) on the surface."""
+    rows = surface.nodes[:, :-1].reshape(-1, 4)
+    return rows[:, :3], rows[:, 3]
+
+
+def resisted(support: PressureDistribution, twist: Array) -> Array:
+    """Loads (n, 3) of twists (n, 3): the sum of the frictions of the points, each spread over its area."""
+    x, y = support.points.T
+    u = np.stack([twist[:, :1] - twist[:, 2:] * y, twist[:, 1:2] + twist[:, 2:] * x], axis=2)
+    area = 2.0 * max(support.spread, 3e-3 * support.length) ** 2
+    weight = support.shares / np.sqrt(np.sum(u * u, axis=2) + area * twist[:, 2:] ** 2)
+    force = weight[:, :, None] * u
+    moment = np.sum(x * force[:, :, 1] - y * force[:, :, 0] + weight * area * twist[:, 2:], axis=1)
+    return np.column_stack([force.sum(axis=1), moment])
 
 
 # --- the definition -------------------------------------------------------------------------------------------------
@@ -79,14 +98,17 @@ def tabulated(surface: LoadMap | PowerSurface, load: Array) -> Array:
 
 @settings(max_examples=50, deadline=None)
 @given(twists)
-def test_load_of_a_twist_is_the_sum_of_point_frictions(twist: tuple[float, float, float]) -> None:
-    vx, vy, w = twist[0], twist[1], twist[2] / 0.04
-    force, moment = np.zeros(2), 0.0
-    for (x, y), share in zip(THREE_POINTS.points, THREE_POINTS.shares, strict=True):
-        velocity = np.array([vx - w * y, vy + w * x])
-        friction = share * velocity / max(float(np.linalg.norm(velocity)), 1e-300)
-        force, moment = force + friction, moment + x * friction[1] - y * friction[0]
-    assert load_of_twist(THREE_POINTS, np.array([[vx, vy, w]]))[0] == pytest.approx([*force, moment], abs=1e-9)
+def test_load_is_the_slope_of_the_power_and_drives_the_twist_that_it_resists(twist: tuple[float, float, float]) -> None:
+    given_ = np.array([[twist[0], twist[1], twist[2] / 0.04]])
+    load = resisted(THREE_POINTS, given_)
+    steps = 1e-6 * np.diag([1.0, 1.0, 25.0])
+    slope = (power_of_twist(THREE_POINTS, given_ + steps) - power_of_twist(THREE_POINTS, given_ - steps)) / (
+        2.0 * np.diag(steps)
+    )
+    assert load[0] * [1.0, 1.0, 25.0] == pytest.approx(slope * [1.0, 1.0, 25.0], abs=1e-4)
+    assert load[0] @ given_[0] == pytest.approx(power_of_twist(THREE_POINTS, given_)[0], rel=1e-9)
+    back = resisted(THREE_POINTS, twist_of_load(THREE_POINTS, load))
+    assert back == pytest.approx(load, abs=1e-6)
 
 
 def disc_load(distance: float) -> tuple[float, float]:
@@ -108,105 +130,67 @@ def disc_load(distance: float) -> tuple[float, float]:
 def test_even_disc_has_the_load_of_the_integral_over_its_area(distance: float) -> None:
     disc, d = patch(ellipse(RADIUS, RADIUS)), distance * RADIUS
     force, moment = disc_load(d)
-    load = load_of_twist(disc, np.array([[0.0, -d, 1.0]]))[0]
+    load = resisted(disc, np.array([[0.0, -d, 1.0]]))[0]
     assert load == pytest.approx([0.0, force, moment], abs=2e-3 * RADIUS, rel=3e-3)
 
 
-@pytest.mark.parametrize("distance", [0.4, 0.8, 1.2, 2.0, 5.0])
-def test_table_of_an_even_disc_inverts_the_integral_over_its_area(distance: float) -> None:
-    disc = map_of("disc")
-    force, moment = disc_load(distance * RADIUS)
-    load = np.array([[0.0, force, moment / disc.length]])
-    twist = tabulated(disc, load)
-    assert angle_between(twist, np.array([[0.0, -distance * RADIUS, disc.length]]))[0] < 6e-3
-    assert disc.gauge(*load.T)[0] == pytest.approx(1.0, abs=3e-3)
-
-
 @EVERY_SUPPORT
-def test_tabulated_twist_has_the_load_it_was_asked_for(name: str) -> None:
-    support, surface = about_centre(SUPPORTS[name]), map_of(name)
-    load = directions(400)
-    twist = tabulated(surface, load)
-    spun = PressureDistribution(support.points, support.shares, max(support.spread, 3e-3 * surface.length))
-    back = load_of_twist(spun, twist / [1.0, 1.0, surface.length]) / [1.0, 1.0, surface.length]
-    error = angle_between(back, load)
-    assert np.mean(error) < (0.02 if "points" in name else 0.002)  # next to a flat, a twist says little of its load
-    solved = twist_of_load(support, load * [1.0, 1.0, surface.length]) * [1.0, 1.0, surface.length]
-    assert np.quantile(angle_between(twist, solved), 0.99) < 0.012
-
-
-@EVERY_SUPPORT
-def test_gauge_is_one_on_the_limit_surface(name: str) -> None:
-    support, surface = about_centre(SUPPORTS[name]), map_of(name)
-    twist = directions(500, 1)
-    load = load_of_twist(support, twist / [1.0, 1.0, surface.length]) / [1.0, 1.0, surface.length]
-    assert surface.gauge(*load.T) == pytest.approx(1.0, abs=0.01)
-    assert surface.gauge(*(3.0 * load).T) == pytest.approx(3.0 * surface.gauge(*load.T))
-
-
-@EVERY_SUPPORT
-def test_friction_dissipates_and_opposite_loads_drive_opposite_twists(name: str) -> None:
-    load = directions(500, 2)
-    twist = tabulated(map_of(name), load)
-    assert np.all(np.sum(twist * load, axis=1) > 0.0)
-    assert tabulated(map_of(name), -load) == pytest.approx(-twist, abs=1e-9)
-    assert tabulated(map_of(name), 2.0 * load) == pytest.approx(2.0 * twist, abs=1e-9)
+def test_a_tables_twists_have_the_loads_of_its_nodes(name: str) -> None:
+    support, surface, wanted = about_centre(SUPPORTS[name]), map_of(name), loads()
+    twist, size = nodes(surface)
+    assert np.linalg.norm(twist, axis=1) == pytest.approx(1.0, abs=2e-3)
+    back = resisted(support, twist / [1.0, 1.0, surface.quantities[2]]) / [1.0, 1.0, surface.quantities[2]]
+    error = angle_between(back, wanted)
+    assert np.mean(error) < (1e-4 if "points" in name else 0.002) and np.quantile(error, 0.99) < 0.02
+    assert size == pytest.approx(np.linalg.norm(back, axis=1), rel=0.01)
+    assert np.all(np.sum(twist * wanted, axis=1) > 0.0)  # friction dissipates
 
 
 @EVERY_SUPPORT
 def test_pure_forces_and_moments_have_unit_size(name: str) -> None:
-    surface, zero, one = map_of(name), np.zeros(1), np.ones(1)
-    assert surface.gauge(one, zero, zero)[0] == pytest.approx(1.0, abs=1e-4)
-    assert surface.gauge(zero, one, zero)[0] == pytest.approx(1.0, abs=1e-4)
-    assert surface.gauge(zero, zero, one)[0] == pytest.approx(1.0, abs=5e-3)
+    size = map_of(name).nodes[:, :, 3]
+    assert size[0] == pytest.approx(1.0, abs=1e-4)
+    assert size[-1] == pytest.approx(1.0, abs=5e-3)
+
+
+@EVERY_SUPPORT
+def test_polynomials_of_the_cells_take_the_values_of_the_nodes(name: str) -> None:
+    surface = map_of(name)
+    cells = surface.cells.reshape(ELEVATIONS - 1, AZIMUTHS, 16)
+    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        factors = np.array([1.0, right, up, right * up])
+        corner = surface.nodes[up : ELEVATIONS - 1 + up, right : AZIMUTHS + right]
+        twist = np.tensordot(cells[:, :, :12].reshape(*cells.shape[:2], 4, 3), factors, axes=(2, 0))
+        assert twist == pytest.approx(corner[:, :, :3], abs=1e-14)
+        assert cells[:, :, 12:] @ factors == pytest.approx(corner[:, :, 3], abs=1e-14)
+
+
+def test_slopes_of_a_patch_change_its_table_as_its_stretched_arms_do() -> None:
+    """And few points have none: the flats of their surface move."""
+    assert not map_of("three points").slopes.any()
+    arms, a = about_centre(SUPPORTS["square"]), 0.4
+    more, less = (
+        load_map(PressureDistribution(arms.points * np.sqrt([1.0 + side, 1.0 - side]), arms.shares, arms.spread)).cells
+        for side in (a, -a)
+    )
+    secant = (more - less) / (2.0 * a)
+    assert np.linalg.norm(map_of("square").slopes[0] - secant) < 0.1 * np.linalg.norm(secant)
 
 
 # --- flats ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("support", [THREE_POINTS, FOUR_POINTS], ids=["three", "four"])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_loads_on_a_flat_turn_the_slider_about_one_support_point(support: PressureDistribution, sign: float) -> None:
-    about, surface = about_centre(support), load_map(support)
-    for k, (x, y) in enumerate(about.points):
-        others = np.arange(len(about.points)) != k
-        rest = PressureDistribution(about.points[others], about.shares[others])
-        load = load_of_twist(rest, sign * np.array([[y, -x, 1.0]]))[0] * (1.0 - about.shares[k])
-        for turn in np.linspace(0.0, 2.0 * np.pi, 7):
-            f = 0.7 * about.shares[k] * np.array([np.cos(turn), np.sin(turn)])
-            total = load + [*f, x * f[1] - y * f[0]]
-            vx, vy, spin = tabulated(surface, total[None] / [1.0, 1.0, surface.length])[0] / [1, 1, surface.length]
-            at_point = np.hypot(vx - spin * y, vy + spin * x)
-            assert at_point < 0.02 * np.hypot(x, y) * abs(spin)
-            assert np.sign(spin) == sign
-
-
 def test_two_points_of_support_slide_along_and_turn() -> None:
-    surface = load_map(TWO_POINTS)
-    along, turned = np.array([[np.cos(0.25 * np.pi), np.sin(0.25 * np.pi), 0.0]]), np.array([[0.0, 0.0, 1.0]])
-    assert angle_between(tabulated(surface, along), along)[0] < 0.01
-    assert angle_between(tabulated(surface, turned), turned)[0] < 0.01
+    twist, _ = nodes(load_map(TWO_POINTS))
+    along, turned = np.array([np.cos(0.25 * np.pi), np.sin(0.25 * np.pi), 0.0]), np.array([0.0, 0.0, 1.0])
+    for load in (along, turned):
+        at = np.argmin(np.linalg.norm(loads() - load, axis=1))
+        assert angle_between(twist[at : at + 1], load[None])[0] < 0.01
 
 
-# --- the ellipsoid --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("power", [1.5, 2.0, 3.0])
-def test_power_surface_moves_along_the_gradient_of_its_gauge(power: float) -> None:
-    surface, load, step = PowerSurface(np.zeros(2), 0.03, power), directions(50, 3), 1e-6
-    slopes = [
-        (surface.gauge(*(load + step * e).T) - surface.gauge(*(load - step * e).T)) / (2.0 * step) for e in np.eye(3)
-    ]
-    assert angle_between(tabulated(surface, load), np.stack(slopes, axis=1)) == pytest.approx(0.0, abs=1e-4)
-    assert tabulated(surface, 2.0 * load) == pytest.approx(2.0 * tabulated(surface, load))
-
-
-def test_ellipsoid_is_near_an_even_patch_and_far_from_three_points() -> None:
-    load = directions(2000, 4)
-    ellipsoid = tabulated(PowerSurface(np.zeros(2), 1.0), load)
-    even, three = (angle_between(tabulated(map_of(name), load), ellipsoid) for name in ("square", "three points"))
-    assert np.mean(even) < 0.09
-    assert np.max(even) < 0.2
+def test_an_even_patch_is_near_the_ellipsoid_and_three_points_are_far() -> None:
+    even, three = (angle_between(nodes(map_of(name))[0], loads()) for name in ("square", "three points"))
+    assert np.mean(even) < 0.1 and np.max(even) < 0.2
     assert np.mean(three) > 2.0 * np.mean(even)
 
 
@@ -216,13 +200,13 @@ def test_ellipsoid_is_near_an_even_patch_and_far_from_three_points() -> None:
 @pytest.mark.parametrize("name", SHAPES)
 def test_even_patch_has_the_centre_and_length_of_the_closed_form(name: str) -> None:
     outline = shape_outline(name)
-    exact, sampled = uniform_support(outline), patch(outline)
+    exact, sampled = uniform_ellipsoid(outline), patch(outline)
     assert sampled.centre == pytest.approx(exact.centre, abs=2e-4)
     assert sampled.length == pytest.approx(exact.length, rel=5e-3)
 
 
 def test_patch_of_an_outline_with_hidden_parts_stays_inside_it() -> None:
-    sampled, exact = patch(NOTCHED), uniform_support(NOTCHED)
+    sampled, exact = patch(NOTCHED), uniform_ellipsoid(NOTCHED)
     assert np.all(NOTCHED.project(sampled.points).distance < 0.0)
     assert sampled.centre == pytest.approx(exact.centre, abs=1e-3)
     assert sampled.length == pytest.approx(exact.length, rel=0.03)
@@ -241,31 +225,58 @@ def test_pressure_of_a_disc_follows_its_exponent() -> None:
     assert patch(ellipse(RADIUS, RADIUS), -1.0).length == pytest.approx(RADIUS / 2.0, rel=1e-6)
 
 
-def test_mean_squares_and_reach_are_those_of_the_points() -> None:
-    surface, about = map_of("three points"), about_centre(THREE_POINTS)
+def test_quantities_are_those_of_the_points() -> None:
+    about = about_centre(THREE_POINTS)
     x, y = about.points.T
-    assert surface.square == pytest.approx([about.shares @ (x * x), about.shares @ (x * y), about.shares @ (y * y)])
-    assert map_of("square").square == pytest.approx([0.09**2 / 12.0, 0.0, 0.09**2 / 12.0], rel=0.01, abs=1e-7)
-    assert map_of("square").reach.sum() == pytest.approx(1.0)
-    line = spread_by_direction(np.array([[0.0, -0.02], [0.0, 0.01]]), np.array([0.5, 0.5]))
+    squares = about.shares @ (x * x), about.shares @ (x * y), about.shares @ (y * y)
+    expected = [*THREE_POINTS.centre, THREE_POINTS.length, *squares]
+    assert map_of("three points").quantities == pytest.approx([*expected, *reach(about)])
+    assert map_of("square").quantities[3:6] == pytest.approx([0.09**2 / 12.0, 0.0, 0.09**2 / 12.0], rel=0.01, abs=1e-7)
+
+
+def test_reach_is_shared_by_direction() -> None:
+    assert reach(about_centre(SUPPORTS["square"])).sum() == pytest.approx(1.0)
+    line = reach(PressureDistribution(np.array([[0.0, -0.02], [0.0, 0.02]]), np.array([0.5, 0.5])))
     assert np.flatnonzero(line).tolist() == [DIRECTIONS // 2]
     turn = 0.25 * np.pi / DIRECTIONS  # a quarter of the way from the first direction to the second
-    between = spread_by_direction(np.array([[np.cos(turn), np.sin(turn)]]), np.ones(1))
+    arm = np.array([np.cos(turn), np.sin(turn)])
+    between = reach(PressureDistribution(np.stack([arm, -arm]), np.array([0.5, 0.5])))
     assert between[:3] == pytest.approx([0.75, 0.25, 0.0])
 
 
-def test_blend_of_two_tables_lies_between_them() -> None:
-    low, high = map_of("square"), map_of("rim")
-    share = np.array([0.0, 0.25, 1.0])
-    rows = row_surfaces([low, high], np.zeros(3, dtype=np.int64), np.ones(3, dtype=np.int64), share)
-    load = np.tile(directions(1, 5), (3, 1))
-    here, there = tabulated(low, load), tabulated(high, load)
-    expected = here + share[:, None] * (there - here)
-    assert np.stack(rows.twist(np.arange(3), *load.T), axis=1) == pytest.approx(expected)
-    assert np.stack(rows.twist(np.arange(2), *load[:2].T), axis=1) == pytest.approx(expected[:2])
-    assert rows.of_rows.length == pytest.approx(low.length + share * (high.length - low.length))
-    sizes = [surface.gauge(*load[:1].T)[0] for surface in (low, high)]
-    assert rows.gauge(np.arange(3), *load.T) == pytest.approx(sizes[0] + share * (sizes[1] - sizes[0]))
+# --- the ellipsoid of even pressure ----------------------------------------------------------------------------------
+
+
+ELL = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.1], [0.0, 0.1]]))
+
+
+def test_even_pressure_has_the_known_mean_distance_of_circle_and_square() -> None:
+    assert uniform_ellipsoid(ellipse(0.0525, 0.0525)).length == pytest.approx(2.0 / 3.0 * 0.0525, rel=1e-15)
+    expected = 0.09 * (np.sqrt(2.0) + np.log(1.0 + np.sqrt(2.0))) / 6.0
+    assert uniform_ellipsoid(square(0.09)).length == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("outline", [*map(shape_outline, SHAPES), ELL, NOTCHED], ids=[*SHAPES, "ell", "notched"])
+def test_even_pressure_equals_the_sum_over_a_grid(outline: Outline) -> None:
+    ticks = np.linspace(-0.10975, 0.10975, 440) + 1.3e-5  # off the edges
+    points = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
+    inside = points[outline.project(points).distance < 0.0]
+    found = uniform_ellipsoid(outline)
+    assert found.centre == pytest.approx(np.mean(inside, axis=0), abs=2e-4)
+    assert found.length == pytest.approx(np.mean(np.linalg.norm(inside - found.centre, axis=1)), rel=2e-3)
+
+
+def test_the_pressure_of_a_moved_ellipse_moves_with_it() -> None:
+    own, pose = ellipse(0.0785, 0.0525), (0.01, -0.02, 0.4)
+    moved = transformed(own, pose[2], pose[:2])
+    found = uniform_ellipsoid(moved)
+    assert found.centre == pytest.approx(pose[:2])
+    assert found.length == pytest.approx(uniform_ellipsoid(own).length)
+    expected = rotate(patch(own).points, np.array(pose[2])) + pose[:2]
+    assert patch(moved).points == pytest.approx(expected, abs=1e-15)
+
+
+# --- what is refused -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

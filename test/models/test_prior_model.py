@@ -41,17 +41,14 @@ from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.tabulated import tabulated_prior
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.planning.push_windows import windows_of
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_integration")]
+pytestmark = pytest.mark.slow
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)
@@ -102,13 +99,6 @@ def trained(rows: PushTable) -> PushModel:
 @pytest.fixture(scope="module")
 def after_ten() -> PushModel:
     return trained(pushed(20, 3))
-
-
-@pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A table of few knots, however far off."""
-    for name, value in (("CELL", 0.03), ("ANGLE_CELLS", 4), ("MEAN_TOLERANCE", np.inf), ("SPREAD_TOLERANCE", np.inf)):
-        monkeypatch.setattr(tabulated_prior, name, value)
 
 
 # --- width -------------------------------------------------------------------------------------------------
@@ -273,7 +263,6 @@ def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel
 # --- without training rows ---------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("coarse")
 def test_untrained_model_describes_itself(of_few_draws: PushModel, tmp_path: Path) -> None:
     assert "trained on no push" in repr(of_few_draws)
     of_few_draws.save(tmp_path / "before.pushmodel")
@@ -322,44 +311,6 @@ def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel
 def test_planning_takes_usual_windows_without_training_rows(untrained: PushModel) -> None:
     assert windows_of(untrained, 1.0).count == 5
     assert untrained.usual_speed == 0.02
-
-
-@pytest.mark.usefixtures("coarse")
-def test_table_agrees_with_the_model_at_its_knots_and_beyond_its_range(of_few_draws: PushModel) -> None:
-    tabulated = tabulate(of_few_draws)
-    assert "table of 600 knots" in tabulated.how
-    edges = of_few_draws.rig.outline.contact_on_edge(
-        np.array([0, 1, 3, 2]), 0.5 - 0.5 * np.cos(np.pi * np.array([0.2, 0.4, 0.6, 0.8]))
-    )
-    travel = np.array([5e-4, 0.03, 0.03, 0.04])  # m; the last is beyond the table
-    inputs = np.column_stack([np.full(4, 0.02), edges, [0.0, -0.7, 1.4, 0.0]])
-    found, exact = (model.predict_rows(inputs, travel / 0.02) for model in (tabulated, of_few_draws))
-    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(found.covariance, exact.covariance, rtol=1e-4, atol=1e-12)
-    np.testing.assert_allclose(found.process_covariance, exact.process_covariance, rtol=1e-4, atol=1e-12)
-    alone = [tabulated.predict_rows(inputs[k : k + 1], travel[k : k + 1] / 0.02).covariance[0] for k in range(4)]
-    np.testing.assert_allclose(alone, found.covariance, rtol=1e-9)
-
-
-def test_table_that_is_too_far_off_is_not_used(of_few_draws: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("CELL", 0.1), ("ANGLE_CELLS", 4), ("FEWEST_CELLS", 4)):
-        monkeypatch.setattr(tabulated_prior, name, value)
-    tabulated, inputs = tabulate(of_few_draws), some_inputs(3, 2)
-    assert "too far off" in tabulated.how
-    found = tabulated.predict_rows(inputs, np.full(3, 0.2))
-    np.testing.assert_array_equal(found.mean, of_few_draws.predict_rows(inputs, np.full(3, 0.2)).mean)
-
-
-@pytest.mark.parametrize("rig", [RIG, pytest.param(ON_ELLIPSE, marks=pytest.mark.long)])
-def test_table_is_accurate_without_mechanics(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = with_draws(train_model(empty_table(), rig, "prior", name="p"), 4)  # less smooth, and faster
-    tabulated, inputs, duration = tabulate(model), some_inputs(100, 3), np.full(100, 0.3)
-    assert tabulated.how.startswith("table of")
-    found, exact = (m.predict_rows(inputs, duration) for m in (tabulated, model))
-    assert np.quantile(np.abs(found.mean - exact.mean) / exact.std, 0.9) < 0.06
-    assert np.quantile(np.abs(found.std / exact.std - 1.0), 0.9) < 0.12
-    monkeypatch.setattr(PushMechanics, "displacement", None)  # what makes the model itself slow
-    np.testing.assert_array_equal(tabulated.predict_rows(inputs, duration).mean, found.mean)
 
 
 def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:

@@ -38,8 +38,6 @@ from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.table import PushTable
 
-pytestmark = pytest.mark.usefixtures("coarse_integration")
-
 
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:

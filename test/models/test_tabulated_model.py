@@ -24,12 +24,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.regression import fit_constant
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
@@ -37,7 +37,6 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.prediction_table import on_grid
 from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
@@ -70,7 +69,7 @@ def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> 
     rng = np.random.default_rng(seed)
     inputs = rng.uniform(low, high, (n, 3))
     duration = np.full(n, 0.2)
-    exact = AnalyticalPush(outline, 0.00475).displacement(inputs, duration)
+    exact = analytical_mechanics(outline, 0.00475).displacement(inputs, duration)
     noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
     return PushTable(inputs, duration, exact + noise, np.array([f"p{k}" for k in range(n)]))
 
@@ -369,40 +368,6 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not answers.tabulated
     assert "too far off" in answers.how
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
-
-
-# --- interpolation ----------------------------------------------------------------------------------------------
-
-
-def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
-    axes = [Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7)]
-
-    def cubic(x: Array, y: Array) -> Array:
-        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
-
-    knots = np.meshgrid(np.linspace(-1.0, 2.0, 6), np.linspace(0.0, 0.5, 8), indexing="ij")
-    spline = TensorSpline.through(axes, cubic(*knots)[None])
-    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
-    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
-    assert spline(points, 0) == pytest.approx(cubic(*points.T), abs=1e-12)
-    assert np.array([spline.at(p.tolist(), 0) for p in points]) == pytest.approx(cubic(*points.T), abs=1e-12)
-
-
-def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
-    points = np.linspace(0.0, 1.0, 997)[:, None]
-    errors = []
-    for cells in (40, 80):
-        values = np.exp(np.sin(6.0 * np.linspace(0.0, 1.0, cells + 1)))
-        spline = TensorSpline.through([Axis(0.0, 1.0, cells)], values[None, :, None])
-        errors.append(np.max(np.abs(spline(points, 0)[:, 0] - np.exp(np.sin(6.0 * points[:, 0])))[100:-100]))
-    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.15)
-
-
-def test_few_nodes_resolve_a_smooth_function() -> None:
-    axis = Axis(0.2, 3.0, 10)
-    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
-        knots = along(0, axis.nodes_to_knots(count), np.exp(-(axis.nodes(count) ** 2)))
-        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
 
 
 # --- services ------------------------------------------------------------------------------------

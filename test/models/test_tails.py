@@ -24,7 +24,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from scipy import stats
 from synthetic import noisy_pushes, square_rig
 
@@ -42,8 +41,6 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
-
-pytestmark = pytest.mark.usefixtures("coarse_integration")
 
 SCALE, DEGREES = np.array([0.5, 0.9, 1.6]), np.array([3.0, 4.0, 8.0])
 COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 0.25]])
@@ -307,11 +304,10 @@ def test_exact_density_is_the_t_density_of_the_reported_moments() -> None:
 
 def test_effects_shift_and_widen_the_t_density() -> None:
     model, test = trained("gp"), shared_errors(5, 3)
-    physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
     tip = Effect(
         "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
     )
-    extended = replace(model, predictor=ExtendedPredictor(learnt(model), physics, (tip,), np.array([2.0, 1.0, 0.5])))
+    extended = replace(model, predictor=ExtendedPredictor(learnt(model), (tip,), np.array([2.0, 1.0, 0.5])))
     tails, answer = tails_of(extended), predicted(extended, test)
     scale = answer.std * np.sqrt((tails.degrees - 2.0) / tails.degrees)
     expected = stats.t(tails.degrees, answer.mean, scale).logpdf(test.outcomes)

@@ -35,7 +35,7 @@ DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 GRAIN = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 
 
-def physics() -> FittedMechanics:
+def mechanics() -> FittedMechanics:
     rig = square_rig()
     return analytical_mechanics(rig.outline, rig.pusher_radius)
 
@@ -47,13 +47,13 @@ def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
     duration = np.full(n, 0.2)
     shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
-    outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
+    outcomes = mechanics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
     covariates = {
         "elapsed_time": np.repeat(np.linspace(0.0, 1000.0, count), 3),
         "topic:/warmth": np.repeat(rng.standard_normal(count), 3),
         "slider_heading": rng.uniform(-np.pi, np.pi, n),
     }
-    shift = joint_shift(physics(), effects, Push(inputs, duration, covariates))
+    shift = joint_shift(mechanics(), effects, Push(inputs, duration, covariates))
     push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 

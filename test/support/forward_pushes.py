@@ -22,10 +22,9 @@ from functools import cache
 import numpy as np
 from supports import FOUR_POINTS, THREE_POINTS
 
-from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline, square
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
+from push_predictor.models.mechanics.surface import uniform_ellipsoid
 from push_predictor.types import Array
 
 RADIUS = 0.00475
@@ -33,15 +32,11 @@ IN_METRES = np.array([1.0, 1.0, 0.034])
 SQUARE = square(0.09)
 
 
-def ellipsoid(outline: Outline) -> PowerSurface:
-    return uniform_ellipsoid(outline)
-
-
 @cache
 def mechanics(shape: str = "rect1", kind: str = "patch") -> PushMechanics:
     """Kept for all tests: a table takes a tenth of a second."""
     outline = shape_outline(shape)
-    kinds = {"patch": None, "three": THREE_POINTS, "four": FOUR_POINTS, "ellipsoid": ellipsoid(outline)}
+    kinds = {"patch": None, "three": THREE_POINTS, "four": FOUR_POINTS, "ellipsoid": uniform_ellipsoid(outline)}
     return PushMechanics(outline, RADIUS, kinds[kind])
 
 

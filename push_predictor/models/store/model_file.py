@@ -33,8 +33,8 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError, PushPredictorError
-from push_predictor.models.gaussian_process.constant import ConstantNoise
 from push_predictor.models.gaussian_process.gp import GaussianProcess
+from push_predictor.models.gaussian_process.regression import ConstantNoise
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.forward import PushMechanics

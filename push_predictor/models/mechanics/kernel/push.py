@@ -197,7 +197,7 @@ def _displacement(
     c, s = cos(values.push_rotation), sin(values.push_rotation)
     push.ahead_x, push.ahead_y = c * recorded_x - s * recorded_y, s * recorded_x + c * recorded_y
     push.speed = velocity * (1.0 + values.travel_share)
-    push.travel = push.speed * given[3]
+    push.travel = push.speed * given[3] + (given[1] - given[1])  # not finite where the contact is not
     push.heading = given[4] - atan2(recorded_y, recorded_x)
     pose: Pose = swept(cython.address(push), accuracy)
     c, s = cos(pose.heading), sin(pose.heading)

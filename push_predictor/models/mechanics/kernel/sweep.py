@@ -62,7 +62,7 @@ def swept(push: cython.pointer(Push), accuracy: cython.double) -> Pose:
     accuracy: of the displacement, relative; a turn counts as its arc at the limit surface's length.
     """
     pose: Pose
-    pose.x = pose.y = pose.heading = 0.0
+    pose.x = pose.y = pose.heading = push.travel - push.travel  # 0, or not a number where the travel is not finite
     done: cython.double = 0.0
     longest: cython.double = _least(push.travel, LONGEST_STEP)
     length: cython.double = push.surface.length

@@ -1,0 +1,116 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Quasi-static pushing on an ellipsoidal limit surface in closed form (Lynch, Maekawa and Tanie 1992), and by steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate, to_body
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.mechanics.surface import PowerSurface
+from push_predictor.types import Array
+
+TOUCHING = 2e-5  # m
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Contacts of n pushes in the body frame: point, inward normal, direction of the push, and twist per metre."""
+
+    point: Array
+    normal: Array
+    ahead: Array
+    twist: Array
+
+    @property
+    def contact(self) -> Array:
+        """Velocity (n, 2) of the slider where it is touched."""
+        (vx, vy, spin), (x, y) = self.twist.T, self.point.T
+        return np.column_stack([vx - spin * y, vy + spin * x])
+
+    def along(self, vector: Array) -> tuple[Array, Array]:
+        """Parts of a vector (n, 2) along the normal and to its left."""
+        across = self.normal[:, 0] * vector[:, 1] - self.normal[:, 1] * vector[:, 0]
+        return np.sum(vector * self.normal, axis=1), across
+
+
+def lynch(at: Instant, surface: PowerSurface, left: Array, right: Array) -> tuple[Array, Array]:
+    """Twists (n, 3), and the angle (n,) of the force to the normal, which the friction cone limits.
+
+    The force that makes the contact stick solves two linear equations. One outside the cone lies on its edge.
+    """
+    arm = (at.point - surface.centre) / surface.length
+    q, p = at.along(arm)  # moments over length of unit forces to the left of the normal, and along it
+    p = -p
+    along, across = at.along(at.ahead)
+    stick = np.linalg.solve(
+        np.stack([1.0 + p * p, p * q, p * q, 1.0 + q * q], axis=1).reshape(-1, 2, 2),
+        np.stack([along, across], axis=1)[:, :, None],
+    )[:, :, 0]
+    wanted = np.arctan2(stick[:, 1], stick[:, 0])
+    angle = np.clip(wanted, -np.arctan(right), np.arctan(left))
+    c, s = np.cos(angle), np.sin(angle)
+    size = along / (c * (1.0 + p * p) + s * p * q)
+    force = size[:, None] * (c[:, None] * at.normal + s[:, None] * rotate(at.normal, np.full(len(c), 0.5 * np.pi)))
+    spin = (arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]) / surface.length
+    return np.column_stack([force + spin[:, None] * surface.centre[::-1] * [1.0, -1.0], spin]), angle
+
+
+@dataclass(frozen=True)
+class Sweeps:
+    """Straight paths of a disc in the frame of the sliders' first poses: start, direction (n, 2), travel (n,)."""
+
+    outline: Outline
+    radius: float
+    start: Array
+    ahead: Array
+    travel: Array
+
+    def at_end(self, pose: Array) -> tuple[Array, Array]:
+        """Gap (n,) to the slider at a pose, and how much the disc approaches it (n,)."""
+        nearest = self.outline.project(to_body(self.start + self.travel[:, None] * self.ahead, pose))
+        return nearest.distance - self.radius, -np.sum(rotate(self.ahead, -pose[:, 2]) * nearest.normal, axis=1)
+
+
+def sweeps(outline: Outline, radius: float, inputs: Array, duration: Array) -> Sweeps:
+    """The paths of pushes."""
+    normal = outline.inward_normal(inputs[:, 1])
+    start = outline.point(inputs[:, 1]) - radius * normal
+    return Sweeps(outline, radius, start, rotate(normal, inputs[:, 2]), inputs[:, 0] * duration)
+
+
+def in_equal_steps(path: Sweeps, surface: PowerSurface, friction: float, steps: int) -> Array:
+    """Poses (n, 3) by equal steps of the classical fourth-order Runge-Kutta method, while the disc touches."""
+    pose, step = np.zeros((len(path.travel), 3)), path.travel / steps
+    coefficient = np.full(len(pose), friction)
+
+    def rate(pose: Array, done: Array) -> tuple[Array, Array]:
+        nearest = path.outline.project(to_body(path.start + done[:, None] * path.ahead, pose))
+        at = Instant(nearest.point, -nearest.normal, rotate(path.ahead, -pose[:, 2]), pose)
+        twist = lynch(at, surface, coefficient, coefficient)[0]
+        twist[at.along(at.ahead)[0] <= 0.0] = 0.0
+        return np.column_stack([rotate(twist[:, :2], pose[:, 2]), twist[:, 2]]), nearest.distance - path.radius
+
+    h = step[:, None]
+    for k in range(steps):
+        k1, gap = rate(pose, k * step)
+        k2 = rate(pose + 0.5 * h * k1, (k + 0.5) * step)[0]
+        k3 = rate(pose + 0.5 * h * k2, (k + 0.5) * step)[0]
+        k4 = rate(pose + h * k3, (k + 1) * step)[0]
+        pose = pose + np.where((gap < TOUCHING)[:, None], h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), 0.0)
+    return pose
