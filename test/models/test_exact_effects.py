@@ -26,7 +26,7 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import joint, joint_shift, joint_shifts, undisturbed
+from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
@@ -151,30 +151,6 @@ def test_designs_are_derivatives_where_the_effects_act(name: str) -> None:
         )
         difference = (more - less) / (0.6 * spread[k])
         assert size_of(design[:, :, k] - difference) <= 0.15 * size_of(difference)
-
-
-@pytest.mark.parametrize("name", ["contact_friction", "body_anisotropy", "inertia"])
-def test_a_known_displacement_without_effects_is_taken_instead_of_computed(name: str) -> None:
-    on, push = square(), made(12, 5)
-    acting = effect(name, *np.full(len(mechanism_named(name).parameters), 0.2))
-    known = undisturbed(on, push)
-    found, expected = joint(on, [acting], push, unchanged=known), joint(on, [acting], push)
-    np.testing.assert_allclose(found.shift, expected.shift, atol=1e-10)
-    np.testing.assert_allclose(found.designs[0], expected.designs[0], atol=1e-9)
-    elsewhere = joint(on, [acting], push, derivatives=False, unchanged=known + 1.0)
-    np.testing.assert_allclose(elsewhere.shift, expected.shift - 1.0, atol=1e-10)
-
-
-def test_several_sets_of_effects_are_shifted_at_once_as_each_alone() -> None:
-    on, push = square(), made(12, 6)
-    later = DriverBasis("step", ("elapsed_time",), place=500.0)
-    sets = [[effect("contact_friction", size, basis=later), effect("inertia", 0.3)] for size in (0.0, 0.2, -0.1)]
-    sets += [[effect("contact_friction", size, basis=later)] for size in (0.2, -0.1)]
-    found = joint_shifts(on, sets, push, undisturbed(on, push))
-    for shift, effects in zip(found, sets, strict=True):
-        np.testing.assert_allclose(shift, joint_shift(on, effects, push), atol=1e-10)
-    assert not found[3][push.covariates["elapsed_time"] < 500.0].any()
-    assert found[3][push.covariates["elapsed_time"] > 500.0].any()
 
 
 def test_a_step_that_is_too_long_is_shortened_until_it_helps(deployed: PushModel) -> None:

@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 import pytest
 from drifting_models import pushes
-from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import supported_at

@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from synthetic import RADIUS, square_rig
 
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
@@ -51,7 +50,7 @@ def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> P
     rng = np.random.default_rng(seed)
     speed = np.array([speeds[k // 3 % len(speeds)] for k in range(n)])
     inputs = np.column_stack([speed, rng.random(n), rng.uniform(-1.0, 1.0, n)])
-    outcomes = AnalyticalPush(RIG.outline, RADIUS).displacement(inputs, np.full(n, 0.2))
+    outcomes = analytical_mechanics(RIG.outline, RADIUS).displacement(inputs, np.full(n, 0.2))
     outcomes += rng.standard_normal((n, 3)) * [0.05, 0.05, 1.0] * (speed * 0.2)[:, None]
     inputs[:, 0] *= np.exp(jitter * rng.standard_normal(n))
     return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"{seed}-{k // 3}" for k in range(n)]))
