@@ -180,11 +180,11 @@ def test_a_value_that_is_not_finite_ends_and_leaves_the_others(parameter: Mechan
 
 
 def test_a_push_that_would_take_too_many_steps_is_not_a_number() -> None:
-    """No step is longer than 4 mm, and there are at most 200 000 steps."""
+    """No step is longer than 4 mm, and there are at most 20 000 steps."""
     square = PushMechanics(shape_outline("rect1"), RADIUS, uniform_ellipsoid(shape_outline("rect1")))
-    away, far = np.array([[1e6, 0.125, 0.0, 1.0, 0.0]]), np.array([[700.0, 0.125, 0.0, 1.0, 0.0]])
+    away, far = np.array([[90.0, 0.125, 0.0, 1.0, 0.0]]), np.array([[70.0, 0.125, 0.0, 1.0, 0.0]])
     assert np.isnan(displaced(square, TEXTBOOK[None], away)).all()
-    assert displaced(square, TEXTBOOK[None], far)[0] == pytest.approx([700.0, 0.0, 0.0], rel=1e-9, abs=1e-6)
+    assert displaced(square, TEXTBOOK[None], far)[0] == pytest.approx([70.0, 0.0, 0.0], rel=1e-9, abs=1e-6)
 
 
 def test_read_only_and_strided_arrays_are_accepted() -> None:
@@ -228,5 +228,5 @@ def test_tables_have_the_size_that_the_kernel_reads() -> None:
     assert number["SLOPES"] == table.cells.size == table.slopes[0].size
     assert number["CELL"] == table.cells.shape[1]
     assert f"{load_map.AZIMUTHS} * {load_map.ELEVATIONS - 1} * {number['CELL']}" in source("push.py")
-    assert table.quantities.shape == (6 + load_map.DIRECTIONS,) and "22 * low" in source("push.py")
+    assert f"QUANTITIES = cython.declare(cython.Py_ssize_t, {table.quantities.size + 1})" in source("push.py")
     assert compiled.displacements.__doc__ is not None
