@@ -68,7 +68,8 @@ def analytical_model(table: PushTable) -> PushModel:
 
 def eight_fitted() -> FittedMechanics:
     """The square on a patch, with eight parameters that differ from the textbook's."""
-    return FittedMechanics(PushMechanics(square_rig().outline, square_rig().pusher_radius), dict(EIGHT))
+    mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
+    return FittedMechanics(mechanics, dict(EIGHT), np.zeros((len(EIGHT), len(EIGHT))))
 
 
 def fitted_model(table: PushTable) -> PushModel:

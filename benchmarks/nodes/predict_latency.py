@@ -244,10 +244,7 @@ def _report_callbacks(cases: list[Case], statuses: list[dict[str, str]]) -> None
 def _processor_times(tabulated: TabulatedModel, case: Case) -> tuple[float, float]:
     """Of one prediction with and without tables, us: the least of some rounds over all pushes, in turns."""
     arrays = [push_from_request(request).arrays for request in case.requests]
-    pushes = [
-        Pushes(inputs[:, 0], inputs[:, 1], inputs[:, 2], duration, covariates)
-        for inputs, duration, covariates in arrays
-    ]
+    pushes = [Pushes(v, c, a, duration, covariates) for ((v, c, a),), duration, covariates in arrays]
     rounds = []
     for _ in range(ROUNDS):
         start = process_time()

@@ -385,3 +385,4 @@ def test_a_corner_belongs_to_the_edge_that_faces_the_point_whatever_the_rounding
         points = corner - 0.005 * normal + error * np.array([[1.0, 0.0], [0.0, 1.0]])
         contact = square.project(points).contact
         assert np.all(square.edge(contact)[0] == k)
+        np.testing.assert_allclose(square.point(contact), [corner, corner], atol=1e-11)

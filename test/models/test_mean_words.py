@@ -36,7 +36,6 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import empty_table
 
-
 VALUES = {"contact_friction": 0.25, "rim_exponent": 1.5}
 MECHANICS = FittedMechanics(PushMechanics(square_rig().outline, RADIUS), VALUES, 1e-4 * np.eye(2))
 

@@ -36,7 +36,6 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-
 RIG = square_rig()
 MECHANICS = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.25}, np.array([[1e-4]]))
 
