@@ -74,7 +74,7 @@ def table() -> PushTable:
 def models() -> dict[str, PushModel]:
     """A small model of every kind."""
     rows, rig = table(), square_rig()
-    zero = TrainingOptions(mean="zero")
+    zero = TrainingOptions(mean="zero", per_path=False)
     trained = {kind: train_model(rows, rig, kind, name=kind, options=zero) for kind in ("gp", "vhgp", "analytical")}
     sparse = TrainingOptions(inducing=10, mean="zero")
     trained["sparse vhgp"] = train_model(rows, rig, "vhgp", name="s", options=sparse)

@@ -147,8 +147,8 @@ def test_a_probability_of_one_lies_in_the_last_bar() -> None:
 
 
 def test_the_exact_transform_is_the_distribution_function_of_the_exact_density() -> None:
-    pushes = made_up_set()
-    model = train_model(pushes.table, pushes.rig, "vhgp", name="v", options=TrainingOptions(n_train=60, mean="zero"))
+    pushes, options = made_up_set(), TrainingOptions(n_train=60, mean="zero", per_path=False, tails=False)
+    model = train_model(pushes.table, pushes.rig, "vhgp", name="v", options=options)
     table, k = pushes.table.take(np.arange(1)), 1
     latent, scaling = model.predictor.latent(table.inputs)[k], model.predictor.scaling
     scaled = float((table.outcomes[0, k] - scaling.outcome_mean[k]) / scaling.outcome_sd[k])
