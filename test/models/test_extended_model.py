@@ -111,7 +111,7 @@ def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushM
     base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
     model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
     ours, theirs = predicted(model, table), predicted(base, table)
-    together = joint(mechanics(), effects, push)
+    together = joint(model.predictor.mechanics, effects, push)
     pairs = zip(together.designs, effects, strict=True)
     uncertainty = [design @ effect.covariance @ design.transpose(0, 2, 1) for design, effect in pairs]
     scale = np.diag([0.5, 1.0, 2.0])
