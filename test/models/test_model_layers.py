@@ -24,7 +24,7 @@ from repository import REPOSITORY
 
 MODELS = REPOSITORY / "push_predictor" / "models"
 # A folder may import from those before it, and from the modules of models/ itself.
-ORDER = ["gaussian_process", "mechanics", "mechanisms", "effects", "predictors", "tabulated", "store"]
+ORDER = ["gaussian_process", "mechanics", "effects", "predictors", "tabulated", "store"]
 
 
 def folders_imported_by(path: Path) -> set[str]:
