@@ -220,15 +220,26 @@ def test_a_tip_that_slips_over_a_corner_drags_it_no_further(share: float) -> Non
     assert 1 < left < 50 and np.all(steps[:left] > 1e-9) and np.all(steps[left:] < 1e-4 * np.linalg.norm(moved[-1]))
 
 
-def test_a_disc_crosses_a_notch_and_pushes_its_far_side() -> None:
-    """It leaves the near side, moves freely, and takes the slider along from its touch on."""
+@pytest.mark.parametrize("aside", [0.0, 0.1, 0.3, 0.5])
+def test_a_disc_crosses_a_notch_and_pushes_its_far_side(aside: float) -> None:
+    """It leaves the near side, moves freely, and from its touch on pushes as one that starts there.
+
+    At an angle aside it comes near to the far side long before it touches.
+    """
     notch = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.07, 0.06], [0.07, 0.03], [0.03, 0.03], [0.03, 0.06], [0.0, 0.06]]
-    outline = Outline(np.array(notch))
+    outline, y = Outline(np.array(notch)), 0.036
     model = analytical_mechanics(outline, RADIUS, 0.3, PowerSurface(np.array([0.05, 0.05]), 0.03))
-    near = outline.project(np.array([[0.031, 0.05]])).contact  # on the side of the notch that faces the far one
-    assert outline.inward_normal(near)[0] == pytest.approx([-1.0, 0.0])
-    moved = model.displacement(np.array([[0.035, near[0], np.pi]]), np.ones(1))
-    assert moved[0] == pytest.approx([0.035 - (0.04 - 2.0 * RADIUS), 0.0, 0.0], abs=3e-5)
+    across = 0.04 - 2.0 * RADIUS
+    ends = np.array([[0.03, y], [0.07, y + across * np.tan(aside)]])
+    near, far = outline.project(ends).contact
+    assert outline.inward_normal(np.array([near, far])) == pytest.approx(np.array([[-1.0, 0.0], [1.0, 0.0]]))
+    free = across / np.cos(aside)
+    found, expected = (
+        model.displacement(np.array([[travel, contact, angle]]), np.ones(1))[0]
+        for travel, contact, angle in ((free + 0.005, near, np.pi + aside), (0.005, far, aside))
+    )
+    assert np.linalg.norm(expected[:2]) > 3e-3
+    assert found * IN_METRES == pytest.approx(expected * IN_METRES, abs=3e-5)
 
 
 def test_off_centre_friction_turns_a_slider_pushed_at_its_middle() -> None:
