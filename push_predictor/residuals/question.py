@@ -67,7 +67,7 @@ class Question:
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model
-        every = widened(evidence_of(searched, loaded.table), model.training, shift)
+        every = widened(evidence_of(searched, loaded.table), searched, shift)
         every = replace(every, chosen=loaded.chosen)
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})

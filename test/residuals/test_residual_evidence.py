@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from synthetic import square_pushes, square_rig
 
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -135,10 +136,27 @@ def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTa
     fast = with_inputs(known, 0, np.full(len(known), 0.06))
     model = trained(slow)
     evidence = evidence_of(model, fast)
-    wider = widened(evidence, model.training, input_shift(model, fast))
+    wider = widened(evidence, model, input_shift(model, fast))
     assert wider.z == pytest.approx(evidence.z / 3.0)
     same = evidence_of(model, slow)
-    assert widened(same, model.training, input_shift(model, slow)) is same
+    assert widened(same, model, input_shift(model, slow)) is same
+
+
+@pytest.mark.parametrize("per_path", [True, False])
+def test_deviations_beyond_training_grow_once(known: PushTable, per_path: bool) -> None:
+    """Outcomes learnt per path length have predicted deviations that grow with it."""
+    fast = with_inputs(known, 0, np.full(len(known), 0.06))
+    options = TrainingOptions(mean="zero", per_path=per_path)
+    slow = with_inputs(known, 0, np.full(len(known), 0.02))
+    model = train_model(slow, square_rig(), "gp", name="learnt", options=options)
+    at_training, beyond = evidence_of(model, slow), evidence_of(model, fast)
+    wider = widened(beyond, model, input_shift(model, fast))
+    assert (wider is beyond) == per_path
+    before, after = (np.diagonal(np.linalg.inv(e.whitener), axis1=1, axis2=2) ** 2 for e in (at_training, wider))
+    base = model.predictor.base
+    assert isinstance(base, GaussianProcessPredictor)
+    unseen_speed = (0.1 * np.log(3.0) * base.reported_sd) ** 2 if per_path else 0.0
+    assert after == pytest.approx(9.0 * (before + unseen_speed))
 
 
 def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_stays(known: PushTable) -> None:

@@ -20,10 +20,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.input_shift import InputShift
 from push_predictor.residuals.evidence.standardised import Evidence
 
@@ -42,11 +41,22 @@ def about_mechanics(model: PushModel) -> PushModel:
     return train_model(model.training, model.rig, model.kind, name=model.name, sources=sources, options=options)
 
 
-def widened(evidence: Evidence, training: PushTable, shift: InputShift) -> Evidence:
-    """The evidence with predicted deviations in proportion to the tip's travel, where that is beyond training."""
-    if not any(each.covariate == "velocity" and each.extrapolates for each in shift.inputs):
+def widened(evidence: Evidence, model: PushModel, shift: InputShift) -> Evidence:
+    """The evidence with predicted deviations in proportion to the tip's travel, where that is beyond training.
+
+    Unchanged if those of the model grow with the travel already.
+    """
+    if _grows(model) or not any(each.covariate == "velocity" and each.extrapolates for each in shift.inputs):
         return evidence
-    longest = float(np.max(training.inputs[:, 0] * training.duration))
+    longest = float(np.max(model.training.inputs[:, 0] * model.training.duration))
     travel = evidence.table.inputs[:, 0] * evidence.table.duration
     factor = np.where(shift.outside, np.maximum(travel / longest, 1.0), 1.0)
     return replace(evidence, whitener=evidence.whitener / factor[:, None, None])
+
+
+def _grows(model: PushModel) -> bool:
+    """Whether predicted deviations grow with the travel: not if outcomes were learnt as they are, nor of mechanics."""
+    base = model.predictor.base
+    if isinstance(base, GaussianProcessPredictor):
+        return base.scaling.travel is not None
+    return not isinstance(base, MechanicsPredictor)
