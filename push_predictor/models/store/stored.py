@@ -127,6 +127,8 @@ def check(cls: type, arguments: Mapping[str, Any], place: str) -> None:
     So a computation with them ends, in the time and memory that a model needs.
     """
     for name, value in arguments.items():
+        if value is None:  # where the class accepts it
+            continue
         numbers = np.asarray(value) if isinstance(value, int | float | tuple | np.ndarray) else np.zeros(0)
         if numbers.dtype.kind == "f" and not np.all(np.isfinite(numbers)):
             raise ValueError(f"{place}.{name}: a number is not finite")
