@@ -45,8 +45,8 @@ from push_predictor.design.information import Information
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.splits import FOLDS, push_folds
 from push_predictor.evaluation.validation import compare
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.rig import Rig

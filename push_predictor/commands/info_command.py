@@ -95,7 +95,7 @@ def _write_rig(options: argparse.Namespace) -> None:
 
 
 def _describe_model(path: Path) -> dict[str, object]:
-    from push_predictor.models.mean_words import mean_of, mean_parameters
+    from push_predictor.models.push_model import mean_of, mean_parameters
     from push_predictor.models.store.model_file import load_model
 
     model = load_model(path)

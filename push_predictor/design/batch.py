@@ -34,11 +34,10 @@ from push_predictor.design.greedy import greedy
 from push_predictor.design.information import Information
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
-from push_predictor.models.mechanics.parameter_update import CORRELATION
+from push_predictor.models.mechanics.prior import CORRELATION
 from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.request import check_requests
 from push_predictor.planning.persistence import Persistence, persistence_of
 from push_predictor.types import Array

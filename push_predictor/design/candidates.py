@@ -23,8 +23,8 @@ import numpy as np
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.geometry.touch import displaced
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.types import Array, BoolArray
 

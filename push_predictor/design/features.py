@@ -36,8 +36,8 @@ from push_predictor.models.predictors import (
     Predictor,
     PriorPredictor,
 )
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 NEGLIGIBLE = 0.01  # of the noise variance: what is known that well is not resolved further

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.request import UNITS
 from push_predictor.types import BoolArray
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 

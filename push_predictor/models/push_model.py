@@ -28,11 +28,16 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
-from push_predictor.models.mean_words import mean_in_words
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import InputLimits, Moments, Predictor
-from push_predictor.models.push import Push
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.predictors import (
+    GaussianProcessPredictor,
+    InputLimits,
+    MechanicsPredictor,
+    Moments,
+    Predictor,
+    PriorPredictor,
+)
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.request import check_pushes
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
@@ -231,3 +236,33 @@ class PushModel:
         low, high = features.min(axis=0), features.max(axis=0)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
         return low - margin, high + margin
+
+
+def mean_of(predictor: Predictor) -> str:
+    """What the base of a predictor predicts with before it has learnt anything."""
+    base = predictor.base
+    if isinstance(base, GaussianProcessPredictor):
+        per_path = "" if base.scaling.travel is not None else ", not per path length"
+        return ("zero" if base.mean is None else "fitted mechanics") + per_path
+    if _is_textbook(predictor):
+        return "textbook mechanics"
+    return "mechanics with uncertain parameters" if isinstance(base, PriorPredictor) else "fitted mechanics"
+
+
+def mean_parameters(predictor: Predictor) -> dict[str, float]:
+    """The parameters of these mechanics by name, in the units of PARAMETERS; empty for the textbook's, and for none."""
+    base = predictor.base
+    if _is_textbook(predictor) or (isinstance(base, GaussianProcessPredictor) and base.mean is None):
+        return {}
+    return {name: float(value) for name, value in base.mechanics.values.items()}
+
+
+def _is_textbook(predictor: Predictor) -> bool:
+    base = predictor.base
+    return isinstance(base, MechanicsPredictor) and not base.fitted.covariance.any()
+
+
+def mean_in_words(predictor: Predictor) -> str:
+    """Both on one line."""
+    values = ", ".join(f"{name} {value:.3g}" for name, value in mean_parameters(predictor).items())
+    return f"{mean_of(predictor)} ({values})" if values else mean_of(predictor)

@@ -23,7 +23,7 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.recordings.table import INPUTS
-from push_predictor.types import Array
+from push_predictor.types import Array, BoolArray, IntArray
 
 Numbers = float | Sequence[float] | np.ndarray
 DEFAULT_DURATION = 0.2  # s, the length of a window unless something else is stated
@@ -97,3 +97,17 @@ def _same_length(columns: Mapping[str, Array]) -> dict[str, Array]:
 def _range(column: Array) -> str:
     low, high = float(column.min()), float(column.max())
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """n pushes: inputs (n, 3: velocity m/s, contact, angle rad), duration (n,) s, covariates (n,) each by name."""
+
+    inputs: Array
+    duration: Array
+    covariates: Mapping[str, Array]
+
+    def take(self, rows: IntArray | BoolArray | slice) -> Push:
+        """Some of these pushes."""
+        covariates = {name: column[rows] for name, column in self.covariates.items()}
+        return Push(self.inputs[rows], self.duration[rows], covariates)

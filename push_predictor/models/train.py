@@ -37,8 +37,7 @@ from push_predictor.models.predictors import (
 )
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
 from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_about, train_learnt
-from push_predictor.models.train_mechanics import predictor_about, train_mechanics
-from push_predictor.models.train_prior import prior_predictor, sharpened
+from push_predictor.models.train_mechanics import predictor_about, prior_predictor, sharpened, train_mechanics
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray

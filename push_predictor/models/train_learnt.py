@@ -37,8 +37,8 @@ from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import GaussianProcessPredictor, Scaling
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
 from push_predictor.models.predictors.scaling import within
-from push_predictor.models.predictors.tails_fit import fit_tails
-from push_predictor.models.push import Push
+from push_predictor.models.predictors.tails import fit_tails
+from push_predictor.models.pushes import Push
 from push_predictor.models.train_mechanics import fit_rows
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Fitting the mechanics of a slider to a push table: the ladder, and the predictor of its last step."""
+"""Training of models that are mechanics: fitted by the ladder, or a prior that pushes update."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,19 @@ from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung, climb
-from push_predictor.models.predictors import MechanicsPredictor
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.prior import (
+    ProcessNoise,
+    drawn_parameters,
+    normal_draws,
+    prior_draws,
+    prior_spreads,
+    updated,
+)
+from push_predictor.models.predictors import MechanicsPredictor, PriorPredictor
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
 from push_predictor.watch import Watch, no_watch
 
 
@@ -62,3 +74,33 @@ def fit_rows(table: PushTable) -> FitRows:
     """The rows of a table as the fit takes them."""
     push = np.unique(table.push_id, return_inverse=True)[1]
     return FitRows(table.inputs, table.duration, table.outcomes, push, table.covariates)
+
+
+def prior_predictor(mechanics: PushMechanics, rig: Rig, seed: int = 0) -> PriorPredictor:
+    """The predictor before the first push.
+
+    The prior of the contact friction is about the rig's coefficient, where it has one. seed: of the draws.
+    """
+    names = drawn_parameters(known_support=mechanics.support is not None)
+    known = {} if rig.contact_friction is None else {"contact_friction": rig.contact_friction}
+    means = {name: known.get(name, BY_NAME[name].textbook) for name in names}
+    within = {name: float(np.clip(mean, BY_NAME[name].low, BY_NAME[name].high)) for name, mean in means.items()}
+    fitted = FittedMechanics(mechanics, within, np.diag(prior_spreads(names) ** 2))
+    return PriorPredictor(fitted, prior_draws(names, _values(within), seed), ProcessNoise())
+
+
+def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPredictor:
+    """The predictor `before` the first push, updated by the pushes of a table with any number of rows."""
+    if not len(rows):
+        return before
+    mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
+    push = np.unique(rows.push_id, return_inverse=True)[1]
+    fit_rows = FitRows(rows.inputs, rows.duration, rows.outcomes, push, rows.covariates)
+    found = updated(mechanics, names, _values(before.fitted.values), fit_rows, before.fitted.ellipsoid.length)
+    values = dict(zip(names, found.values.tolist(), strict=True))
+    draws = normal_draws(names, found.values, found.covariance, seed)
+    return PriorPredictor(FittedMechanics(mechanics, values, found.covariance), draws, found.noise)
+
+
+def _values(values: Mapping[str, float]) -> Array:
+    return np.array(list(values.values()))

@@ -36,8 +36,8 @@ from push_predictor.models.predictors import (
     GaussianProcessPredictor,
     MechanicsPredictor,
 )
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.types import Array

@@ -40,11 +40,10 @@ from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameter_update import CORRELATION
+from push_predictor.models.mechanics.prior import CORRELATION
 from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.persistence import persistence_of
 from push_predictor.recordings.table import PushTable, concatenate, empty_table

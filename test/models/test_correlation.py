@@ -32,10 +32,10 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.predictors import GaussianProcessPredictor, correlation_fit
 from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.partial_correlation import unbounded
+from push_predictor.models.tabulated.prediction_table import unbounded
 from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable

@@ -28,7 +28,7 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray

@@ -32,8 +32,8 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, mechanism_named
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable

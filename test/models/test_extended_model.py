@@ -40,8 +40,8 @@ from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import KINDS, PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry

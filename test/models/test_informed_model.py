@@ -33,8 +33,8 @@ from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model

@@ -28,10 +28,9 @@ from push_predictor.cli import main
 from push_predictor.evaluation.metrics_text import metrics_lines
 from push_predictor.evaluation.report.summary import error_sentence
 from push_predictor.evaluation.validation import compare, metrics_json
-from push_predictor.models.mean_words import mean_in_words, mean_of, mean_parameters
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.push_model import PushModel, mean_in_words, mean_of, mean_parameters
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import empty_table

@@ -25,8 +25,7 @@ from synthetic import square_rig
 from push_predictor.errors import TrainingError
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_residuals, refit
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.held_out import CrossValidation
-from push_predictor.models.mechanics.ladder import Rung, candidates, climb, worthwhile
+from push_predictor.models.mechanics.ladder import CrossValidation, Rung, candidates, climb, worthwhile
 from push_predictor.models.mechanics.surface import uniform_ellipsoid
 
 NOISE = np.array([3e-5, 3e-5, 1e-3])

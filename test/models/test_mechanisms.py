@@ -31,7 +31,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_m
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, Mechanism, mechanism_named
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
 from push_predictor.types import Array

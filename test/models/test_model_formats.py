@@ -228,7 +228,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("sparse vhgp", put("regressions.0.inducing_noise", [-1]), "inducing_noise does not contain indices below 40"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [40]), "inducing_noise does not contain indices below 40"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [0.5]), "inducing_noise: .*give an array of int64"),
-    ("gp about mechanics", put("predictor.mean.travel", 0.0), r"predictor\.mean\.travel: numbers from"),
+    ("gp about mechanics", put("predictor.scaling.travel", 0.0), r"predictor\.scaling\.travel: numbers from"),
     ("with constant noise", put("regressions.1.parameters.noise_spread", 11.0), "noise_spread: numbers from 0 to 10"),
     ("fitted on supports", put("predictor.fitted.values", [["warmth", 0.1]]), "'warmth' is no parameter"),
     ("fitted on supports", put("predictor.fitted.values.0.1", 9.0), "contact_friction 9, 9: 0.0 to 1.5 is accepted"),

@@ -30,10 +30,9 @@ from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements, prior_spreads
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanics.process_noise import ProcessNoise
+from push_predictor.models.mechanics.prior import DRAWS, ProcessNoise, displacements, prior_spreads
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel

@@ -32,7 +32,7 @@ from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING,
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
+from push_predictor.models.tabulated.grid_posterior import sparse_grid_regression
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
 from push_predictor.recordings.table import PushTable

@@ -32,10 +32,17 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
-from push_predictor.models.predictors.tails import INTERVAL_KINDS, STEPS, Tails, half_widths, joint_radius
-from push_predictor.models.predictors.tails_fit import FEWEST_PUSHES, fit_tails
-from push_predictor.models.push import Push
+from push_predictor.models.predictors.tails import (
+    FEWEST_PUSHES,
+    INTERVAL_KINDS,
+    STEPS,
+    Tails,
+    fit_tails,
+    half_widths,
+    joint_radius,
+)
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model

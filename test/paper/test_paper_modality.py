@@ -41,7 +41,7 @@ from push_predictor_paper.section import Section
 from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
 from push_predictor_paper.statistics.grid_maps import place_text
 
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.reporting.canvas import Picture
 
 SPLIT = 4  # the push of the grid that is given two modes

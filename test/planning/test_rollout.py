@@ -34,8 +34,8 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import ANALYTICAL_ACCURACY, analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import Provenance, PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.particles import Deviations
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of

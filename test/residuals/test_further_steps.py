@@ -33,8 +33,8 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable

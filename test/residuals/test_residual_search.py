@@ -29,8 +29,8 @@ from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.predictors import MechanicsPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

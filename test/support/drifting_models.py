@@ -26,8 +26,8 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])

@@ -27,8 +27,8 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate

@@ -43,8 +43,8 @@ from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import LIBRARY, Mechanism
 from push_predictor.models.predictors import Moments
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray

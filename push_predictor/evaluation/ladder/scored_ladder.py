@@ -25,8 +25,7 @@ from push_predictor.evaluation.estimate import Estimate, by_push, total_nlpd, to
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.held_out import CrossValidation
-from push_predictor.models.mechanics.ladder import Rung
+from push_predictor.models.mechanics.ladder import CrossValidation, Rung
 from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParameter
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import PushModel

@@ -23,7 +23,7 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 GENERIC_TERMS = 6  # of the polynomial, for each output

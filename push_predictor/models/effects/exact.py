@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,7 @@ from push_predictor.models.effects.driver_basis import columns_of
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import Changes, FittedMechanics
 from push_predictor.models.mechanisms import LARGEST
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array, IntArray
 
 
@@ -145,3 +145,15 @@ def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
 def within_limits(changes: Changes) -> Changes:
     """Changes of at most the largest that a rig can have."""
     return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in changes.items()}
+
+
+def covariance_of(effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array]) -> Array:
+    """Covariance (m, m) of the coefficients of all effects, in their order; cross: see Predictor."""
+    starts = np.cumsum([0, *(len(effect.coefficients) for effect in effects)])
+    parts = [slice(*ends) for ends in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True)]
+    covariance = np.zeros((starts[-1], starts[-1]))
+    for part, effect in zip(parts, effects, strict=True):
+        covariance[part, part] = effect.covariance
+    for (i, j), shared in cross.items():
+        covariance[parts[i], parts[j]], covariance[parts[j], parts[i]] = shared, shared.T
+    return covariance

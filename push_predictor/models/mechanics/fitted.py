@@ -29,7 +29,7 @@ from push_predictor.models.mechanics.forward import COLUMN, RECORDING, TEXTBOOK,
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 Changes = Mapping[str, Array]  # by name of a parameter: what is added to its value at each push, (n,)

@@ -39,7 +39,7 @@ from push_predictor.models.mechanics.surface import (
     power_table,
     surface_tables,
 )
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 RECORDING = "recording"  # the covariate that numbers recordings with different supports

@@ -21,13 +21,12 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.covariance import covariance_of
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import JointEffects, joint
+from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.tails import Tails
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 

@@ -27,17 +27,16 @@ from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors.correlation import Correlation, covariances
-from push_predictor.models.predictors.predictor import Moments, Shift
+from push_predictor.models.predictors.predictor import BasePredictor, Moments, Shift
 from push_predictor.models.predictors.scaling import DEVIATION, Scaling
 from push_predictor.models.predictors.tails import Tails
-from push_predictor.models.predictors.without_effects import WithoutEffects
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class GaussianProcessPredictor(WithoutEffects):
+class GaussianProcessPredictor(BasePredictor):
     """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV).
 
     correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
@@ -79,16 +78,6 @@ class GaussianProcessPredictor(WithoutEffects):
         if self.mean is not None:
             return self.mean
         return analytical_mechanics(self.rig.outline, self.rig.pusher_radius)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See Predictor: those of the mean."""
-        return self.mean.needs if self.mean is not None else ()
-
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """See Predictor: those that the mean depends on."""
-        return self.needs
 
     @cached_property
     def reported_sd(self) -> Array:

@@ -18,17 +18,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from push_predictor.models.predictors.of_mechanics import OfMechanics
-from push_predictor.models.predictors.predictor import Moments
-from push_predictor.models.push import Push
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.predictors.predictor import BasePredictor, Moments
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 
 @dataclass(frozen=True, eq=False)
-class MechanicsPredictor(OfMechanics):
+class MechanicsPredictor(BasePredictor):
     """Mechanics with their parameters; covariance (3, 3) of the outcomes about it."""
 
+    fitted: FittedMechanics
     covariance: Array
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return self.fitted
 
     def moments(self, push: Push) -> Moments:
         """See Predictor."""

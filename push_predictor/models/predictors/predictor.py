@@ -12,22 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The protocol of all predictors: what a push model asks of the mathematics behind it."""
+"""What a push model asks of the mathematics behind it: the protocol of predictors, and what bases have in common."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol, TypeAlias
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.tails import Tails
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array, BoolArray, IntArray
 
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
+Self = TypeVar("Self", bound="BasePredictor")
 
 
 class Moments(NamedTuple):
@@ -133,18 +136,102 @@ class Predictor(Protocol):
         """The same predictor without the correlation of its outputs; an analytical base keeps its covariance."""
 
 
-class BasePredictor(Predictor, Protocol):
-    """A predictor without effects, which effects can extend."""
+class BasePredictor(ABC):
+    """A predictor without effects, which effects can extend: see Predictor for what is not described here.
+
+    What is not overridden holds for mechanics alone, without a learnt function of the inputs: training rows are
+    predicted like others, and the predictive is taken for a Gaussian.
+    """
+
+    effects: ClassVar[tuple[Effect, ...]] = ()
+    cross: ClassVar[Cross] = MappingProxyType({})
+
+    @property
+    def base(self: Self) -> Self:
+        """Itself."""
+        return self
+
+    @property
+    @abstractmethod
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+
+    @property
+    def learnt(self) -> bool:
+        """See Predictor."""
+        return False
+
+    @property
+    def absorbs(self) -> bool:
+        """See Predictor: parameters are kept."""
+        return False
+
+    @property
+    def integrates(self) -> bool:
+        """See Predictor."""
+        return True
 
     @property
     def gaussian(self) -> bool:
         """Whether the exact predictive is the Gaussian of its moments."""
+        return True
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor: those of the mechanics."""
+        return self.mechanics.needs
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor: those that the mechanics depend on."""
+        return self.needs
+
+    @property
+    def tails(self) -> Tails | None:
+        """See Predictor."""
+        return None
+
+    @property
+    def own_limits(self) -> InputLimits | None:
+        """See Predictor."""
+        return None
+
+    def completed(self, push: Push) -> Push:
+        """See Predictor."""
+        return push
+
+    @abstractmethod
+    def moments(self, push: Push) -> Moments:
+        """See Predictor."""
+
+    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
+        """See Predictor."""
+        return self.moments(rows)
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Predictor."""
+        return None
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
-        """Like `exact_log_density` with a shift added and the base's standard deviations multiplied by scale (3,)."""
-
-    def with_independent_outputs(self) -> BasePredictor:
-        """See Predictor."""
+        """Like `exact_log_density` with a shift added and the standard deviations multiplied by scale (3,)."""
+        return None
 
     def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
         """Moments of the outcomes from those of what was learnt, which a table may contain."""
+        return learnt
+
+    def with_effects(self, moments: Moments, push: Push) -> Moments:
+        """See Predictor."""
+        return moments
+
+    def shift(self, push: Push) -> Shift:
+        """See Predictor: zero."""
+        return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
+
+    def with_base(self, base: BasePredictor) -> Predictor:
+        """See Predictor."""
+        return base
+
+    def with_independent_outputs(self: Self) -> Self:
+        """See Predictor."""
+        return self

@@ -22,12 +22,11 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import RECORDING, PushMechanics
-from push_predictor.models.mechanics.parameter_draws import displacements
-from push_predictor.models.mechanics.process_noise import ProcessNoise
-from push_predictor.models.predictors.of_mechanics import OfMechanics
-from push_predictor.models.predictors.predictor import InputLimits, Moments
-from push_predictor.models.push import Push
+from push_predictor.models.mechanics.prior import ProcessNoise, displacements
+from push_predictor.models.predictors.predictor import BasePredictor, InputLimits, Moments
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 ACCURACY = 0.01  # of a draw's displacement: moves means by less than 0.3 % of a standard deviation, in half the time
@@ -36,15 +35,21 @@ STEEPEST = 1.4  # rad: in a grazing push the tip soon leaves the slider, or miss
 
 
 @dataclass(frozen=True, eq=False)
-class PriorPredictor(OfMechanics):
+class PriorPredictor(BasePredictor):
     """The moments of the mechanics' answers under draws of their parameters, and process noise.
 
     fitted: the most probable parameters. draws (k, p): of these, in the order of `fitted.values`. All of them are known
     before the first push, from priors; pushes narrow the draws.
     """
 
+    fitted: FittedMechanics
     draws: Array
     noise: ProcessNoise
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return self.fitted
 
     @property
     def own_limits(self) -> InputLimits:

@@ -45,8 +45,8 @@ from push_predictor.models.predictors import (
     PriorPredictor,
 )
 from push_predictor.models.predictors.correlation import Correlation
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import Provenance, PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.store.archive import ENDING, HEADER, archived, read_archive
 from push_predictor.models.store.codec import APART, Reader, encode
 from push_predictor.models.store.stored import REGRESSIONS

@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Lock
 
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
-from push_predictor.models.mean_words import mean_in_words
+from push_predictor.models.push_model import mean_in_words
 from push_predictor.models.store.model_file import is_model_file
 from push_predictor.models.store.table_cache import completed, load_at_once, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.effects.covariance import covariance_of
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, generic_width
+from push_predictor.models.effects.exact import covariance_of
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
 from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
@@ -35,7 +35,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution
-from push_predictor.models.mechanics.process_noise import VARYING, ProcessNoise
+from push_predictor.models.mechanics.prior import VARYING, ProcessNoise
 from push_predictor.models.mechanics.surface import PowerSurface
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.models.predictors import (
@@ -127,6 +127,8 @@ def check(cls: type, arguments: Mapping[str, Any], place: str) -> None:
     So a computation with them ends, in the time and memory that a model needs.
     """
     for name, value in arguments.items():
+        if value is None:  # where the class accepts it
+            continue
         numbers = np.asarray(value) if isinstance(value, int | float | tuple | np.ndarray) else np.zeros(0)
         if numbers.dtype.kind == "f" and not np.all(np.isfinite(numbers)):
             raise ValueError(f"{place}.{name}: a number is not finite")

@@ -34,6 +34,7 @@ from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.ridge import DenseKernel
+from push_predictor.models.gaussian_process.sparse.vhgp import InducedPosterior, SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.types import Array, IntArray
 
@@ -147,3 +148,31 @@ def _all_pairs(left: Array, right: Array) -> Array:
 
 def _squared_norms(rows: Array) -> Array:
     return np.asarray(np.einsum("ij,ij->i", rows, rows))
+
+
+_EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class InducedGridPosterior(GridPosterior):
+    """A GridPosterior of inducing inputs; root (m, r) as in InducedPosterior, so that no factorisation is needed."""
+
+    root: Array
+
+    @cached_property
+    def _explaining(self) -> tuple[IntArray, Array]:
+        return np.arange(len(self.inputs)), self.kernel.variance * self.root
+
+
+def sparse_grid_regression(regression: SparseVHGP) -> GridRegression:
+    """See grid_posterior.grid_regression."""
+    parameters = regression.parameters
+    jitter, of_noise, nugget = parameters.jitter, parameters.noise.variance, parameters.nugget
+    signal = _on_grid(regression.signal, parameters.signal.variance + jitter, jitter)
+    noise = _on_grid(regression.noise, of_noise + nugget, nugget + _EPSILON * of_noise)
+    return GridRegression(signal, parameters.noise_mean, noise)
+
+
+def _on_grid(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> InducedGridPosterior:
+    inputs, weights, none = posterior.inducing, posterior.weights, np.empty(0)
+    return InducedGridPosterior(posterior.kernel, inputs, none, weights, prior_variance, least_variance, posterior.root)

@@ -37,13 +37,16 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, Reg
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.predictors import GaussianProcessPredictor, Moments
 from push_predictor.models.predictors.correlation import Correlation, correlations
-from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
+from push_predictor.models.tabulated.grid_posterior import (
+    GridPosterior,
+    GridRegression,
+    grid_regression,
+    sparse_grid_regression,
+    weighted_sums,
+)
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
-from push_predictor.models.tabulated.partial_correlation import unbounded
-from push_predictor.models.tabulated.push_chart import Chart
-from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
+from push_predictor.models.tabulated.push_chart import Chart, Side, table_sides
 from push_predictor.models.tabulated.spline import table_moments
-from push_predictor.models.tabulated.table_sides import Side, table_sides
 from push_predictor.types import Array, IntArray
 
 OnGrid: TypeAlias = GridRegression | ConstantNoise
@@ -268,3 +271,13 @@ def _boxes_first(values: Array, counts: Sequence[int]) -> Array:
     shape = list(chain(*((size // count, count) for size, count in zip(values.shape, counts, strict=True))))
     order = [*range(0, len(shape), 2), *range(1, len(shape), 2)]
     return values.reshape(shape).transpose(order).reshape(-1, *counts)
+
+
+_LARGEST = 1.0 - 1e-12
+
+
+def unbounded(correlation: Array) -> Array:
+    """The three numbers (m, 3) of correlation matrices (m, 3, 3)."""
+    r12, r13, r23 = correlation[:, 0, 1], correlation[:, 0, 2], correlation[:, 1, 2]
+    partial = (r23 - r12 * r13) / np.sqrt((1.0 - r12**2) * (1.0 - r13**2))
+    return np.arctanh(np.clip(np.column_stack([r12, r13, partial]), -_LARGEST, _LARGEST))

@@ -15,11 +15,13 @@
 """Where a push lies in a box of velocity, place on the outline and angle; one box for each edge that differs.
 
 The place is a fraction of an edge of a polygon, or of the part of a smooth outline that its symmetry repeats. In these
-coordinates a model's predictions are smooth; `features.push_features` is what its kernels compare.
+coordinates a model's predictions are smooth; `features.push_features` is what its kernels compare. A squared
+exponential kernel is a product over the sides of the box.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,6 +29,8 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.features import EDGE_SPACING
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.predictors import Scaling
 from push_predictor.types import Array, IntArray
 
 
@@ -120,3 +124,62 @@ class PolygonChart:
     def place_range(self, places: Array) -> tuple[float, float]:
         """See Chart: where edges differ, the domain contains most of them completely."""
         return (float(places.min()), float(places.max())) if self.boxes == 1 else (0.0, 1.0)
+
+
+_PATH = 65  # points along which lengthscales are counted
+
+
+def table_sides(scaling: Scaling, chart: Chart, low: Array, high: Array) -> list[Side]:
+    """Those of velocity, place and angle that vary, over the box from low (3,) to high (3,)."""
+    groups = ((0,), chart.place_columns, (len(chart.place_columns) + 1,))
+    sides = []
+    for column, (group, features) in enumerate(zip(groups, (_itself, _places(chart), _itself), strict=True)):
+        chosen = [k for k, feature in enumerate(group) if feature in scaling.columns]
+        if chosen:
+            used = [scaling.columns.index(group[k]) for k in chosen]
+            standardised = _standardised(features, chosen, scaling.feature_mean[used], scaling.feature_sd[used])
+            sides.append(Side(column, float(low[column]), float(high[column]), used, standardised))
+    return sides
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One of velocity, place and angle that the model uses: `used` are its columns among the model's features."""
+
+    column: int
+    low: float
+    high: float
+    used: list[int]
+    features: Callable[[Array], Array]  # values (m,) -> standardised features (boxes, m, len(used))
+
+    def lengthscales(self, kernel: ArdKernel) -> float:
+        """How many lengthscales of a kernel lie between low and high; around a closed outline 2 pi at least."""
+        path = self._scaled(kernel, self.features(np.linspace(self.low, self.high, _PATH))[0])
+        length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        return max(length, 2.0 * np.pi) if len(self.used) > 1 else length
+
+    def factor(self, kernel: ArdKernel, inputs: Array, values: Array) -> Array:
+        """The factor (boxes m, n) of a kernel's correlations between values (m,) and inputs (n, D)."""
+        points = self._scaled(kernel, self.features(values)).reshape(-1, 1, len(self.used))
+        inputs = self._scaled(kernel, inputs[:, self.used])
+        return np.asarray(np.exp(-0.5 * ((points - inputs) ** 2).sum(axis=2)))
+
+    def _scaled(self, kernel: ArdKernel, features: Array) -> Array:
+        return np.asarray(features / np.exp(kernel.log_lengthscales[self.used]))
+
+
+def _itself(values: Array) -> Array:
+    return values[None, :, None]
+
+
+def _places(chart: Chart) -> Callable[[Array], Array]:
+    """Features (boxes, m, columns) of the places (m,) of every box."""
+    return lambda places: np.stack(
+        [np.column_stack(chart.place_features(places, np.full(len(places), k))) for k in range(chart.boxes)]
+    )
+
+
+def _standardised(
+    features: Callable[[Array], Array], chosen: list[int], mean: Array, sd: Array
+) -> Callable[[Array], Array]:
+    return lambda values: (features(values)[:, :, chosen] - mean) / sd

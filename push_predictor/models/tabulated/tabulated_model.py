@@ -31,8 +31,8 @@ import numpy as np
 
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor, Moments
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.tabulated.prediction_table import OnGrid, TooFineError, on_grid
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, narrow_box, tabulated_domain, wide_box

@@ -31,7 +31,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.ladder import Group
 from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParameter, ParameterValues
 from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.types import Array

@@ -23,8 +23,8 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect, responses_of
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 

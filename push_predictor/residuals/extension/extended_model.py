@@ -23,8 +23,8 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from push_predictor.models.predictors import ExtendedPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 

@@ -22,8 +22,8 @@ import numpy as np
 
 from push_predictor import __version__
 from push_predictor.models.predictors import Predictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import Provenance, PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model, training_rows
 from push_predictor.recordings.table import PushTable
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.evidence.standardised import mechanics_under
 from push_predictor.residuals.outcome import Sized, Trace

@@ -30,7 +30,7 @@ from push_predictor.design.greedy import greedy
 from push_predictor.design.information import Information
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.settable import continued, has_long_pushes, proposed, settings, travels_of

@@ -26,8 +26,8 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.prediction import exact_cdf
 from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.push import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 from push_predictor_paper.data.corpus import PushSet

@@ -26,7 +26,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.standardised import evidence_of, mechanics_under
 from push_predictor.residuals.outcome import Trace

@@ -26,7 +26,7 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint
-from push_predictor.models.push import Push
+from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import UNIT_NAMES, UNITS
 from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Line, limits_of

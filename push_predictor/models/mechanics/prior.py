@@ -1,0 +1,271 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters of a prior model: draws of them, the noise of repeated pushes, and what pushes say about both.
+
+Bauza and Rodriguez (2017, "A probabilistic data-driven model for planar pushing") find that repeated pushes of a slider
+differ by some 10 to 20 % of the motion, and that the spread depends on the push, because friction varies in space and
+time. So the noise is that of small changes of the friction and of the centre of pressure, passed through the mechanics.
+A share of the distance travelled and the tracker's noise are added.
+
+The update takes the most probable values of all parameters together, with the Laplace approximation of their
+covariance, and the size of the noise. The windows of a push share their deviation, so each of m windows counts as
+1 / (1 + (m - 1) r) with a correlation r: the information of a push with equal windows that correlate with r.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy
+
+from push_predictor.models.mechanics.fit import FitRows
+from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.types import Array
+
+CORRELATION = 0.5  # of the windows of a push; planning/persistence.py finds 0.45 and more
+NOISE_WINDOWS = 6.0  # independent windows that the prior of the noise variance is worth
+DIFFERENCE = 0.05  # prior standard deviations
+CONVERGED = 0.02  # prior standard deviations
+MOST_STEPS = 15
+SHORTENINGS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterUpdate:
+    """values (p,), their covariance (p, p), and the noise."""
+
+    values: Array
+    covariance: Array
+    noise: ProcessNoise
+
+
+def updated(
+    mechanics: PushMechanics, names: tuple[str, ...], means: Array, rows: FitRows, length: float
+) -> ParameterUpdate:
+    """The parameters' posterior, from normal priors about `means` (p,) with the spreads of `prior_spreads`.
+
+    length: c of the support in m, for the noise of the turn. Gauss-Newton steps within the plausible ranges, each
+    shortened until the posterior grows; the noise's factor is estimated again after each. Deterministic.
+    """
+    return _Update(mechanics, names, means, rows, length).solved()
+
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """The model about some values: residuals (n, 3), derivatives (n, 3, p), noise (n, 3, 3) for a factor of 1."""
+
+    residuals: Array
+    jacobian: Array
+    noise: Array
+
+
+class _Update:
+    def __init__(
+        self, mechanics: PushMechanics, names: tuple[str, ...], means: Array, rows: FitRows, length: float
+    ) -> None:
+        self.mechanics, self.names, self.means, self.rows = mechanics, names, means, rows
+        table = [BY_NAME[name] for name in names]
+        self.low, self.high = np.array([p.low for p in table]), np.array([p.high for p in table])
+        self.spread = prior_spreads(names)
+        windows = np.bincount(rows.push)[rows.push]
+        self.weight = 1.0 / (1.0 + (windows - 1.0) * CORRELATION)
+        self.travel, self.length = rows.inputs[:, 0] * rows.duration, np.full(len(rows.push), length)
+
+    def solved(self) -> ParameterUpdate:
+        """See `updated`."""
+        values, factor = self.means, np.ones(3)
+        for _ in range(MOST_STEPS):
+            local = self._local(values)
+            precision = self._precision(local.noise, factor)
+            curvature, slope = self._equations(local, precision, values)
+            stepped = self._stepped(values, np.asarray(np.linalg.solve(curvature, slope)), local.residuals, precision)
+            moved, values = stepped - values, stepped
+            factor = self._factor(local, local.residuals - local.jacobian @ moved, _inverse(curvature))
+            if np.max(np.abs(moved) / self.spread) < CONVERGED:
+                break
+        local = self._local(values)
+        curvature, _ = self._equations(local, self._precision(local.noise, factor), values)
+        return ParameterUpdate(values, _inverse(curvature), ProcessNoise(factor))
+
+    def _local(self, values: Array) -> _Local:
+        step = np.where(values + DIFFERENCE * self.spread > self.high, -DIFFERENCE, DIFFERENCE) * self.spread
+        changed = ProcessNoise.changed(self.names, values)
+        found = self._displacements(np.concatenate([changed, values + np.diag(step)]))
+        jacobian = (found[:, len(changed) :] - found[:, :1]).transpose(0, 2, 1) / step
+        noise = ProcessNoise().covariance(found[:, : len(changed)], self.travel, self.length)
+        return _Local(self.rows.outcomes - found[:, 0], jacobian, noise)
+
+    def _displacements(self, draws: Array) -> Array:
+        rows = self.rows
+        return displacements(self.mechanics, self.names, draws, rows.inputs, rows.duration, rows.covariates)
+
+    def _precision(self, noise: Array, factor: Array) -> Array:
+        root = np.sqrt(factor)
+        return np.asarray(np.linalg.inv(noise * root[:, None] * root) * self.weight[:, None, None])
+
+    def _equations(self, local: _Local, precision: Array, values: Array) -> tuple[Array, Array]:
+        """Curvature (p, p) and slope (p,) of the log posterior."""
+        weighted = np.einsum("nkp,nkl->npl", local.jacobian, precision)
+        curvature = np.einsum("npl,nlq->pq", weighted, local.jacobian) + np.diag(self.spread**-2.0)
+        slope = np.einsum("npl,nl->p", weighted, local.residuals) + (self.means - values) / self.spread**2
+        return curvature, slope
+
+    def _stepped(self, values: Array, step: Array, residuals: Array, precision: Array) -> Array:
+        before = self._misfit(values, residuals, precision)
+        for k in range(SHORTENINGS):
+            trial = np.clip(values + step * 0.4**k, self.low, self.high)
+            after = self.rows.outcomes - self._displacements(trial[None])[:, 0]
+            if self._misfit(trial, after, precision) < before:
+                return trial
+        return values
+
+    def _misfit(self, values: Array, residuals: Array, precision: Array) -> float:
+        prior = np.sum(((values - self.means) / self.spread) ** 2)
+        return float(np.einsum("nk,nkl,nl->", residuals, precision, residuals) + prior)
+
+    def _factor(self, local: _Local, residuals: Array, covariance: Array) -> Array:
+        """Factor (3,) of the noise: the mean of its prior, 1, and of the residuals, weighted by windows.
+
+        The residuals count with the uncertainty of the parameters, which a fit to these rows hides.
+        """
+        unsure = np.einsum("nkp,pq,nkq->nk", local.jacobian, covariance, local.jacobian)
+        ratio = (residuals**2 + unsure) / np.diagonal(local.noise, axis1=1, axis2=2)
+        return np.asarray((NOISE_WINDOWS + self.weight @ ratio) / (NOISE_WINDOWS + self.weight.sum()))
+
+
+def _inverse(matrix: Array) -> Array:
+    inverse = np.asarray(np.linalg.inv(matrix))
+    return 0.5 * (inverse + inverse.T)
+
+
+DRAWS = 64
+# Their sign changes in a mirror along the body's x axis, where the others keep theirs.
+MIRRORED = (
+    "friction_difference",
+    "centre_y",
+    "body_anisotropy_diagonal",
+    "tracker_rotation",
+    "push_rotation",
+    "outline_y",
+    "tip_offset_across",
+)
+# Through the speed: they matter beyond quasi-static pushing, and without them only the distance travelled counts. The
+# height of a push shifts the pressure, as centre_x and centre_y do; the rim exponent spreads it.
+NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height", "pressure_spread")
+# Of the spreads of PARAMETERS, which are weak priors for fits. Set once on 21 rigs, simulated by three simulators and
+# measured in two laboratories: before the first push, 95 % intervals then cover 0.97 on average, and 0.89 on the worst.
+PRIOR_SHARE = 0.7
+
+
+def drawn_parameters(known_support: bool) -> tuple[str, ...]:
+    """Names of the parameters that are drawn: those that need no covariate, and no patch if the support is known."""
+    left_out = (*NOT_DRAWN, "rim_exponent") if known_support else NOT_DRAWN
+    return tuple(p.name for p in PARAMETERS if not p.needs and p.name not in left_out)
+
+
+def prior_spreads(names: Sequence[str]) -> Array:
+    """Standard deviations (p,) from rig to rig of the parameters before the first push."""
+    return np.array([PRIOR_SHARE * BY_NAME[name].spread for name in names])
+
+
+def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAWS) -> Array:
+    """Draws (count, p) from the priors, normal about `means` (p,) and cut off at the plausible ranges.
+
+    A scrambled Sobol' sequence of half of them; the other half are their mirror images, so that a symmetric outline
+    gets symmetric predictions. Deterministic for a seed.
+    """
+    table = [BY_NAME[name] for name in names]
+    spread = prior_spreads(names)
+    low = scipy.special.ndtr((np.array([p.low for p in table]) - means) / spread)
+    high = scipy.special.ndtr((np.array([p.high for p in table]) - means) / spread)
+    half = means + spread * scipy.special.ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))
+    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in names])
+    return np.concatenate([half, sign * half])
+
+
+def normal_draws(names: Sequence[str], means: Array, covariance: Array, seed: int, count: int = DRAWS) -> Array:
+    """Draws (count, p) in pairs on opposite sides of `means` (p,), moved into the plausible ranges."""
+    table = [BY_NAME[name] for name in names]
+    half = scipy.special.ndtri(_sobol(len(names), count // 2, seed)) @ np.linalg.cholesky(covariance).T
+    draws = means + np.concatenate([half, -half])
+    return np.asarray(np.clip(draws, [p.low for p in table], [p.high for p in table]))
+
+
+def displacements(
+    mechanics: PushMechanics,
+    names: Sequence[str],
+    draws: Array,
+    inputs: Array,
+    duration: Array,
+    covariates: Mapping[str, Array],
+) -> Array:
+    """Displacements (n, k, 3: m, m, rad) of n pushes under k draws (k, p) of the parameters.
+
+    inputs (n, 3), duration (n,) s, covariates as in PushMechanics.displacement.
+    """
+    n, k = len(inputs), len(draws)
+    values = np.tile(TEXTBOOK, (n, k, 1))
+    values[:, :, [COLUMN[name] for name in names]] = draws
+    repeated = {name: np.repeat(column, k) for name, column in covariates.items()}
+    moved = mechanics.displaced(
+        values.reshape(n * k, -1), np.repeat(inputs, k, axis=0), np.repeat(duration, k), repeated
+    )
+    return moved.reshape(n, k, 3)
+
+
+def _sobol(dimensions: int, count: int, seed: int) -> Array:
+    from scipy.stats import qmc  # its import would take every node 0.4 s at the start
+
+    uniform = qmc.Sobol(dimensions, scramble=True, seed=seed).random(count)
+    return np.asarray(np.clip(uniform, 1e-9, 1.0 - 1e-9))
+
+
+VARYING = {"contact_friction": 0.1, "centre_x": 0.004, "centre_y": 0.004}  # standard deviations within a session
+SHARE = 0.05  # of the distance travelled, and of the turn that moves a point at the length c that far
+TRACKER = (1e-4, 1e-4, 1e-3)  # m, m, rad: of the difference of two poses
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessNoise:
+    """factor (3,): on the variances of dx, dy and dtheta; 1 before there are data."""
+
+    factor: Array = field(default_factory=lambda: np.ones(3))
+
+    @staticmethod
+    def changed(names: Sequence[str], values: Array) -> Array:
+        """Rows (1 + 2 v, p) of parameters: the values (p,), and each of those that vary increased, then decreased."""
+        rows = np.tile(values, (1 + 2 * len(VARYING), 1))
+        for k, (name, spread) in enumerate(VARYING.items()):
+            column, low, high = names.index(name), BY_NAME[name].low, BY_NAME[name].high
+            above, below = min(values[column] + spread, high), max(values[column] - spread, low)
+            rows[1 + k, column], rows[1 + len(VARYING) + k, column] = above, below
+        return rows
+
+    def covariance(self, displacements: Array, travel: Array, length: Array) -> Array:
+        """Covariance (n, 3, 3) of the noise.
+
+        displacements (n, 1 + 2 v, 3): under the parameters of `changed`. travel (n,), length c (n,) in m.
+        """
+        varied = displacements[:, 1:]
+        shift = 0.5 * (varied[:, : len(VARYING)] - varied[:, len(VARYING) :])
+        covariance = np.einsum("nka,nkb->nab", shift, shift)
+        unit = np.column_stack([travel, travel, travel / length])
+        index = np.arange(3)
+        covariance[:, index, index] += (SHARE * unit) ** 2 + np.square(TRACKER)
+        root = np.sqrt(self.factor)
+        return np.asarray(covariance * root[:, None] * root)
