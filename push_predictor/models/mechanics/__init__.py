@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Quasi-static mechanics of pushing: the exact forward model, its fit, and its setting of Lynch et al. (1992).
+"""Mechanics of planar pushing: from parameters and pushes to displacements, and fits of the parameters to pushes.
 
-Import `forward` for the model, `fitted` for it with values, `analytical` for the ellipsoid; `scalar.mechanics` and
-`analytical_scalar` compute single pushes without array overhead.
+`forward` is the way in, and the compiled `kernel` is the one place where a push is computed. `fitted` adds values to it.
 """
