@@ -24,6 +24,7 @@ from push_predictor.models.predictors.tails import IntervalKind, Tails, half_wid
 from push_predictor.types import Array, BoolArray
 
 ROWS_SHOWN = 10
+NOT_FINITE = "the velocity or a covariate is too far from the training data, or the tip wedges into a notch"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +49,13 @@ class Prediction:
     def std(self) -> Array:
         """Standard deviations (n, 3) of an observed outcome: m, m, rad."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)))
+
+    @property
+    def first_not_finite(self) -> int | None:
+        """The first push without a finite mean and covariance, None if there is none."""
+        if np.isfinite(self.mean.sum() + self.covariance.sum()):  # a sum is finite only if all of its terms are
+            return None
+        return int(np.argmin(np.isfinite(self.mean.sum(axis=1) + self.covariance.sum(axis=(1, 2)))))
 
     def interval(self, level: float = 0.95, kind: IntervalKind = "student") -> tuple[Array, Array]:
         """Low and high ends (n, 3) of the central intervals that contain a new outcome with this probability.

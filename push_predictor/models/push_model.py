@@ -26,9 +26,10 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
+from push_predictor.errors import RequestError
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
-from push_predictor.models.prediction import Prediction
+from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.predictors import (
     GaussianProcessPredictor,
     InputLimits,
@@ -107,7 +108,10 @@ class PushModel:
         predict or that lacks a covariate the model needs.
         """
         check_pushes(self, pushes)
-        return self.predict_rows(pushes.inputs, pushes.duration, pushes.covariates)
+        found = self.predict_rows(pushes.inputs, pushes.duration, pushes.covariates)
+        if (bad := found.first_not_finite) is not None:
+            raise RequestError(f"velocity[{bad}]", float(pushes.inputs[bad, 0]), f"a push to predict: {NOT_FINITE}")
+        return found
 
     def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
         """Predict n pushes unchecked: inputs (n, 3: velocity m/s, contact, angle rad), duration (n,) s, covariates.

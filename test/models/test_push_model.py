@@ -20,6 +20,7 @@ import io
 import json
 import pickle
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.features import push_features
 from push_predictor.models.push_model import KINDS, PushModel
+from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import PushRequest, check_request, check_requests
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
@@ -285,3 +287,10 @@ def _rewrite(path: Path, members: dict[str, bytes]) -> None:
 def test_training_options_reject_counts_below_one(name: str) -> None:
     with pytest.raises(TrainingError, match=f"{name}: 0 is not accepted, give 1 or more"):
         TrainingOptions(**{name: 0})
+
+
+def test_a_push_without_a_finite_prediction_is_an_error_that_names_it() -> None:
+    model = train_model(noisy_pushes(40), square_rig(), "analytical", name="a")
+    broken = replace(model, predictor=replace(model.predictor, covariance=np.full((3, 3), np.nan)))
+    with pytest.raises(RequestError, match=r"velocity\[0\].*too far from the training data"):
+        broken.predict(Pushes(velocity=0.02, contact=[0.1, 0.2], angle=0.3))

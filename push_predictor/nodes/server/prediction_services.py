@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ from msg_adapters.predictions import (
 )
 from push_predictor.errors import PredictionError, TooLargeError
 from push_predictor.models.domain_remark import domain_remark
-from push_predictor.models.prediction import Prediction
+from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.request import PushRequest, check_request, check_requests, own_window, with_own_window
@@ -119,22 +118,5 @@ def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
 
 def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:
     """Raise PredictionError for the first push without a finite prediction; start: index of the chunk's first push."""
-    if (bad := _first_not_finite(prediction)) is not None:
-        raise PredictionError(
-            f"push {start + bad}: {tabulated.model.name} has no finite prediction: the velocity or a covariate is too "
-            "far from the training data"
-        )
-
-
-def _first_not_finite(prediction: Prediction) -> int | None:
-    """The first push without a finite prediction; none is in the domain, where a model is finite."""
-    # A sum is finite only if all of its terms are.
-    if len(prediction) == 1:  # in plain numbers, a fifth of the time
-        if prediction.in_domain[0]:
-            return None
-        numbers = prediction.mean[0].tolist() + prediction.covariance[0].ravel().tolist()
-        return None if isfinite(sum(numbers)) else 0
-    if prediction.in_domain.all():
-        return None
-    finite = np.isfinite(prediction.mean.sum(axis=1) + prediction.covariance.sum(axis=(1, 2)))
-    return None if finite.all() else int(np.argmin(finite))
+    if (bad := prediction.first_not_finite) is not None:
+        raise PredictionError(f"push {start + bad}: {tabulated.model.name} has no finite prediction: {NOT_FINITE}")
