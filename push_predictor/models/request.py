@@ -50,7 +50,7 @@ UNITS = {
     "free_force_x": "N",
     "free_force_y": "N",
 }  # of the covariates that every window has; the unit of a recorded topic is its publisher's
-FARTHEST = 1.0  # m per push; the mechanics is integrated along the path, some milliseconds per centimetre
+FARTHEST = 1.0  # m per push; the mechanics are integrated along the path
 
 
 @dataclass(frozen=True)
