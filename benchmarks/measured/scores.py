@@ -34,6 +34,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
 HEAD = "NMSE (dx dy dtheta) | 95 % of NMSE | NLPD | 95 % of NLPD | exact NLPD | within 95 % (dx dy dtheta)"
+PLAIN = TrainingOptions(mean="zero", per_path=False, tails=False)  # as in Bauza and Rodriguez 2017
 WITHIN = COVERAGE_LEVELS.index(0.95)
 
 
@@ -52,12 +53,13 @@ class Fold:
         return scores.push_scores(self.comparison)
 
 
-def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False) -> Fold:
+def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, options: TrainingOptions = PLAIN) -> Fold:
     """Train on one table and predict another."""
     start = time.process_time()
-    model = train_model(table, rig, kind, name=kind, options=TrainingOptions(fit=fit, tails=False))
+    model = train_model(table, rig, kind, name=kind, options=options)
     cpu = time.process_time() - start
-    return Fold(model, compare(model, test), model.predict_rows(test.inputs, test.duration).in_domain, cpu)
+    in_domain = model.predict_rows(test.inputs, test.duration, test.covariates).in_domain
+    return Fold(model, compare(model, test), in_domain, cpu)
 
 
 def pooled(folds: Sequence[Fold]) -> PushScores:

@@ -25,15 +25,17 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measured.scores import HEAD, Fold, figures, pooled, total, trained
+from benchmarks.measured.scores import HEAD, PLAIN, Fold, figures, pooled, total, trained
 from benchmarks.measured.square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import analytical_mechanics
+from push_predictor.models.train import TrainingOptions
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import distinct_pushes, load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
@@ -84,12 +86,14 @@ def mcube_tables(data: Path, work: Path, quick: bool) -> None:
         print(f"\n{_physics_in_words(block)}")
 
 
-def leave_one_run_out(runs: Sequence[Path], kind: str, fit: bool = False, stride: float | None = None) -> list[Fold]:
+def leave_one_run_out(
+    runs: Sequence[Path], kind: str, options: TrainingOptions = PLAIN, stride: float | None = None
+) -> list[Fold]:
     """For every run, a model trained on the other runs. stride (s) overlaps training windows; test windows tile."""
-    rig, options = load_rig_for(runs), WindowOptions(stride=stride)
+    rig, windows = load_rig_for(runs), WindowOptions(stride=stride)
     tiled = [load_data([run]) for run in runs]
-    training = tiled if stride is None else [load_data([run], None, options) for run in runs]
-    return [trained(_without(k, runs, training), tiled[k], rig, kind, fit=fit) for k in range(len(runs))]
+    training = tiled if stride is None else [load_data([run], None, windows) for run in runs]
+    return [trained(_without(k, runs, training), tiled[k], rig, kind, options) for k in range(len(runs))]
 
 
 def _without(k: int, runs: Sequence[Path], tables: Sequence[PushTable]) -> PushTable:
@@ -120,7 +124,7 @@ def _summary(recording: Recording) -> str:
 
 
 def _leave_one_out_row(runs: Sequence[Path], kind: str, fit: bool, stride: float | None) -> str:
-    folds = leave_one_run_out(runs, kind, fit, stride)
+    folds = leave_one_run_out(runs, kind, replace(PLAIN, fit=fit), stride)
     counts = [len(fold.model.training) for fold in folds]
     inside, there = np.concatenate([fold.in_domain for fold in folds]), _nmse_in_domain(folds)
     by_run = " ".join(f"{total(fold.push_scores, 'nmse'):.2f}" for fold in folds)

@@ -83,7 +83,7 @@ def rig() -> Rig:
 
 @pytest.fixture(scope="module")
 def inputs(rig: Rig) -> SessionInputs:
-    return recording._draw_inputs(np.random.default_rng(5), rig, 12, PushDistribution())
+    return recording.draw_inputs(np.random.default_rng(5), rig, 12, PushDistribution())
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +237,7 @@ def test_mujoco_moves_the_slider_along_with_the_tip(rig: Rig) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install '.[foreign]'")
     from benchmarks.foreign import mujoco_engine
 
-    few = recording._draw_inputs(np.random.default_rng(5), rig, 2, PushDistribution())
+    few = recording.draw_inputs(np.random.default_rng(5), rig, 2, PushDistribution())
     motion = mujoco_engine.simulate(rig, few.plan, few.facts, few.noise.scaled(0.0), ())
     moved = np.linalg.norm(motion.pose[:, -1, :2] - motion.pose[:, 0, :2], axis=1)
     assert np.all(moved > 0.2 * few.plan.travel) and np.all(moved < 1.5 * few.plan.travel)

@@ -130,6 +130,7 @@ def test_textbook_physics_explains_the_long_pushes_and_no_mirror_of_them(importe
 
 
 def test_learnt_from_other_runs_a_model_predicts_an_aluminium_run(imported: dict[str, Path]) -> None:
+    """Plain models of the raw outcomes, about no mechanics: these runs turn both ways, and a VHGP alone learns it."""
     runs = block_runs(imported, "Al")
     learnt, physics = (pooled(leave_one_run_out(runs, kind)) for kind in ("vhgp", "analytical"))
     assert total(learnt, "nmse") < 0.15 and total(physics, "nmse") < 0.15
@@ -137,12 +138,22 @@ def test_learnt_from_other_runs_a_model_predicts_an_aluminium_run(imported: dict
 
 
 def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: dict[str, Path]) -> None:
-    """Steel run 3 alone turns clockwise: what was learnt from the others fails there, and says so."""
+    """Steel run 3 alone turns clockwise: what a plain model learnt from the others fails there, and says so."""
     folds = leave_one_run_out(block_runs(imported, "St"), "vhgp")
     outside = [fold.in_domain.mean() < 0.5 for fold in folds]
     scores = [total(fold.push_scores, "nmse") for fold in folds]
     assert outside == [False, False, True, False]
     assert scores[2] > 1.0 > 0.3 > max(scores[:2] + scores[3:])
+
+
+def test_a_default_model_predicts_even_the_run_that_turns_as_no_other(imported: dict[str, Path]) -> None:
+    """It is learnt about mechanics, which know both directions of turning, and better than textbook mechanics."""
+    runs = block_runs(imported, "St")
+    folds = leave_one_run_out(runs, "vhgp", TrainingOptions(tails=False))
+    assert max(total(fold.push_scores, "nmse") for fold in folds) < 0.3
+    textbook = pooled(leave_one_run_out(runs, "analytical"))
+    assert total(pooled(folds), "nmse") < total(textbook, "nmse")
+    assert total(pooled(folds), "nlpd") < total(textbook, "nlpd")
 
 
 # --- through the real nodes -------------------------------------------------------------------------------------
