@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.fitted import DIFFERENCE, FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array
@@ -58,10 +58,13 @@ class Mechanism:
         """Names of the covariates that the mechanism itself depends on, in addition to those of its basis."""
         return ("slider_heading",) if any(BY_NAME[name].needs for name in self.quantities) else ()
 
-    def response(self, mechanics: FittedMechanics, push: Push) -> Array:
-        """Derivatives (n, 3, p) of the outcome (m, m, rad, push frame) by the parameters, by central differences."""
+    def response(self, mechanics: FittedMechanics, push: Push, difference: float = DIFFERENCE) -> Array:
+        """Derivatives (n, 3, p) of the outcome (m, m, rad, push frame) by the parameters, by central differences.
+
+        difference: see FittedMechanics.shifted; with a long one, secants.
+        """
         unchanged = np.zeros((len(push.inputs), len(self.quantities)))
-        return mechanics.shifted(self.quantities, unchanged, push)[1].transpose(0, 2, 1)
+        return mechanics.shifted(self.quantities, unchanged, push, difference)[1].transpose(0, 2, 1)
 
     def plausible(self, values: Array) -> bool:
         """Whether a rig could have these values (n, p) of the parameters."""

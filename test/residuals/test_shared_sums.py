@@ -24,6 +24,7 @@ from made_up_traces import pushes
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.residuals.candidates.candidate import candidate
@@ -146,10 +147,18 @@ def test_candidates_are_screened_together_as_each_alone() -> None:
     np.testing.assert_allclose(together.p_value, exceeded, rtol=1e-12)
 
 
+def test_candidates_are_searched_by_the_secant_over_95_percent_of_rigs(deployed: PushModel) -> None:
+    evidence = evidence_of(deployed, pushes(20, 2))
+    end = np.full(len(evidence.table), 2.0 * BY_NAME["centre_x"].spread)
+    more, less = evidence.mechanics.displacements([{"centre_x": end}, {"centre_x": -end}], evidence.push)
+    secant = np.einsum("nij,nj->ni", evidence.whitener, (more - less) / (2.0 * end[0]))
+    np.testing.assert_allclose(whitened_response(evidence, "centre_of_friction")[:, :, 0], secant, rtol=1e-9, atol=1e-9)
+
+
 def test_responses_are_computed_once_for_the_same_windows(deployed: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
     evidence, computed = evidence_of(deployed, pushes(20, 2)), []
-    known = standardised.responses_of
-    monkeypatch.setattr(standardised, "responses_of", lambda name, *rest: computed.append(name) or known(name, *rest))
+    known = standardised.mechanism_named
+    monkeypatch.setattr(standardised, "mechanism_named", lambda name: computed.append(name) or known(name))
     both = [whitened_response(evidence, name) for name in ("pusher_travel", "contact_friction") * 2]
     assert computed == ["pusher_travel", "contact_friction"]
     assert both[0] is both[2] and both[1] is both[3]

@@ -86,21 +86,26 @@ class FittedMechanics:
         duration = np.broadcast_to(push.duration, (k, n)).reshape(-1)
         return self.mechanics.displaced(values.reshape(k * n, -1), inputs, duration, given).reshape(k, n, 3)
 
-    def shifted(self, names: tuple[str, ...], changes: Array, push: Push) -> tuple[Array, Array]:
-        """What changes (n, q) of the parameters `names` shift the displacement by (n, 3), and derivatives (n, q, 3)."""
+    def shifted(
+        self, names: tuple[str, ...], changes: Array, push: Push, difference: float = DIFFERENCE
+    ) -> tuple[Array, Array]:
+        """What changes (n, q) of the parameters `names` shift the displacement by (n, 3), and derivatives (n, q, 3).
+
+        difference: step to both sides for a derivative, in prior standard deviations.
+        """
         given = Push(push.inputs, push.duration, self._covariates(push, names))
-        moved = self._moved(names)
-        shape = self._changed_shape(names, changes)
+        moved = self._moved(names, difference)
+        shape = self._changed_shape(names, changes, difference)
         found = self.mechanics.shifted(self._row, shape, changes, moved, given)
         return found[:, 0], found[:, 1:]
 
-    def _changed_shape(self, names: tuple[str, ...], changes: Array) -> Shape:
+    def _changed_shape(self, names: tuple[str, ...], changes: Array, difference: float) -> Shape:
         """Where no rim changes it is the same for all changes of these parameters."""
         rim = "rim_exponent" in names
         if rim or names not in self._shapes:
             ends = np.repeat(self._row, 2, axis=0)
             for k, name in enumerate(names):
-                step = DIFFERENCE * BY_NAME[name].spread
+                step = difference * BY_NAME[name].spread
                 ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
             if rim:
                 return self.mechanics.shape_of(ends)
@@ -115,16 +120,17 @@ class FittedMechanics:
     def _shape(self) -> Shape:
         return self.mechanics.shape_of(self._row)
 
-    def _moved(self, names: tuple[str, ...]) -> Array:
+    def _moved(self, names: tuple[str, ...], difference: float) -> Array:
         """The parameters of a difference, see PushMechanics.shifted. No friction and no inertia is below zero."""
-        if names not in self._differences:
-            steps = [DIFFERENCE * BY_NAME[name].spread for name in names]
+        if (names, difference) not in self._differences:
+            steps = [difference * BY_NAME[name].spread for name in names]
             least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
-            self._differences[names] = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
-        return self._differences[names]
+            own = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
+            self._differences[names, difference] = own
+        return self._differences[names, difference]
 
     @cached_property
-    def _differences(self) -> dict[tuple[str, ...], Array]:
+    def _differences(self) -> dict[tuple[tuple[str, ...], float], Array]:
         return {}
 
     def value(self, name: str) -> float:

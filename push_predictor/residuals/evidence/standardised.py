@@ -21,8 +21,9 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.effect import Effect, responses_of
+from push_predictor.models.effects.effect import Effect, generic_responses
 from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
@@ -31,6 +32,9 @@ from push_predictor.types import Array, BoolArray, IntArray
 BLOCK = 4  # neighbouring pushes may share disturbances that no covariate records
 ACCURACY_OF_FITS = 3e-3  # relative, of displacements
 MOST_FITTED = 600  # windows of a fit that compares candidates
+# Prior standard deviations of a parameter, to both sides: 95 % of rigs lie between. The search takes the secant over
+# this range, which for a large effect is nearer to what it does than the tangent.
+SECANT = 2.0
 FEWEST_BLOCKS = 100  # with fewer, blocks are smaller: a bootstrap over few blocks has little power
 
 
@@ -137,7 +141,10 @@ def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
 
 
 def _whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
-    response = responses_of(mechanism, evidence.mechanics, evidence.push, evidence_scale(evidence))
+    if mechanism is None:
+        response = generic_responses(evidence.mechanics, evidence.push, evidence_scale(evidence))
+    else:
+        response = mechanism_named(mechanism).response(evidence.mechanics, evidence.push, SECANT)
     return np.asarray(np.einsum("nij,njp->nip", evidence.whitener, response))
 
 
