@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
@@ -34,7 +33,6 @@ from push_predictor.types import Array
 
 Changes = Mapping[str, Array]  # by name of a parameter: what is added to its value at each push, (n,)
 
-NO_CHANGES: Changes = MappingProxyType({})
 # Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
 DIFFERENCE = 0.5
 TEXTBOOK_FRICTION = 0.3

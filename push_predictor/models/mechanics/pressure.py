@@ -31,7 +31,6 @@ from push_predictor.types import Array
 RAYS, RADII = 40, 8  # of a patch whose rim is visible from its centroid
 GRID_POINTS = 400  # of any other, approximately
 ROUNDING = 1e-12
-RIM_EXPONENTS = (-4.0, 12.0)  # beyond it the pressure is practically a point or the rim alone
 
 
 @dataclass(frozen=True, eq=False)

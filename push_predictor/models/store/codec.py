@@ -80,7 +80,7 @@ class Reader:
         if origin is Literal:
             return found if found in inner else _refuse(place, found, " or ".join(map(repr, inner)))
         if origin is not None and issubclass(origin, Mapping):
-            return dict(self.read(found, list[tuple[inner]], place))  # type: ignore[valid-type]
+            return dict(self.read(found, list[tuple[inner]], place))  # type: ignore[valid-type]  # made at run time
         if origin in (list, tuple):
             items = _listed(found, place)
             hints = [inner[0]] * len(items) if origin is list or inner[-1] is Ellipsis else inner
@@ -124,7 +124,7 @@ class Reader:
 @cache
 def _hints(cls: type) -> dict[str, Any]:
     """Type hints of what is written of a class."""
-    hints = get_type_hints(cls if is_dataclass(cls) else cls.__init__)  # type: ignore[misc]
+    hints = get_type_hints(cls if is_dataclass(cls) else cls.__init__)  # type: ignore[misc]  # of a class, not of an instance
     return {name: hints[name] for name in signature(cls).parameters if (cls, name) not in GIVEN}
 
 

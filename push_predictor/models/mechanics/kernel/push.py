@@ -23,7 +23,7 @@ import cython
 from cython.cimports.libc.math import atan2, cos, exp, sin
 from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Nearest, body_of, contact_at, nearest_to
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surface, root_of
-from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Tables, Values, swept
+from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Slider, Tables, Values, swept
 
 CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
 QUANTITIES = cython.declare(cython.Py_ssize_t, 23)
@@ -50,23 +50,13 @@ def displacements(
     (T, 23): see SurfaceTables; power: of the power law where there is no table, else 0. pusher_radius m. accuracy:
     relative. found (n, 3) is written; what takes too many steps, or is not finite, is not a number.
     """
-    body: Body = body_of(cython.address(boundary[0]))
-    tables: Tables = _tables(cython.address(quantities[0, 0]), quantities.shape[0], power)
-    tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
-    tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
     own: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
     n: cython.Py_ssize_t
     with cython.nogil:
         for n in range(pushes.shape[0]):
-            _displacement(
-                cython.cast(cython.pointer(Values), cython.address(values[n * own, 0])),
-                cython.address(pushes[n, 0]),
-                cython.address(body),
-                cython.address(tables),
-                pusher_radius,
-                accuracy,
-                cython.address(found[n, 0]),
-            )
+            row: cython.p_double = cython.address(values[n * own, 0])
+            _displacement(row, cython.address(pushes[n, 0]), cython.address(slider), cython.address(found[n, 0]))
 
 
 def shifts(
@@ -88,10 +78,7 @@ def shifts(
     values (1, 28). moved (3, q): number of the parameter, step of its difference, least change of it. found
     (n, 1 + q, 3) is written: the shift, then the derivatives. The rest as in `displacements`.
     """
-    body: Body = body_of(cython.address(boundary[0]))
-    tables: Tables = _tables(cython.address(quantities[0, 0]), quantities.shape[0], power)
-    tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
-    tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
     own: cython.double[28]
     tried: cython.double[3]
     column: cython.Py_ssize_t
@@ -101,18 +88,11 @@ def shifts(
     end: cython.int
     with cython.nogil:
         for n in range(pushes.shape[0]):
+            push: cython.p_double = cython.address(pushes[n, 0])
             for i in range(PARAMETERS):
                 own[i] = values[0, i]
             for end in range(2):
-                _displacement(
-                    cython.cast(cython.pointer(Values), cython.address(own[0])),
-                    cython.address(pushes[n, 0]),
-                    cython.address(body),
-                    cython.address(tables),
-                    pusher_radius,
-                    accuracy,
-                    cython.address(tried[0]),
-                )
+                _displacement(own, push, cython.address(slider), tried)
                 for i in range(3):
                     found[n, 0, i] = tried[i] - found[n, 0, i] if end else tried[i]
                 if end == 0:
@@ -128,15 +108,7 @@ def shifts(
                 high: cython.double = changed + moved[1, k]
                 for end in range(2):
                     own[column] = high if end else low
-                    _displacement(
-                        cython.cast(cython.pointer(Values), cython.address(own[0])),
-                        cython.address(pushes[n, 0]),
-                        cython.address(body),
-                        cython.address(tables),
-                        pusher_radius,
-                        accuracy,
-                        cython.address(tried[0]),
-                    )
+                    _displacement(own, push, cython.address(slider), tried)
                     for i in range(3):
                         found[n, 1 + k, i] = (tried[i] - found[n, 1 + k, i]) / (high - low) if end else tried[i]
                 own[column] = changed
@@ -144,29 +116,39 @@ def shifts(
 
 @cython.cfunc
 @cython.exceptval(check=False)
-def _tables(quantities: cython.p_double, count: cython.Py_ssize_t, power: cython.double) -> Tables:
-    tables: Tables
-    tables.quantities, tables.count, tables.power, tables.known = quantities, count, power, 0
-    exponent: cython.p_double = quantities + QUANTITIES - 1
-    while tables.known < count and exponent[0] != exponent[0]:  # a known support has no exponent
-        tables.known += 1
+def _slider(
+    boundary: cython.double[::1],
+    cells: cython.double[:, :, ::1],
+    slopes: cython.double[:, :, :, ::1],
+    quantities: cython.double[:, ::1],
+    power: cython.double,
+    pusher_radius: cython.double,
+    accuracy: cython.double,
+) -> Slider:
+    slider: Slider
+    slider.body = body_of(cython.address(boundary[0]))
+    slider.pusher_radius, slider.accuracy = pusher_radius, accuracy
+    slider.tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
+    slider.tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+    slider.tables.quantities, slider.tables.count = cython.address(quantities[0, 0]), quantities.shape[0]
+    slider.tables.power, slider.tables.known = power, 0
+    exponent: cython.p_double = slider.tables.quantities + QUANTITIES - 1
+    while slider.tables.known < slider.tables.count and exponent[0] != exponent[0]:  # a known support has no exponent
+        slider.tables.known += 1
         exponent += QUANTITIES
-    return tables
+    return slider
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _displacement(
-    values: cython.pointer(Values),
-    given: cython.p_double,
-    body: cython.pointer(Body),
-    tables: cython.pointer(Tables),
-    pusher_radius: cython.double,
-    accuracy: cython.double,
-    found: cython.p_double,
+    row: cython.p_double, given: cython.p_double, slider: cython.pointer(Slider), found: cython.p_double
 ) -> cython.void:
     """One row of `displacements`."""
+    values: cython.pointer(Values) = cython.cast(cython.pointer(Values), row)
+    body: cython.pointer(Body) = cython.address(slider.body)
+    pusher_radius: cython.double = slider.pusher_radius
     velocity: cython.double = given[0]
     contact: Contact = contact_at(given[1], body)
     c: cython.double = cos(given[2])
@@ -175,7 +157,7 @@ def _displacement(
     recorded_y: cython.double = s * contact.normal_x + c * contact.normal_y
     push: Push
     push.values, push.body = values, body
-    surface: Surface = _surface(tables, given[5], cython.address(push))
+    surface: Surface = _surface(cython.address(slider.tables), given[5], cython.address(push))
     push.surface = cython.address(surface)
     push.radius = pusher_radius + values.radius_error
     along: cython.double = values.tip_offset_along + velocity * values.clock_delay
@@ -199,7 +181,7 @@ def _displacement(
     push.speed = velocity * (1.0 + values.travel_share)
     push.travel = push.speed * given[3] + (given[1] - given[1])  # not finite where the contact is not
     push.heading = given[4] - atan2(recorded_y, recorded_x)
-    pose: Pose = swept(cython.address(push), accuracy)
+    pose: Pose = swept(cython.address(push), slider.accuracy)
     c, s = cos(pose.heading), sin(pose.heading)
     pose.x += c * origin_x - s * origin_y - origin_x
     pose.y += s * origin_x + c * origin_y - origin_y
