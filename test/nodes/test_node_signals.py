@@ -44,7 +44,11 @@ PATIENCE = 60.0  # s
 
 def begun(command: Sequence[str], folder: Path) -> subprocess.Popen[bytes]:
     """A process in a group of its own, to be interrupted as Ctrl-C does."""
-    environment = {**harness.node_environment(harness.free_domain()), "PUSH_PREDICTOR_CACHE": str(folder / "tables")}
+    environment = {
+        **harness.node_environment(harness.free_domain()),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF",
+        "PUSH_PREDICTOR_CACHE": str(folder / "tables"),
+    }
     return subprocess.Popen(
         [sys.executable, *command],
         cwd=REPOSITORY,
