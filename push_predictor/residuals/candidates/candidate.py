@@ -73,6 +73,10 @@ class Candidate:
         """Mechanism and covariate, whatever the basis."""
         return self.mechanism, self.covariate
 
+    def same_as(self, other: Candidate) -> bool:
+        """Whether two are the same effect in the same form."""
+        return self.label == other.label and self.basis == other.basis
+
 
 def projected(values: Array, nuisance: Array | None) -> Array:
     """Values (n, 3, ...) projected off orthonormal columns (3 n, q)."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanisms import LIBRARY, mechanism_named
+from push_predictor.models.mechanics.ladder import all_supports_known
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import CONSTANT, screening_bases
@@ -67,6 +68,17 @@ def usable(evidence: Evidence) -> list[str | None]:
     """The mechanisms whose needs are recorded, and None for the generic polynomial."""
     recorded = evidence.table.covariates
     return [*(m.name for m in LIBRARY if all(need in recorded for need in m.needs)), None]
+
+
+def constant_refinements(evidence: Evidence) -> dict[str | None, str]:
+    """By mechanism that refines the library's and that these windows can show, the covariate of its constant effect."""
+    mechanics, table = evidence.mechanics.mechanics, evidence.table
+    known = mechanics.support is not None or all_supports_known(mechanics, table.covariates)
+    return {
+        m.name: HEADED if headed(m.name) else CONSTANT
+        for m in REFINEMENTS
+        if all(need in table.covariates for need in m.needs) and not (known and m.name == "rim_pressure")
+    }
 
 
 def _of_mechanism(

@@ -1,0 +1,235 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The search for effects on the motion: a gate, then moves that add, exchange and drop terms of one joint fit.
+
+A term is a mechanism, a covariate and a form. The gate (gate.py) alone decides that there is an effect. Every move is
+judged by what the joint fit gains on blocks of pushes that it was not fitted to (candidates/joint_fit.py), and is made
+if it gains more than the standard error of that gain. An exchange undoes a choice that others made wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.ladder import least_gain
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.candidates.enumeration import constant_refinements
+from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, fitted, standard_error
+from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.selection.forms import forms_of, step_places_near
+from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.selection.naming import Naming, Trial, naming_of
+from push_predictor.residuals.selection.screening import Screened
+from push_predictor.types import Array
+
+MOST_TERMS = 6
+MOST_MECHANISMS = 6  # of those that the gate let pass, with the largest statistics
+MOST_EXACT = 8  # labels that are fitted exactly, by their gain to first order
+CLOSE = 0.5  # of the best gain to first order: less is not fitted exactly
+MOST_ROUNDS = 6  # of moves after an addition
+Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A chosen term. p_value: family-wise. gain: in log density over the fit of the others, nats."""
+
+    best: Candidate
+    p_value: float
+    gain: float
+    naming: Naming
+
+    @property
+    def mechanism(self) -> str | None:
+        """The mechanism that the effect is named after; None if none fits, even if `best` has one that comes close."""
+        return self.best.mechanism if self.naming.known else None
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The terms, the largest gain first, and their joint fit; the first and the last screen of all candidates.
+
+    unexplained (n, 3): the standardised residuals minus the terms.
+    """
+
+    terms: tuple[Term, ...]
+    fit: Fit
+    candidates: tuple[Candidate, ...]
+    first: Screened
+    last: Screened
+    unexplained: Array
+
+
+def search(gate: Gate, rows: FitRows) -> SearchResult:
+    """Search these windows for terms; gate.alpha is the probability of any term where there is no effect."""
+    return _Search(gate, rows).found()
+
+
+@dataclass(eq=False)
+class _Search:
+    """passed: p of what the gate let pass, by label, in the order of their statistics."""
+
+    gate: Gate
+    rows: FitRows
+    passed: dict[Label, float] = field(default_factory=dict)
+
+    def found(self) -> SearchResult:
+        chosen: list[Candidate] = []
+        fit = self._fit(chosen)
+        first = screened = self.gate.screened(self._unexplained(fit))
+        while len(chosen) < MOST_TERMS and self._let_pass(screened):
+            added = self._best(fit, chosen)
+            if added is None or not self._worthwhile(added.fit, fit, bool(chosen)):
+                break
+            chosen, fit = self._improved([*chosen, added.candidate], added.fit)
+            screened = self.gate.screened(self._unexplained(fit))
+        terms = [self._named(chosen[:k] + chosen[k + 1 :], chosen[k]) for k in range(len(chosen))]
+        terms.sort(key=lambda term: -term.gain)
+        fit = self._fit([term.best for term in terms], fit)
+        return SearchResult(tuple(terms), fit, self.gate.candidates, first, screened, self._unexplained(fit))
+
+    # --- moves -------------------------------------------------------------------------------------------------------
+
+    def _worthwhile(self, after: Fit, before: Fit, further: bool) -> bool:
+        """Whether an addition gains more than its error; a further one as much as a step of the ladder, too."""
+        size = len(after.coefficients) - len(before.coefficients)
+        least = least_gain(len(self.rows.evidence.table.pushes)) * size if further else 0.0
+        gains = after.scores - before.scores
+        return bool(gains.sum() > max(least, standard_error(gains)))
+
+    def _improved(self, chosen: list[Candidate], fit: Fit) -> tuple[list[Candidate], Fit]:
+        """Drops and exchanges until none helps; the first term alone was the best of all."""
+        for _ in range(MOST_ROUNDS):
+            moved = len(chosen) > 1 and (self._dropped(chosen, fit) or self._exchanged(chosen, fit))
+            if not moved:
+                break
+            chosen, fit = moved
+        return chosen, fit
+
+    def _dropped(self, chosen: list[Candidate], fit: Fit) -> tuple[list[Candidate], Fit] | None:
+        for k in range(len(chosen)):
+            others = chosen[:k] + chosen[k + 1 :]
+            without = self._fit(others, fit)
+            if not self._worthwhile(fit, without, True):
+                return others, without
+        return None
+
+    def _exchanged(self, chosen: list[Candidate], fit: Fit) -> tuple[list[Candidate], Fit] | None:
+        for k in range(len(chosen)):
+            others = chosen[:k] + chosen[k + 1 :]
+            best = self._best(self._fit(others, fit), others)
+            if best is None or best.candidate.same_as(chosen[k]):
+                continue
+            gains = best.fit.scores - fit.scores
+            if gains.sum() > standard_error(gains):
+                return [*others, best.candidate], best.fit
+        return None
+
+    def _named(self, others: list[Candidate], c: Candidate) -> Term:
+        base, chosen = self._fit(others), Trial(c, self._fit([*others, c]))
+        tried = [t for t in self._tried(base, others) if not t.candidate.same_as(c)]
+        naming = naming_of(chosen, tried, base)
+        generic = max((t for t in tried if t.candidate.mechanism is None), key=lambda t: t.gain, default=chosen)
+        if not naming.known and generic.gain > chosen.gain:
+            chosen = generic
+        gain = chosen.gain - float(base.scores.sum())
+        return Term(chosen.candidate, self._p_value(c), gain, naming)
+
+    # --- proposals ---------------------------------------------------------------------------------------------------
+
+    def _best(self, base: Fit, others: Sequence[Candidate]) -> Trial | None:
+        """What gains most when it is added to a fit of the others; a mechanism rather than the generic polynomial."""
+        tried = self._tried(base, others)
+        known = [t for t in tried if t.candidate.mechanism is not None and t.gain > base.scores.sum()]
+        return max(known or tried, key=lambda t: t.gain, default=None)
+
+    def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
+        """The labels that gain most to first order, each in its best form, fitted exactly."""
+        taken = {c.label for c in others}
+        each = [self._in_best_form(base, *label) for label in self._proposed() if label not in taken]
+        most = max((gain for gain, _ in each), default=0.0)
+        near = sorted((pair for pair in each if pair[0] > CLOSE * most), key=lambda pair: -pair[0])
+        return [Trial(c, self._fit([*others, c], base)) for _, c in near[:MOST_EXACT]]
+
+    def _proposed(self) -> Iterator[Label]:
+        """Every mechanism that passed with every covariate that passed, and constant.
+
+        Of mechanics that were not fitted, all parameters may be off, and mimic each other.
+        """
+        along = dict.fromkeys(covariate for _, covariate in self.passed)
+        for mechanism in list(dict.fromkeys(name for name, _ in self.passed))[:MOST_MECHANISMS]:
+            for covariate in along:
+                if (mechanism, covariate) in self._driven:
+                    yield mechanism, covariate
+        for mechanism, covariate in self._constants.items():
+            if not self.gate.inputs.learnt or any(mechanism == name for name, _ in self.passed):
+                yield mechanism, covariate
+
+    @cached_property
+    def _driven(self) -> set[Label]:
+        """Labels of the candidates that depend on a covariate."""
+        return {c.label for c in self.gate.candidates if not c.basis.is_constant}
+
+    @cached_property
+    def _constants(self) -> dict[str | None, str]:
+        """By mechanism, the covariate of its constant effect."""
+        found = {c.mechanism: c.covariate for c in self.gate.candidates if c.basis.is_constant}
+        return found if self.gate.inputs.learnt else {**found, **constant_refinements(self.rows.evidence)}
+
+    def _in_best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
+        """The form that gains most to first order, and its gain; a step between the two windows where it gains most."""
+        evidence = self.rows.evidence
+        if self._constants.get(mechanism) == covariate:
+            return self._most(base, mechanism, covariate, [DriverBasis("constant")])
+        best = self._most(base, mechanism, covariate, forms_of(covariate, evidence.table))
+        basis = best[1].basis
+        if basis.name != "step":
+            return best
+        near = step_places_near(evidence.table.covariates[covariate], basis.place)
+        return self._most(base, mechanism, covariate, [basis, *(replace(basis, place=place) for place in near)])
+
+    def _most(
+        self, base: Fit, mechanism: str | None, covariate: str, forms: Iterable[DriverBasis]
+    ) -> tuple[float, Candidate]:
+        every = [candidate(self.rows.evidence, mechanism, covariate, basis) for basis in forms]
+        before = float(base.scores.sum())
+        gains = [float(base.with_columns(c.plain).sum()) - before for c in every]
+        k = int(np.argmax(gains))
+        return gains[k], every[k]
+
+    # --- fits and gate -----------------------------------------------------------------------------------------------
+
+    def _fit(self, candidates: Sequence[Candidate], near: Fit | None = None) -> Fit:
+        """The joint fit, begun at another where that has the same effects."""
+        known = {} if near is None else {(e.mechanism, e.covariate, e.basis): e.coefficients for e in near.effects}
+        start = [known.get((c.mechanism, c.covariate, c.basis)) for c in candidates]
+        return fitted(self.rows, candidates, start)
+
+    def _unexplained(self, fit: Fit) -> Array:
+        """Standardised residuals (n, 3) of all windows of the gate, minus the effects."""
+        evidence = self.gate.evidence
+        if not fit.effects:
+            return evidence.z
+        both = joint_shift(evidence.mechanics, [*evidence.effects, *fit.effects], evidence.push)
+        had = joint_shift(evidence.mechanics, evidence.effects, evidence.push)
+        return np.asarray(evidence.z - np.einsum("nij,nj->ni", evidence.whitener, both - had))
+
+    def _let_pass(self, screened: Screened) -> bool:
+        """Note the labels that pass, the largest statistic first; whether there are any."""
+        order = np.argsort(-screened.statistic, kind="stable").tolist()
+        new = [k for k in order if screened.p_value[k] <= self.gate.alpha]
+        for k in new:
+            c, p = self.gate.candidates[k], float(screened.p_value[k])
+            self.passed[c.label] = min(p, self.passed.get(c.label, 1.0))
+        return bool(new)
+
+    def _p_value(self, c: Candidate) -> float:
+        own = [p for label, p in self.passed.items() if c.mechanism == label[0] or c.covariate == label[1]]
+        return min(own or self.passed.values())
