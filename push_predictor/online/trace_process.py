@@ -140,7 +140,7 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     write_whole(task.folder / VERDICT, f"{text}\n".encode())
     if trace.extended is not None:
         save_model(trace.extended, task.folder / EXTENDED)
-    sentences = [verdict_sentence(trace, "in the JSON"), worth_sentence(trace), *_report(task.folder / REPORT, trace)]
+    sentences = [verdict_sentence(trace), worth_sentence(trace), *_report(task.folder / REPORT, trace)]
     sentences += [f"Warning: {_for_client(text, task)}" for text in warnings]
     return Traced(text, " ".join(sentences), None if trace.extended is None else trace.extended.needs)
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -75,9 +75,9 @@ def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
-    held = held_out_rows(again.table, again.chosen)
+    held = held_out_rows(again.table)
     analysis, held_out = again.table.take(~held), again.table.take(held)
-    return Corrected(measured, replace(evidence_of(question.model, analysis), chosen=again.chosen), held_out)
+    return Corrected(measured, evidence_of(question.model, analysis), held_out)
 
 
 def _explains_residuals(question: Question, corrected: Corrected) -> bool:

@@ -139,7 +139,6 @@ class Trace:
     tested: tuple[Tested, ...]
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: tuple[str | None, str] | None
-    experiment: tuple[Mapping[str, float], ...]
     alpha: float
     input_shift: tuple[ShiftedInput, ...] = ()
     notes: tuple[str, ...] = field(default=())

@@ -57,10 +57,9 @@ class Question:
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model
         every = widened(evidence_of(searched, loaded.table), searched, shift)
-        every = replace(every, chosen=loaded.chosen)
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
-        held, usable = held_out_rows(table, loaded.chosen), with_instrument(table)
+        held, usable = held_out_rows(table), with_instrument(table)
         if GAP in (covariates or ()) and GAP not in usable.covariates:
             raise RequestError(
                 "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"

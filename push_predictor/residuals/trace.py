@@ -58,23 +58,20 @@ def trace_data(
     rig: Rig | None = None,
     seed: int = 0,
     watch: Watch = no_watch,
-    experiment: Sequence[Path | str] = (),
     topics: Topics = Topics(),
     checks: DataChecks | None = None,
 ) -> Trace:
     """Judge a model, or a model file, on recordings or push tables that it was not trained on; see `trace`.
 
-    experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
-    the errors before and after are of the same pushes as in that trace. topics: of all recordings. checks: of the data
-    and of what their pushes cover.
+    topics: of all recordings. checks: of the data and of what their pushes cover.
     """
     watch("windows", 0.0)
     model = model if isinstance(model, PushModel) else load_model(Path(model))
-    data, designed = ([Path(path) for path in given] for given in (paths, experiment))
+    data = [Path(path) for path in paths]
     options, inspect = window_options(model), checks or no_inspection
-    loaded = load_evidence(data, rig, options, experiment=designed, topics=topics, inspect=inspect)
+    loaded = load_evidence(data, rig, options, topics=topics, inspect=inspect)
     if checks is not None:
-        checks.judged_by([*data, *designed], loaded.table, loaded.rig)
+        checks.judged_by(data, loaded.table, loaded.rig)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 
@@ -143,7 +140,6 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         tested=_family_wise(measured.tested, "measurement"),
         minimum_detectable={},
         remaining=None,
-        experiment=(),
         alpha=question.alpha,
         input_shift=question.shifted,
         notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(question.loaded)),
@@ -180,7 +176,6 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
         minimum_detectable=motion.minimum_detectable,
         remaining=motion.remaining,
-        experiment=motion.experiment.pushes,
         alpha=question.alpha,
         input_shift=question.shifted,
         notes=(*notes_of(question.loaded, motion, measured, forces), *notes_of_shift(question.shifted)),

@@ -123,31 +123,6 @@ def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsy
     assert asked["covariates"] is None and asked["alpha"] == 0.01 and asked["rig"].shape == "rect1"
 
 
-def test_and_takes_recordings_of_the_proposed_pushes(place: Path, found: Any, extended: Trace) -> None:
-    asked = found(extended)
-    assert run(place) == 0 and asked["experiment"] == []
-    more = [place / f"{name}.csv" for name in ("third", "fourth")]
-    for path in more:
-        path.write_bytes((place / "new.csv").read_bytes())
-    assert run(place, "--and", str(more[0]), "--and", str(more[1])) == 0
-    assert asked["paths"] == [place / "new.csv"] and asked["experiment"] == more
-
-
-@pytest.mark.slow
-def test_pushes_after_and_are_analysed_and_the_held_out_ones_stay_the_same(
-    place: Path, traced: Traced, tmp_path: Path
-) -> None:
-    write_table(tmp_path / "more.csv", pushes(20, 9, slippery(0.1)))
-    (tmp_path / "more.rig.yaml").write_text(json.dumps(square_rig().to_record()))
-    data, model, names = [place / "new.csv"], place / "deployed.pushmodel", ["elapsed_time", "slider_x"]
-    alone = traced.trace
-    both = trace_module.trace_data(data, model, covariates=names, experiment=[tmp_path / "more.csv"])
-    assert both.held_out.digest == alone.held_out.digest
-    assert len(both.analysis.pushes) == len(alone.analysis.pushes) + 20
-    assert any("20 pushes of the designed experiment" in note for note in both.notes)
-    assert not any("designed experiment" in note for note in alone.notes)
-
-
 def test_json_on_stdout_is_the_only_output(
     place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -194,7 +169,6 @@ def test_saved_extended_model_predicts_the_same(place: Path, tmp_path: Path, fou
         (["--covariates", "elapsed_time,,x"], ["--covariates", "commas"]),
         (["--covariates", "topic:/absent"], ["topic:/absent", "elapsed_time", "slider_x"]),
         (["--rig", "absent.yaml"], ["absent.yaml"]),
-        (["--and", "absent"], ["absent", "no such file"]),
     ],
 )
 def test_errors_are_one_line_that_names_the_field(

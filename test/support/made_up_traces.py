@@ -43,9 +43,6 @@ TESTED = tuple(
     )
 )
 DETECTABLE = {"contact_friction": {"value": 0.021, "unit": "1"}, "clock_offset": {"value": 0.004, "unit": "s"}}
-EXPERIMENT = (
-    {"velocity": 0.02, "contact": 0.06, "angle": 0.6, "elapsed_time": 50.0, "push_index": 95.0, "slider_heading": 0.5},
-)
 
 
 def physics() -> FittedMechanics:
@@ -129,7 +126,6 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         tested=TESTED if terms else tuple(replace(t, p_value=0.3 + 0.7 * t.p_value) for t in TESTED),
         minimum_detectable=DETECTABLE,
         remaining=None,
-        experiment=(),
         alpha=0.01,
         notes=("a note for the reader",),
     )

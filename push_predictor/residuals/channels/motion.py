@@ -12,19 +12,16 @@ from typing import Any
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
 from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.absolute_fit import with_fitting_names
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.experiment import Experiment, separating_pushes
 from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
 from push_predictor.residuals.selection.further_steps import climbed
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
@@ -60,14 +57,13 @@ class MotionFinding:
     deviation: Array | None
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: Label | None
-    experiment: Experiment
     variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
     uncompared: tuple[str, ...] = ()
 
 
-NO_MOTION = MotionFinding((), (), (), (), None, {}, None, Experiment(), (), (), ())
+NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), ())
 
 
 def motion_effects(
@@ -112,7 +108,6 @@ def motion_effects(
             **_detectable_noise(spread),
         },
         remaining=_remaining(found, share),
-        experiment=_experiment(first, evidence, inputs, model, inside),
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
@@ -182,19 +177,3 @@ def _unchanged(found: SearchResult) -> tuple[Label, ...]:
     ordered = sorted(found.first.unchanged, key=lambda k: -found.first.statistic[k])
     strongest = {found.candidates[k].covariate: found.candidates[k] for k in reversed(ordered)}
     return tuple(candidate.label for candidate in reversed(strongest.values()))
-
-
-def _experiment(
-    first: SelectedTerm | None, evidence: Evidence, inputs: InputsBasis, model: PushModel, inside: BoolArray | None
-) -> Experiment:
-    """Pushes that would separate the rivals of the first term, one rival per covariate, each fitted to these data."""
-    if first is None:
-        return Experiment()
-    rivals: dict[str, Candidate] = {first.best.covariate: first.best}
-    for judged in first.rivals:
-        if first.best.basis.is_constant and judged.candidate.covariate in CUMULATIVE:
-            continue  # that a constant effect grew early shows only in a session that begins anew
-        rivals.setdefault(judged.candidate.covariate, judged.candidate)
-    controls = inputs.columns if inputs.absorbs else None
-    fitted = [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()]
-    return separating_pushes(evidence, fitted, model.training, inside)

@@ -143,9 +143,6 @@ def _action(trace: Trace) -> str:
     if grew_early(trace.effects[0], trace.equivalent):
         return f"{model}. {ANEW}"
     names = _rivals(trace.effects[0], trace.equivalent)
-    if trace.experiment:
-        pushes = count(len(trace.experiment), "push below: it decides", "pushes below: they decide")
-        return f"{model}, and make the {pushes} between {names}."
     return f"{model}, and vary {names} independently: these pushes do not separate them."
 
 

@@ -21,7 +21,6 @@ from push_predictor.residuals.reporting.phrases import (
     mechanism_phrase,
 )
 from push_predictor.residuals.selection.absolute_fit import parts_of_others
-from push_predictor.residuals.selection.experiment import PUSHES
 
 CUT_AGAIN = (
     "The streams were corrected and the windows cut again. The figures after correction are of the deployed model, "
@@ -44,10 +43,8 @@ def notes_of(
 
 def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
     """How the pushes were split, and which covariates were dropped."""
-    chosen = len(loaded.chosen)
-    experiment = (f"{chosen} pushes of the designed experiment are analysed and never held out.",) if chosen else ()
     dropped = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in loaded.dropped.items())
-    return (f"Split: {RULE}. Windows of one push stay together.", *experiment, *dropped)
+    return (f"Split: {RULE}. Windows of one push stay together.", *dropped)
 
 
 def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:
@@ -81,12 +78,6 @@ def _of_motion(motion: MotionFinding) -> list[str]:
         notes.append(
             f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
             f"they lack the covariate, or have too few windows per push."
-        )
-    if (rivals := motion.experiment.inseparable) and not motion.terms[0].best.basis.is_constant:
-        names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])
-        notes.append(
-            f"{PUSHES} further pushes would not separate {names}: at all values that can be set, their predictions are "
-            f"too similar. Time, push count and distance slid can only grow."
         )
     if motion.unchanged:
         effects = listed([effect_phrase(*label) for label in motion.unchanged])

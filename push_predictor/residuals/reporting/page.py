@@ -23,7 +23,6 @@ from push_predictor.residuals.reporting.quantities import count
 from push_predictor.residuals.reporting.tables import (
     detectable_table,
     effects_table,
-    experiment_table,
     held_out_table,
     metric_tables,
     shifts_table,
@@ -45,12 +44,6 @@ KINDS = {"vhgp": "variational heteroscedastic GP", "gp": "standard GP", "analyti
 UNNAMED = (
     "A mechanism is named only if it explains nearly as much as a general pattern over contact point and push angle. "
     "Here no mechanism does. A tested mechanism can be significant because it resembles the pattern."
-)
-EXPERIMENT = (
-    "Make the pushes below in this order, with the covariates set as the table shows. There the predictions of the "
-    "rivals differ most. Each repeats a recorded push at other values of the covariates. Elapsed time, push count and "
-    "distance slid only grow: rest, or push, until they reach the first row. Then trace again: add --and and the new "
-    "recording to the command."
 )
 
 
@@ -125,8 +118,6 @@ def _rivals(trace: Trace) -> list[str]:
         first, rivals = trace.effects[0], trace.equivalent
         words = [ANEW] if grew_early(first, rivals) else separating_words([first.covariate, *rivals])
         parts.append(html.bullets(words))
-    if trace.experiment:
-        parts += [html.paragraph(EXPERIMENT), experiment_table(trace)]
     return parts
 
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,13 +14,13 @@ from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.reporting.html import NOTHING
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.answer import answer
-from push_predictor.residuals.reporting.phrases import effect_phrase, with_unit
+from push_predictor.residuals.reporting.phrases import effect_phrase
 from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
 
 
 def summary_lines(trace: Trace) -> list[str]:
-    """The page's answer, its evidence, the pushes that would decide, held-out figures and notes; plain ASCII."""
-    evidence = [verdict_sentence(trace), worth_sentence(trace), *_experiment(trace)]
+    """The page's answer, its evidence, held-out figures and notes; plain ASCII."""
+    evidence = [verdict_sentence(trace), worth_sentence(trace)]
     lines = [*answer(trace), "", *evidence, "", *_held_out(trace)]
     if trace.remaining is not None:
         lines.append(f"Still significant after these effects: {effect_phrase(*trace.remaining)}.")
@@ -39,14 +38,6 @@ def comparisons_of(trace: Trace) -> list[Comparison]:
 
 def _same(one: Comparison, other: Comparison) -> bool:
     return np.array_equal(one.mean, other.mean) and np.array_equal(one.observed, other.observed)
-
-
-def _experiment(trace: Trace) -> list[str]:
-    return [f"  push {k + 1}: {_push(push)}" for k, push in enumerate(trace.experiment)]
-
-
-def _push(push: Mapping[str, float]) -> str:
-    return ", ".join(f"{with_unit(name).lower()} {value:.3g}" for name, value in push.items())
 
 
 def _held_out(trace: Trace) -> list[str]:

@@ -16,15 +16,13 @@ from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
 from push_predictor.residuals.outcome import FoundEffect, Gain, Tested, Trace
-from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, effect_phrase, mechanism_phrase, unit_of
+from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, effect_phrase, mechanism_phrase
 from push_predictor.residuals.reporting.quantities import count, in_shown_unit, interval_cell, p_text, shown_unit
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of
 from push_predictor.residuals.reporting.tested import best_of, role_of
 
 AT_ONCE = 15  # candidates shown before the reader opens the rest
-COUNTS = ("push_index", "edge", "recording")
-ANGLES = ("angle", "slider_heading", "push_heading")
 
 
 def effects_table(trace: Trace) -> str:
@@ -130,15 +128,6 @@ def detectable_table(trace: Trace) -> str:
     return html.folded_table(caption, ("mechanism", "constant", "along a covariate", "covariate"), rows)
 
 
-def experiment_table(trace: Trace) -> str:
-    """Pushes that would separate the rivals."""
-    keys = list(dict.fromkeys(key for push in trace.experiment for key in push))
-    rows = [
-        [str(k + 1), *(_cell(_shown(key, push.get(key))) for key in keys)] for k, push in enumerate(trace.experiment)
-    ]
-    return html.table("Pushes that would separate the rivals.", ("push", *map(_column, keys)), rows)
-
-
 def _effect_row(effect: FoundEffect, noise: bool) -> list[str]:
     size, share = effect.parameter, effect.share_of_residual
     basis = "" if effect.basis == "constant" else f" ({effect.basis})"
@@ -197,14 +186,3 @@ def _mark(trace: Trace, tested: Tested) -> str:
 
 def _cell(value: float | None) -> str:
     return html.number(value, 3) if value is not None and np.isfinite(value) else html.NOTHING
-
-
-def _column(key: str) -> str:
-    unit, name = "deg" if key in ANGLES else unit_of(key), bare(covariate_phrase(key))
-    return f"{name} ({unit})" if unit else name
-
-
-def _shown(key: str, value: float | None) -> float | None:
-    if value is not None and key in COUNTS:
-        return float(np.round(value))
-    return float(np.degrees(value)) if value is not None and key in ANGLES else value

@@ -35,9 +35,9 @@ FORCE = "surface_friction"  # its size is a share of the force
 UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
 
 
-def verdict_sentence(trace: Trace, where: str = "below") -> str:
-    """The verdict in a few sentences: answer, size, rivals; where: the place that lists pushes that would decide."""
-    return f"{_joined(headline(trace), EVIDENCE[trace.verdict](trace))}{rivals_sentence(trace, where)}"
+def verdict_sentence(trace: Trace) -> str:
+    """The verdict in a few sentences: answer, size, rivals."""
+    return f"{_joined(headline(trace), EVIDENCE[trace.verdict](trace))}{rivals_sentence(trace)}"
 
 
 def headline(trace: Trace) -> str:
@@ -249,15 +249,14 @@ EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
 }
 
 
-def rivals_sentence(trace: Trace, where: str = "below") -> str:
-    """The covariates and mechanisms that fit as well, and how many pushes would decide."""
+def rivals_sentence(trace: Trace) -> str:
+    """The covariates and mechanisms that fit as well."""
     text = ""
     if trace.effects and grew_early(trace.effects[0], trace.equivalent):
         text = " It was there from the first push, or it grew early in the session: these pushes do not decide."
     elif trace.equivalent:
         names = listed([covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)])
-        pushes = count(len(trace.experiment), "push that would decide is", "pushes that would decide are")
-        text = f" {capitalised(names)} fit equally well{f'; {pushes} listed {where}' if trace.experiment else ''}."
+        text = f" {capitalised(names)} fit equally well."
     if trace.mechanisms:
         names = listed([mechanism_phrase(name) for name in trace.mechanisms])
         text += f" {capitalised(names)} would explain these pushes as well."

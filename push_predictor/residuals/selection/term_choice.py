@@ -21,7 +21,7 @@ from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION, standar
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.basis_choice import bases_for, best_onset, simplest_basis, with_basis
+from push_predictor.residuals.selection.basis_choice import best_onset, simplest_basis, with_basis
 from push_predictor.residuals.selection.cross_validation import Judged, fit, judge, judged_exactly
 from push_predictor.residuals.selection.naming import (
     MOST_UNEXPLAINED,
@@ -36,7 +36,6 @@ from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
 NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that is fixed to body or world does not grow with these
-SMOOTH = ("linear", "logarithmic", "quadratic")  # bases in which rivals are compared after an experiment
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_REFINED = 12  # of the labels, those that are tried in every basis
 MOST_RIVALS = 3  # mechanisms of a whole effect that are fitted exactly
@@ -114,7 +113,6 @@ class TermChoice:
         growing = self._growing(found)
         judged = self._with_onset(self._refined([_if_growing(self.candidates[k], growing) for k in chosen], z), z)
         rivals = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
-        rivals = self._separated(rivals, z) if self.evidence.chosen else rivals
         driver = next((j for j in rivals if j.candidate.covariate in used), rivals[0]).candidate.covariate
         known = {j.candidate.covariate for j in rivals}
         rivals = [*rivals, *(j for j in self._early_growth(judged, z) if j.candidate.covariate not in known)]
@@ -125,24 +123,6 @@ class TermChoice:
         along = [k for k in tested if self.candidates[k].covariate == driver]
         p_value = min(float(screened.p_value[k]) for k in along or tested)
         return self._fitted(best, rivals, p_value, replace(naming, drivers=drivers), z)
-
-    def _separated(self, rivals: list[Judged], z: Array) -> list[Judged]:
-        """The rivals that exact fits leave, the best first.
-
-        Pushes of a designed experiment lie where the rivals differ most: beyond the other pushes, where an effect that
-        is linear in its size predicts too much.
-        """
-        fitted = [(self._exact_in_any_basis(each, z), each) for each in rivals]
-        exact = sorted((pair for pair in fitted if pair[0].exact), key=lambda pair: -pair[0].gain)
-        kept = [each for fit, each in exact if not surely_larger(exact[0][0], fit)]
-        return [*kept, *(each for fit, each in fitted if not fit.exact)]
-
-    def _exact_in_any_basis(self, judged: Judged, z: Array) -> Judged:
-        """The exact fit with the largest gain: the course of an effect beyond the other pushes is not known."""
-        candidate = judged.candidate
-        bases = [b for b in bases_for(candidate, self.evidence.table) if b.name in SMOOTH and b != candidate.basis]
-        tried = [replace(judged, candidate=with_basis(candidate, b, self.evidence.table), exact=None) for b in bases]
-        return max((self._exact(each, z) for each in (judged, *tried)), key=lambda j: j.gain)
 
     def _growing(self, found: Sequence[int]) -> set[str]:
         """Mechanisms found both constant, though no base can have the effect, and changing with a covariate."""
