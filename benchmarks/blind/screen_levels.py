@@ -19,6 +19,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from push_predictor.residuals.selection.forward_selection import ForwardSelection
+from push_predictor.residuals.selection.term_choice import TermChoice
 
 from benchmarks.blind.levels import ALPHAS, later_windows, trained_rig
 from benchmarks.blind.scores import wilson
@@ -32,8 +34,6 @@ from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.forward_selection import ForwardSelection
-from push_predictor.residuals.selection.term_choice import TermChoice
 from push_predictor.types import Array
 
 UNEVEN = 0.4  # standard deviation of the logarithm of a push's spread

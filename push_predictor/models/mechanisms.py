@@ -108,7 +108,7 @@ LIBRARY: tuple[Mechanism, ...] = (
 )
 
 # Most of these mimic one of the library, so they are candidates only once that has shown that an analytical model is
-# wrong (residuals/selection/further_steps.py).
+# wrong (residuals/selection/search.py).
 REFINEMENTS: tuple[Mechanism, ...] = (
     _mechanism("friction_by_angle", "1/rad", 0.5, friction_by_angle="change of contact friction with push angle"),
     _mechanism("friction_by_speed", "1", 0.2, friction_by_speed="contact friction per e-fold of sliding speed"),

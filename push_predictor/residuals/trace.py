@@ -23,7 +23,7 @@ from push_predictor.recordings.load import no_inspection
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding
@@ -40,7 +40,6 @@ from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
-from push_predictor.residuals.selection.absolute_fit import parts_of_others
 from push_predictor.watch import Watch, no_watch
 
 if TYPE_CHECKING:
@@ -191,7 +190,8 @@ def _extension(question: Question, motion: MotionFinding) -> _Extension:
     added = iter(after.predictor.effects[-len(candidates) :] if after else ())
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(
-        estimated_effects(evidence, [t.best], of_size=True)[0][0] if t.own else next(added) for t in motion.terms
+        estimated(fitted(FitRows(evidence), [t.best]), of_size=True)[0][0] if t.own else next(added)
+        for t in motion.terms
     )
     gain = held_out_gain(model, refit, after, evidence.table, question.held_out) if after else None
     return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)
@@ -233,10 +233,10 @@ def _found_effects(
                 None if term.mechanism is None else size_of(effect, question.evidence.table),
                 _of_trace(term.p_value, "motion"),
                 term.share,
-                term.naming.resembles,
+                term.resembles,
             )
-            for term, effect, part in zip(motion.terms, effects, parts_of_others(motion.terms), strict=True)
-            if not part
+            for term, effect in zip(motion.terms, effects, strict=True)
+            if not term.part
         )
     if motion.variance and not forces.effects:
         return tuple(

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from drifting_models import DRIFT, extended, pushes, slippery
 from drifting_models import mechanics as drifting_mechanics
+from push_predictor.residuals.candidates.coefficients import _Problem, estimated_effects
+from push_predictor.residuals.selection.basis_choice import simplest_basis
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -27,9 +29,7 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import _Problem, estimated_effects
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.selection.basis_choice import simplest_basis
 
 EXACT = [mechanism.name for mechanism in (*LIBRARY, *REFINEMENTS)]
 ALWAYS = DriverBasis("constant")

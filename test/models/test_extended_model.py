@@ -17,6 +17,7 @@ import pytest
 import ros_harness as harness
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
 from hosted_nodes import hosted_node
+from push_predictor.residuals.candidates.coefficients import estimated_effects
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -43,7 +44,6 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import gain

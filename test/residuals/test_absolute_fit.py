@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from push_predictor.residuals.selection.absolute_fit import left_by, parts_of_others, with_fitting_names
+from push_predictor.residuals.selection.cross_validation import Judged
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.selection.absolute_fit import left_by, parts_of_others, with_fitting_names
-from push_predictor.residuals.selection.cross_validation import Judged
 from push_predictor.residuals.selection.naming import Naming
-from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 
 def term(

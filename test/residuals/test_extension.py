@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_up_traces import pushes, slippery
+from push_predictor.residuals.candidates.coefficients import _Problem
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -18,7 +19,6 @@ from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import _Problem
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend

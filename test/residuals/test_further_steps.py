@@ -12,6 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from made_up_traces import DRIFT, physics, planted, pushes
+from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.parameter_changes import ParameterChanges
+from push_predictor.residuals.selection.cross_validation import Judged
+from push_predictor.residuals.selection.further_steps import Exchange, worthwhile
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -28,15 +33,10 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
-from push_predictor.residuals.candidates.parameter_changes import ParameterChanges
 from push_predictor.residuals.channels.motion import MotionFinding, motion_effects
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.extension.extended_model import extend
-from push_predictor.residuals.selection.cross_validation import Judged
-from push_predictor.residuals.selection.further_steps import Exchange, worthwhile
 from push_predictor.residuals.selection.naming import Naming
-from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 CONSTANT = DriverBasis("constant")
 COUNT = 100  # pushes, as few as have blocks enough (FEWEST_BLOCKS)

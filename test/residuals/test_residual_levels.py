@@ -10,6 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_up_traces import DRIFT, planted, pushes, slippery
+from push_predictor.residuals.selection.cross_validation import Judged
+from push_predictor.residuals.selection.forward_selection import SearchResult, search
+from push_predictor.residuals.selection.pruning import needed_terms
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 from synthetic import square_rig
 
 from push_predictor.errors import RequestError
@@ -28,11 +32,7 @@ from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.cross_validation import Judged
-from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.naming import Naming, surely_larger
-from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 BLOCKS, ROWS = 40, 3  # a block
 FEW = ("contact_friction", "pressure_spread", "tilted_surface")

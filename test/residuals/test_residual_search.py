@@ -10,6 +10,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
+from push_predictor.residuals.selection.term_choice import TermChoice
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -28,10 +30,8 @@ from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import Controlled, screen
-from push_predictor.residuals.selection.term_choice import TermChoice
 
 COUNT, WINDOWS = 100, 2  # pushes of a session, as few as have blocks enough (FEWEST_BLOCKS); windows of a push
 SIDE = 0.09

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from made_up_traces import pushes
+from push_predictor.residuals.selection.cross_validation import FOLDS, fit, gains_of
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -24,7 +25,6 @@ from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of, whitened_response
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.cross_validation import FOLDS, fit, gains_of
 from push_predictor.residuals.selection.screening import AT_ONCE, Scores, screen
 
 

@@ -100,14 +100,7 @@ def _with_nuisance(found: Sequence[Candidate], evidence: Evidence, inputs: Input
     responses = {c.mechanism: c.response for c in found}
     mechanisms = [name for name in responses if name is not None]
     nuisance = Nuisance(evidence, inputs, mechanisms, responses.__getitem__)
-    return [
-        replace(
-            c,
-            nuisance=nuisance.of_change(*c.label, c.basis, c.kind),
-            nuisance_growing=nuisance.of_growth(*c.label, c.kind),
-        )
-        for c in found
-    ]
+    return [replace(c, nuisance=nuisance.of_change(*c.label, c.basis, c.kind)) for c in found]
 
 
 def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis | None) -> str:

@@ -3,10 +3,10 @@
 
 """Effects fitted together, exactly, and what they gain on blocks of pushes that they were not fitted to.
 
-Residuals of new windows, and of the training windows where the base is learnt, stand under each other. What a learnt
-base may have missed is a function of its inputs, the same in both, and is regressed out (Frisch and Waugh 1933). Effects
-act on new windows only, so they are changes since training. The fit is by steps of Gauss and Newton with the weights of
-Student's t noise; the windows of a push share their deviation and count accordingly.
+Where a learnt base may have missed a function of its inputs, the residuals of training windows stand under those of new
+ones: what is the same in both is regressed out (Frisch and Waugh 1933). Effects act on new windows only, so they are
+changes since training. The fit is by steps of Gauss and Newton with the weights of Student's t noise; the windows of a
+push share their deviation and count accordingly.
 """
 
 from __future__ import annotations

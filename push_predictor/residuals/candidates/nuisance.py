@@ -43,14 +43,12 @@ class Nuisance:
 
     def of_change(self, mechanism: str | None, covariate: str, basis: DriverBasis, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) for a candidate that changes an effect which may exist anyway; None if none."""
-        return self._nuisance(mechanism if basis.is_constant else None, covariate, kind)
-
-    def of_growth(self, mechanism: str | None, covariate: str, kind: Kind) -> Array | None:
-        """The same for an effect that starts at zero: the constant effect of its own mechanism stays in."""
-        return self._nuisance(mechanism, covariate, kind)
-
-    def _nuisance(self, kept: str | None, covariate: str, kind: Kind) -> Array | None:
-        key = covariate in TOUCHED or kind != "driven", kind != "constant", kept, kind
+        key = (
+            covariate in TOUCHED or kind != "driven",
+            kind != "constant",
+            mechanism if basis.is_constant else None,
+            kind,
+        )
         if key not in self.known:
             self.known[key] = self._columns(*key)
         return self.known[key]

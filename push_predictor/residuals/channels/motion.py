@@ -10,39 +10,75 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc
 
 from push_predictor.errors import RequestError
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidate import SPEED, Candidate
+from push_predictor.recordings.table import OUTPUTS, concatenate
+from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
-from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, SESSION
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
-from push_predictor.residuals.selection.absolute_fit import with_fitting_names
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
-from push_predictor.residuals.selection.further_steps import climbed
+from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
-from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
+from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
-FEWEST_PUSHES = 12  # whose variance is judged
+FEWEST_PUSHES = 12  # whose variance is judged, and of training with which a constant effect is compared
+FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
+CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 
-Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
+
+@dataclass(frozen=True, eq=False)
+class MotionTerm:
+    """A term of the search, judged as a part of the model.
+
+    outputs: those that it shifts. share: of the sum of squares of the standardised residual that all terms explain. own:
+    whether it lies in the inputs of a learnt base, so that a refit learns it. since_training: whether a constant effect is
+    a change since training. part: whether it is what the fit of a larger one leaves, rather than an effect.
+    """
+
+    term: Term
+    p_value: float
+    outputs: tuple[str, ...]
+    share: float
+    own: bool
+    since_training: bool
+    part: bool
+
+    @property
+    def best(self) -> Candidate:
+        """Mechanism, covariate and form."""
+        return self.term.best
+
+    @property
+    def mechanism(self) -> str | None:
+        """See Term."""
+        return self.term.mechanism
+
+    @property
+    def resembles(self) -> str | None:
+        """The mechanism that comes closest, where none fits."""
+        return self.term.naming.resembles
 
 
 @dataclass(frozen=True, eq=False)
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: in the order of selection, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
-    and of its mechanism.
+    terms: the largest gain first, parts of others last. equivalent, mechanisms: rivals of the first term's covariate and
+    of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
     confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
@@ -50,7 +86,7 @@ class MotionFinding:
     terms.
     """
 
-    terms: tuple[SelectedTerm, ...]
+    terms: tuple[MotionTerm, ...]
     equivalent: tuple[str, ...]
     mechanisms: tuple[str, ...]
     tested: tuple[Tested, ...]
@@ -85,22 +121,19 @@ def motion_effects(
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
     every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
-    candidates = [c for c in every if not baseline.lacks(c.covariate)]
+    candidates = tuple(c for c in every if not baseline.lacks(c.covariate))
     if not candidates:
         accepted = "one that training recorded, too" if every else "one that the inputs do not change, as they shifted"
         raise RequestError("covariate", ", ".join(names or ()), accepted)
-    found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
-    found = replace(found, terms=needed_terms(found.terms, evidence))
-    if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
-        found = climbed(found, ForwardSelection(TermChoice(evidence, found.candidates, inputs, seed), share, baseline))
-    found = replace(found, terms=with_fitting_names(found.terms))  # last: the ladder may explain what a name leaves
+    found = search(Gate(evidence, candidates, inputs, share, seed, baseline), _rows(model, evidence, baseline, inputs))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
-    first = found.terms[0] if found.terms else None
+    terms = _judged(found, evidence, inputs, baseline)
+    first = terms[0].term if terms else None
     return MotionFinding(
-        terms=tuple(replace(term, p_value=_of_motion(term.p_value)) for term in found.terms),
-        equivalent=first.naming.drivers[1:] if first else spread.rivals if notable else (),
-        mechanisms=_other_mechanisms(first),
+        terms=terms,
+        equivalent=first.naming.covariates[1:] if first else spread.rivals if notable else (),
+        mechanisms=tuple(name for name in first.naming.mechanisms[1:] if name is not None) if first else (),
         tested=_tested(found),
         deviation=baseline.deviation if inputs.learnt else None,
         minimum_detectable={
@@ -113,6 +146,63 @@ def motion_effects(
         confounded=tuple(confounded(evidence, names, inputs)),
         uncompared=tuple(dict.fromkeys(c.covariate for c in every if baseline.lacks(c.covariate))),
     )
+
+
+def _rows(model: PushModel, evidence: Evidence, baseline: Baseline, inputs: InputsBasis) -> FitRows:
+    """The windows of the fits: with those of training where a learnt base may have missed a function of its inputs."""
+    _, few = evidence.thinned
+    if not (inputs.learnt and inputs.absorbs):
+        return FitRows(few)
+    _, before = baseline.evidence.thinned
+    return FitRows(few, before, inputs_basis(model, concatenate([few.table, before.table])).columns)
+
+
+def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseline: Baseline) -> tuple[MotionTerm, ...]:
+    fit, total = found.fit, float(np.sum(evidence.z**2))
+    explained = 1.0 - float(np.sum(found.unexplained**2)) / total
+    gains = [max(term.gain, 0.0) for term in found.terms]
+    changed = _changed(found, inputs, baseline)
+    terms = [
+        MotionTerm(
+            term,
+            _of_motion(term.p_value),
+            _outputs(fit.columns[:, :, part] @ fit.coefficients[part]),
+            explained * gain / max(sum(gains), np.finfo(float).tiny),
+            inputs.absorbs and term.best.kind == "constant",
+            bool(term.best.covariate == CONSTANT and own),
+            gain < MOST_UNEXPLAINED * gains[0],
+        )
+        for term, gain, part, own in zip(found.terms, gains, fit.parts, changed, strict=True)
+    ]
+    return tuple(sorted(terms, key=lambda term: term.part))
+
+
+def _outputs(shift: Array) -> tuple[str, ...]:
+    """Names of the outputs that a standardised shift (n, 3) changes."""
+    size = np.sqrt(np.mean(shift**2, axis=0))
+    return tuple(name for name, felt in zip(OUTPUTS, size >= FELT * size.max(), strict=True) if felt)
+
+
+def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> list[bool]:
+    """Whether each term differs from what the same fit finds in training; of a learnt base every one does."""
+    if inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
+        return [inputs.learnt] * len(found.terms)
+    _, before = baseline.evidence.thinned
+    recorded = [k for k, term in enumerate(found.terms) if _recorded(term.best, before)]
+    again = [candidate(before, *found.terms[k].best.label, found.terms[k].best.basis) for k in recorded]
+    now, then = estimated(found.fit)[0], dict(zip(recorded, estimated(fitted(FitRows(before), again))[0], strict=True))
+    return [k in then and _differ(effect, then[k]) for k, effect in enumerate(now)]
+
+
+def _recorded(c: Candidate, evidence: Evidence) -> bool:
+    needs = () if c.mechanism is None else mechanism_named(c.mechanism).needs
+    return {*needs, *c.basis.drivers} <= set(evidence.table.covariates)
+
+
+def _differ(one: Effect, other: Effect) -> bool:
+    change, covariance = one.coefficients - other.coefficients, one.covariance + other.covariance
+    square = float(change @ np.linalg.pinv(covariance, hermitian=True) @ change)
+    return bool(chdtrc(len(change), square) <= CHANGED)
 
 
 def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
@@ -146,12 +236,6 @@ def _spread(
     if len(evidence.table.pushes) < FEWEST_PUSHES:
         return VarianceFinding((), ())
     return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
-
-
-def _other_mechanisms(first: SelectedTerm | None) -> tuple[str, ...]:
-    if first is None or not first.naming.known:
-        return ()
-    return tuple(name for name in first.naming.mechanisms if name is not None and name != first.mechanism)
 
 
 def _tested(found: SearchResult) -> tuple[Tested, ...]:

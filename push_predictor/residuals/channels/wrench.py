@@ -41,7 +41,7 @@ from push_predictor.residuals.channels.sensor_zero import zero_shift
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.basis_choice import SIMPLEST_FIRST, step_places, step_places_near
+from push_predictor.residuals.selection.forms import SIMPLEST_FIRST, step_places, step_places_near
 from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"

@@ -16,7 +16,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model
 from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.extension.recalibration import held_out_windows
@@ -31,8 +31,8 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     """
     learnt, absorbs = base.predictor.learnt, base.predictor.absorbs
     # About mechanics, a learnt base expresses little in its own inputs, and a refit keeps the mechanics.
-    own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else None
-    effects, cross = estimated_effects(evidence, candidates, own_inputs, of_size=True)
+    own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else np.empty((0, 0))
+    effects, cross = estimated(fitted(FitRows(evidence, controls=own_inputs), candidates), of_size=True)
     predictor = _with_effects(base.predictor, effects, cross)
     table = spread_rows(base, evidence.table)
     if learnt or absorbs:

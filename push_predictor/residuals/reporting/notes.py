@@ -20,7 +20,6 @@ from push_predictor.residuals.reporting.phrases import (
     listed,
     mechanism_phrase,
 )
-from push_predictor.residuals.selection.absolute_fit import parts_of_others
 
 CUT_AGAIN = (
     "The streams were corrected and the windows cut again. The figures after correction are of the deployed model, "
@@ -62,10 +61,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
         )
     if own := [effect_phrase(term.mechanism, term.best.covariate) for term in motion.terms if term.own]:
         notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
-    parts = parts_of_others(motion.terms)
-    if left := [
-        effect_phrase(t.mechanism, t.best.covariate) for t, part in zip(motion.terms, parts, strict=True) if part
-    ]:
+    if left := [effect_phrase(t.mechanism, t.best.covariate) for t in motion.terms if t.part]:
         notes.append(f"Fitted together with a listed effect, and not listed separately: {listed(left)}.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])

@@ -17,6 +17,8 @@ from push_predictor.types import Array
 
 STEPS = 9  # places of a step that are tried first, at quantiles of the covariate
 MOST_PLACES = 60  # that are tried near the best of these
+SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "periodic", "periodic, twice around",
+                  "quadratic", "map")  # fmt: skip
 SOON = 0.03  # of the covariate's range: scale of an effect that grows early in it
 
 
@@ -28,7 +30,9 @@ def forms_of(covariate: str, table: PushTable) -> list[DriverBasis]:
     if covariate in HEADINGS:
         return [DriverBasis(name, (covariate,), offset=True) for name in ("periodic", "periodic, twice around")]
     values = table.covariates[covariate]
-    linear, logarithmic, quadratic = (standard_basis(n, covariate, values) for n in ("linear", "logarithmic", "quadratic"))
+    linear, logarithmic, quadratic = (
+        standard_basis(n, covariate, values) for n in ("linear", "logarithmic", "quadratic")
+    )
     forms = [DriverBasis("step", (covariate,), place=place) for place in step_places(values)]
     forms += [replace(linear, centre=(float(values.min()),)), logarithmic, replace(linear, offset=True)]
     if covariate in CUMULATIVE:

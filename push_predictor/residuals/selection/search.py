@@ -22,7 +22,6 @@ from push_predictor.models.mechanics.ladder import least_gain
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import constant_refinements
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, fitted, standard_error
-from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.selection.forms import forms_of, step_places_near
 from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import Naming, Trial, naming_of
