@@ -43,12 +43,8 @@ class Nuisance:
 
     def of_change(self, mechanism: str | None, covariate: str, basis: DriverBasis, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) for a candidate that changes an effect which may exist anyway; None if none."""
-        key = (
-            covariate in TOUCHED or kind != "driven",
-            kind != "constant",
-            mechanism if basis.is_constant else None,
-            kind,
-        )
+        own = mechanism if basis.is_constant else None
+        key = covariate in TOUCHED or kind != "driven", kind != "constant", own, kind
         if key not in self.known:
             self.known[key] = self._columns(*key)
         return self.known[key]

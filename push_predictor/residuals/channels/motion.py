@@ -44,9 +44,9 @@ CHANGED = 0.05  # p from which a constant effect that an analytical base lacks i
 class MotionTerm:
     """A term of the search, judged as a part of the model.
 
-    outputs: those that it shifts. share: of the sum of squares of the standardised residual that all terms explain. own:
-    whether it lies in the inputs of a learnt base, so that a refit learns it. since_training: whether a constant effect is
-    a change since training. part: whether it is what the fit of a larger one leaves, rather than an effect.
+    outputs: those that it shifts. share: of the sum of squares of the standardised residual. own: whether it lies in
+    the inputs of a learnt base, so that a refit learns it. since_training: whether a constant effect is a change since
+    training. part: whether it is what the fit of a larger one leaves, rather than an effect.
     """
 
     term: Term
@@ -77,8 +77,8 @@ class MotionTerm:
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: the largest gain first, parts of others last. equivalent, mechanisms: rivals of the first term's covariate and
-    of its mechanism.
+    terms: the largest gain first, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
+    and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
     confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
@@ -241,8 +241,8 @@ def _spread(
 def _tested(found: SearchResult) -> tuple[Tested, ...]:
     """Every mechanism with every covariate once, in its best basis, smallest p first."""
     best: dict[Label, float] = {}
-    for candidate, p in zip(found.candidates, found.first.p_value.tolist(), strict=True):
-        best[candidate.label] = min(p, best.get(candidate.label, 1.0))
+    for tried, p in zip(found.candidates, found.first.p_value.tolist(), strict=True):
+        best[tried.label] = min(p, best.get(tried.label, 1.0))
     return tuple(Tested(*label, _of_motion(p)) for label, p in sorted(best.items(), key=lambda item: item[1]))
 
 
@@ -260,4 +260,4 @@ def _unchanged(found: SearchResult) -> tuple[Label, ...]:
     """The strongest candidate of each covariate that acts as it did in training."""
     ordered = sorted(found.first.unchanged, key=lambda k: -found.first.statistic[k])
     strongest = {found.candidates[k].covariate: found.candidates[k] for k in reversed(ordered)}
-    return tuple(candidate.label for candidate in reversed(strongest.values()))
+    return tuple(one.label for one in reversed(strongest.values()))
