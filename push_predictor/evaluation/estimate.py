@@ -25,6 +25,17 @@ class Estimate:
     low: float
     high: float
 
+    def times(self, factor: float) -> Estimate:
+        """The statistic times a factor."""
+        low, high = (
+            (factor * self.low, factor * self.high) if factor >= 0.0 else (factor * self.high, factor * self.low)
+        )
+        return Estimate(factor * self.value, low, high)
+
+    def size(self) -> Estimate:
+        """The statistic without its sign."""
+        return self.times(-1.0) if self.value < 0.0 else self
+
     def text(self, form: str = ".2f") -> str:
         """Text for a sentence: 0.12 (0.10 to 0.14)."""
         return f"{self._text(self.value, form)} ({self._ends(form)})"

@@ -12,9 +12,14 @@ from push_predictor.residuals.reporting.figures.driver_basis import basis_charts
 from push_predictor.residuals.reporting.figures.errors import coverage_charts, error_charts
 from push_predictor.residuals.reporting.figures.partial import Rows, Strength, analysis_rows, held_out_rows, strength_of
 from push_predictor.residuals.reporting.figures.shifts import Shifts, course_charts, course_of, shift_charts, shifts_of
-from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, effect_phrase, listed, moved_noun
-from push_predictor.residuals.reporting.quantities import count
-from push_predictor.residuals.reporting.summary import comparisons_of
+from push_predictor.residuals.reporting.phrases import (
+    capitalised,
+    count,
+    covariate_phrase,
+    effect_phrase,
+    listed,
+    moved_noun,
+)
 
 BARS = "Bars: 95 % intervals from a bootstrap of pushes."
 
@@ -29,7 +34,7 @@ def effect_figures(trace: Trace) -> list[str]:
 
 def error_figure(trace: Trace) -> list[str]:
     """The error of each held-out push before and after, along the first effect's covariate or the time."""
-    table, shown = trace.held_out.table, comparisons_of(trace)
+    table, shown = trace.held_out.table, trace.comparisons
     if not len(table):
         return []
     shown = [shown[0], shown[-1]]
@@ -41,7 +46,7 @@ def error_figure(trace: Trace) -> list[str]:
 
 def calibration_figures(trace: Trace) -> list[str]:
     """Coverage and PIT before, after the refit and with the effects."""
-    shown = [comparison for comparison in comparisons_of(trace) if len(comparison.observed)]
+    shown = [comparison for comparison in trace.comparisons if len(comparison.observed)]
     if not shown:
         return []
     caption = (

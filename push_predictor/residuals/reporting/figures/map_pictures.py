@@ -14,7 +14,6 @@ from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.maps import Column, Halves, columns_of, halves_of, map_charts
 from push_predictor.residuals.reporting.figures.partial import strength_of
 from push_predictor.residuals.reporting.phrases import covariate_phrase
-from push_predictor.residuals.reporting.summary import comparisons_of
 
 
 def map_figures(trace: Trace) -> list[str]:
@@ -43,7 +42,7 @@ def _analysis_columns(trace: Trace) -> list[Column]:
 
 
 def _held_out_columns(trace: Trace) -> list[Column]:
-    table, shown = trace.held_out.table, comparisons_of(trace)
+    table, shown = trace.held_out.table, trace.comparisons
     shown = shown[::2] if trace.verdict == "measurement" and len(shown) > 2 else shown[-2:]
     if not len(table) or any(len(comparison.observed) != len(table) for comparison in shown):
         return []

@@ -19,8 +19,7 @@ from push_predictor.reporting import chart
 from push_predictor.reporting.chart import Chart
 from push_predictor.reporting.html import number
 from push_predictor.residuals.reporting.figures.partial import Strength
-from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, place_of_step
-from push_predictor.residuals.reporting.quantities import count
+from push_predictor.residuals.reporting.phrases import bare, count, covariate_phrase, place_of_step
 from push_predictor.types import Array, BoolArray
 
 LEAST_REACH = 1.0  # predicted standard deviations at either end of the colours; less is noise of few windows

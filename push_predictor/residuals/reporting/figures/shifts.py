@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import arc_length, commonest_condition, sector_length
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.outline import Outline
@@ -20,9 +21,9 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import UNIT_NAMES, UNITS
 from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Line, limits_of
 from push_predictor.residuals.evidence.standardised import mechanics_under
-from push_predictor.residuals.outcome import Gain, Trace
+from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows
-from push_predictor.residuals.reporting.quantities import estimate
+from push_predictor.residuals.reporting.phrases import interval
 from push_predictor.types import Array, BoolArray
 
 SHIFT_BINS = 8
@@ -153,5 +154,5 @@ def _title(k: int) -> str:
 
 def _bars(means: Means, kind: str, unit: str, name: str = "") -> Bars:
     ends = zip(means.found, means.low, means.high, strict=True)
-    titles = [estimate(Gain(float(value), float(low), float(high)), unit) for value, low, high in ends]
+    titles = [interval(Estimate(float(value), float(low), float(high)), unit) for value, low, high in ends]
     return Bars(kind, means.place, means.found, means.low, means.high, titles, name=name)
