@@ -18,7 +18,6 @@ from made_up_traces import DRIFT, GRAIN, made_up_trace, planted, slippery, witho
 
 from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import Cells, PushMap
-from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
 from push_predictor.models.request import UNITS
 from push_predictor.residuals import outcome
@@ -36,7 +35,6 @@ from push_predictor.residuals.reporting.figures.partial import (
     shift_of,
     strength_of,
 )
-from push_predictor.residuals.reporting.figures.shifts import binned_means, course_of, shifts_of
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval
 from push_predictor.residuals.reporting.rivals import separating_words
@@ -238,19 +236,6 @@ def test_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     whole = np.einsum("nij,nj->ni", rows.whitener, shift_of(trace, trace.terms[0], trace.analysis))
     np.testing.assert_allclose(shown, whole, atol=1e-9)  # one column of the basis: the pattern is all of it
     assert strength.share == pytest.approx(1.0)
-
-
-@pytest.mark.slow
-def test_constant_effect_is_shown_against_push_angle_by_thirds_of_the_edge() -> None:
-    trace = made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08), count=200)
-    rows, effect = analysis_rows(trace), trace.terms[0]
-    course = course_of(effect, trace.model.rig.outline, rows)
-    assert len(course.groups) == 3 and "angle" in course.label
-    for _, group in course.groups:
-        means = binned_means(shifts_of(trace, effect, rows), course.x, group, 1)
-        assert np.mean((means.low <= means.fitted) & (means.fitted <= means.high)) >= 0.6
-    headed = planted(*GRAIN, 0.06, 0.03)
-    assert "Push direction" in course_of(headed, trace.model.rig.outline, rows).label
 
 
 def test_maps_are_split_at_the_median_strength_of_the_effect(drift: Trace, nothing: Trace) -> None:

@@ -16,7 +16,7 @@ from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
 from push_predictor.residuals.reporting.figures.key import key_figure
-from push_predictor.residuals.reporting.figures.map_pictures import map_figures
+from push_predictor.residuals.reporting.figures.maps import map_figures
 from push_predictor.residuals.reporting.phrases import count, effect_phrase
 from push_predictor.residuals.reporting.rivals import advice, rivals
 from push_predictor.residuals.reporting.sentences import answer, evidence, shift_sentence, worth
