@@ -35,12 +35,15 @@ class Parameter:
 class Mechanism:
     """A mechanism that the base model lacks, or has with another value.
 
-    quantities: the parameters of mechanics/parameters.py that it changes, one for each of its own.
+    quantities: the parameters of mechanics/parameters.py that it changes, one for each of its own. noun: what it
+    changes, in prose. onset: a clause for a change at one point, if there is an apt one.
     """
 
     name: str
     quantities: tuple[str, ...]
     parameters: tuple[Parameter, ...]
+    noun: str
+    onset: str = ""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -60,36 +63,60 @@ class Mechanism:
         return bool(np.all(np.abs(values) <= [parameter.largest for parameter in self.parameters]))
 
 
-def _mechanism(name: str, unit: str, largest: float, **quantities: str) -> Mechanism:
+def _mechanism(name: str, noun: str, unit: str, largest: float, onset: str = "", **quantities: str) -> Mechanism:
     """quantities: by name of a parameter of the mechanics, what its change is."""
     parameters = tuple(Parameter(meaning, unit, largest) for meaning in quantities.values())
-    return Mechanism(name, tuple(quantities), parameters)
+    return Mechanism(name, tuple(quantities), parameters, noun, onset)
 
 
 LIBRARY: tuple[Mechanism, ...] = (
-    _mechanism("contact_friction", "1", 1.0, contact_friction="change of the contact friction"),
-    _mechanism("contact_asymmetry", "1", 1.0, friction_difference="contact friction in slip to the left less the mean"),
-    _mechanism("pressure_spread", "1", 1.0, pressure_spread="logarithm of the factor on the pressure's spread"),
+    _mechanism("contact_friction", "contact friction", "1", 1.0, contact_friction="change of the contact friction"),
     _mechanism(
-        "centre_of_friction", "m", 0.05, centre_x="shift along the body's x", centre_y="shift along the body's y"
+        "contact_asymmetry",
+        "the difference between contact friction to the left and to the right",
+        "1",
+        1.0,
+        friction_difference="contact friction in slip to the left less the mean",
     ),
-    _mechanism("pushing_height", "m", 0.05, pushing_height="height of the push times surface friction"),
+    _mechanism(
+        "pressure_spread",
+        "the spread of the slider's pressure on the table",
+        "1",
+        1.0,
+        pressure_spread="logarithm of the factor on the pressure's spread",
+    ),
+    _mechanism(
+        "centre_of_friction",
+        "the slider's centre of friction",
+        "m",
+        0.05,
+        centre_x="shift along the body's x",
+        centre_y="shift along the body's y",
+    ),
+    _mechanism(
+        "pushing_height", "the pushing height", "m", 0.05, pushing_height="height of the push times surface friction"
+    ),
     _mechanism(
         "body_anisotropy",
+        "direction-dependent friction of the slider",
         "1",
         0.8,
+        onset="the slider's friction became direction-dependent",
         body_anisotropy="anisotropy along the body's x",
         body_anisotropy_diagonal="anisotropy along its diagonal",
     ),
     _mechanism(
         "anisotropic_friction",
+        "direction-dependent friction of the table",
         "1",
         0.8,
+        onset="the table's friction became direction-dependent",
         grain_x="anisotropy along the world's x",
         grain_diagonal="anisotropy along the diagonal",
     ),
     _mechanism(
         "friction_gradient",
+        "the friction gradient across the table",
         "1/m",
         50.0,
         gradient_x="relative rise of friction along the world's x",
@@ -97,25 +124,57 @@ LIBRARY: tuple[Mechanism, ...] = (
     ),
     _mechanism(
         "tilted_surface",
+        "the tilt of the table",
         "1",
         0.7,
         slope_x="pull along the world's x, share of friction",
         slope_y="the same along y",
     ),
-    _mechanism("inertia", "s^2/m", 3.0, inertia="inverse of surface friction times gravity"),
-    _mechanism("pusher_radius", "m", 0.004, radius_error="change of the pusher's radius"),
-    _mechanism("pusher_travel", "1", 0.5, travel_share="relative change of the pusher's path length"),
+    _mechanism("inertia", "the slider's inertia", "s^2/m", 3.0, inertia="inverse of surface friction times gravity"),
+    _mechanism("pusher_radius", "the pusher's radius", "m", 0.004, radius_error="change of the pusher's radius"),
+    _mechanism(
+        "pusher_travel",
+        "the distance that the pusher travels",
+        "1",
+        0.5,
+        travel_share="relative change of the pusher's path length",
+    ),
 )
 
 # Most of these mimic one of the library, so they are candidates only once that has shown that an analytical model is
 # wrong (residuals/selection/search.py).
 REFINEMENTS: tuple[Mechanism, ...] = (
-    _mechanism("friction_by_angle", "1/rad", 0.5, friction_by_angle="change of contact friction with push angle"),
-    _mechanism("friction_by_speed", "1", 0.2, friction_by_speed="contact friction per e-fold of sliding speed"),
-    _mechanism("friction_by_load", "1", 0.5, friction_by_load="contact friction per e-fold of normal force"),
-    _mechanism("rim_pressure", "1", 12.0, rim_exponent="exponent of the pressure's growth towards the rim"),
+    _mechanism(
+        "friction_by_angle",
+        "the change of contact friction with the push angle",
+        "1/rad",
+        0.5,
+        friction_by_angle="change of contact friction with push angle",
+    ),
+    _mechanism(
+        "friction_by_speed",
+        "the change of contact friction with sliding speed",
+        "1",
+        0.2,
+        friction_by_speed="contact friction per e-fold of sliding speed",
+    ),
+    _mechanism(
+        "friction_by_load",
+        "the change of contact friction with the normal force",
+        "1",
+        0.5,
+        friction_by_load="contact friction per e-fold of normal force",
+    ),
+    _mechanism(
+        "rim_pressure",
+        "the growth of the slider's pressure towards its rim",
+        "1",
+        12.0,
+        rim_exponent="exponent of the pressure's growth towards the rim",
+    ),
     _mechanism(
         "outline_shift",
+        "the position of the slider's outline in its tracked frame",
         "m",
         0.02,
         outline_x="shift of the outline along the body's x",
@@ -123,13 +182,26 @@ REFINEMENTS: tuple[Mechanism, ...] = (
     ),
     _mechanism(
         "tip_offset",
+        "the offset of the pusher's tip",
         "m",
         0.01,
         tip_offset_along="true minus recorded tip, along the push",
         tip_offset_across="true minus recorded tip, left of the push",
     ),
-    _mechanism("outline_rotation", "rad", 0.35, tracker_rotation="rotation of the outline in its tracked frame"),
-    _mechanism("push_rotation", "rad", 0.35, push_rotation="true push direction minus the recorded one"),
+    _mechanism(
+        "outline_rotation",
+        "the rotation of the slider's outline in its tracked frame",
+        "rad",
+        0.35,
+        tracker_rotation="rotation of the outline in its tracked frame",
+    ),
+    _mechanism(
+        "push_rotation",
+        "the rotation of the recorded push direction",
+        "rad",
+        0.35,
+        push_rotation="true push direction minus the recorded one",
+    ),
 )
 
 _BY_NAME = {mechanism.name: mechanism for mechanism in (*LIBRARY, *REFINEMENTS)}

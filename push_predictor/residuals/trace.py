@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
@@ -37,7 +38,7 @@ from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
 from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
-from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace, Verdict
+from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
 from push_predictor.watch import Watch, no_watch
@@ -45,7 +46,7 @@ from push_predictor.watch import Watch, no_watch
 if TYPE_CHECKING:
     from push_predictor.recordings.checks.data_checks import DataChecks
 
-NO_GAIN = Gain(0.0, 0.0, 0.0)
+NO_GAIN = Estimate(0.0, 0.0, 0.0)
 
 
 def trace_data(
@@ -177,7 +178,12 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         remaining=motion.remaining,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=(*notes_of(question.loaded, motion, measured, forces), *notes_of_shift(question.shifted)),
+        harmless=tuple(
+            Harmless(fault.mechanism, size.with_errors_of_mechanics())
+            for fault in found.harmless
+            for size in fault.parameters
+        ),
+        notes=(*notes_of(question.loaded, found), *notes_of_shift(question.shifted)),
     )
 
 

@@ -141,7 +141,7 @@ def test_prints_verdict_worth_and_held_out_figures_without_json(
     assert run(place) == 0
     text = capsys.readouterr().out
     assert text.startswith("Contact friction changes with elapsed time.\n")
-    assert "\nContact friction changes with elapsed time: 0.0" in text
+    assert "\nContact friction changes with elapsed time. It shifts a window by 0." in text
     assert "The motion model is extended." in text and extended.held_out.digest in text
     for name in ("before", "refit", "after"):
         assert f"\n{name} " in text

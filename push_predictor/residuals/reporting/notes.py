@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from push_predictor.residuals.channels.measurement import MeasurementFinding
+from push_predictor.residuals.channel_search import Searched
 from push_predictor.residuals.channels.motion import MotionFinding
-from push_predictor.residuals.channels.wrench import WrenchFinding
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
+from push_predictor.residuals.outcome import Sized
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     covariate_phrase,
@@ -33,11 +33,9 @@ NOT_TRIED = (
 NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
-def notes_of(
-    loaded: LoadedData, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
-) -> tuple[str, ...]:
+def notes_of(loaded: LoadedData, found: Searched) -> tuple[str, ...]:
     """Notes on the data, and on what was found or not tried in addition to the verdict."""
-    return (*notes_of_data(loaded), *_of_motion(motion), *_of_other_channels(motion, measured, forces))
+    return (*notes_of_data(loaded), *_of_motion(found.motion), *_of_other_channels(found))
 
 
 def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
@@ -81,7 +79,8 @@ def _of_motion(motion: MotionFinding) -> list[str]:
     return notes
 
 
-def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding) -> list[str]:
+def _of_other_channels(found: Searched) -> list[str]:
+    motion, measured, forces = found.motion, found.measured, found.forces
     notes = []
     if measured is not None and measured.errors:
         errors = listed([mechanism_phrase(error.mechanism) for error in measured.errors])
@@ -90,13 +89,9 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
         )
     if measured is None:
         notes.append(NOT_JUDGED)
+    notes += [f"{_bias(fault.parameters)} The windows and predictions do not depend on it." for fault in found.harmless]
     if forces.zero is not None:
-        change = " and ".join(
-            f"{size.value:+.2g} N along {axis}" for size, axis in zip(forces.zero.parameters, "xy", strict=True)
-        )
-        notes.append(
-            f"The reading of the force sensor in free motion changed by {change}. It was subtracted from the windows."
-        )
+        notes.append(f"{_bias(forces.zero.parameters)} Zero the sensor, and record again.")
     if motion.variance and forces.effects and not motion.terms:
         covariates = listed([covariate_phrase(effect.covariate) for effect in motion.variance])
         notes.append(f"The noise of the motion changed as well; it depends on {covariates}.")
@@ -104,3 +99,8 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
         effects = listed([effect_phrase(e.mechanism, e.covariate) for e in forces.effects])
         notes.append(f"The force changed as well: {effects}.")
     return notes
+
+
+def _bias(parameters: Sequence[Sized]) -> str:
+    sizes = " and ".join(f"{size.value:+.2g} N along {axis}" for size, axis in zip(parameters, "xy", strict=True))
+    return f"The force sensor has a bias of {sizes}.".replace("-", "−")
