@@ -75,8 +75,8 @@ def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
-    held = held_out_rows(again.table, again.chosen)
-    analysis, held_out = again.table.take(~held), again.table.take(held)
+    table, held = question.deployed.continued(again.table), held_out_rows(again.table, again.chosen)
+    analysis, held_out = table.take(~held), table.take(held)
     return Corrected(measured, replace(evidence_of(question.model, analysis), chosen=again.chosen), held_out)
 
 
