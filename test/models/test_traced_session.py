@@ -113,16 +113,17 @@ def test_session_of_a_second_trace_goes_on_from_the_first() -> None:
     assert both.origin == TUESDAY
     assert both.now == pytest.approx({"elapsed_time": 86_500.0, "push_index": 97.0, "slid_distance": 1.0})
     assert counted(TUESDAY + 2 * DAY, both) == [[172_805.0, 172_809.0], [97.0, 98.0], [1.0, 1.008]]
-    assert counted(began, both) == counted(began) and counted(TUESDAY, both) == counted(TUESDAY)
+    for earlier in (began, AFTERNOON.stamp, TUESDAY):
+        assert counted(earlier, both) == counted(earlier)
     assert TracedSession().followed_by(own) == own
 
 
 # --- requests --------------------------------------------------------------------------------------------------------
 
 
-def stepped(name: str, place: float) -> Effect:
+def stepped(name: str, place: float, size: float = 0.2) -> Effect:
     basis = DriverBasis("step", (name,), place=place)
-    return Effect("contact_friction", name, basis, np.array([0.2]), np.array([[1e-4]]), np.ones(3))
+    return Effect("contact_friction", name, basis, np.array([size]), np.array([[1e-4]]), np.ones(3))
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +153,12 @@ def test_request_without_the_count_is_predicted_as_after_the_trace(base: PushMod
 
 def pushed_at(**covariates: float) -> Pushes:
     return Pushes(0.02, 0.1, 0.85, covariates=covariates)
+
+
+def test_request_with_one_of_two_counts_gets_the_default_of_the_other(base: PushModel) -> None:
+    model = traced(base, stepped("push_index", 10.5, 0.05), stepped("elapsed_time", 500.0, 0.05))
+    found, same = (model.predict(pushed_at(push_index=3.0, **given)).mean for given in ({}, {"elapsed_time": 2000.0}))
+    assert np.array_equal(found, same) and not np.allclose(found, model.predict(pushed_at()).mean, atol=1e-5)
 
 
 def test_rollout_needs_no_count(base: PushModel) -> None:
