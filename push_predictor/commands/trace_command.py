@@ -141,10 +141,12 @@ def _write_report(options: argparse.Namespace, found: Trace) -> None:
 
 def _print(found: Trace, saved: Path | None) -> None:
     """Print the verdict, and where the extended model is."""
+    from push_predictor.models.push_model import defaults_in_words
     from push_predictor.residuals.reporting.summary import summary_lines
 
     print("\n".join(summary_lines(found)))
     if saved is not None and found.extended is not None:
         needs = ", ".join(found.extended.needs) or "no further covariates"
-        print(f"extended model: {saved}; requests need {needs}")
+        defaults = f"; defaults: {defaults_in_words(found.extended)}" if found.extended.defaults else ""
+        print(f"extended model: {saved}; requests need {needs}{defaults}")
     sys.stdout.flush()  # the verdict is out before the pictures are drawn

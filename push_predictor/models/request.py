@@ -84,8 +84,8 @@ def check_requests(model: PushModel, inputs: Array, duration: float | Array, cov
 
 
 def check_pushes(model: PushModel, pushes: Pushes) -> None:
-    """Raise RequestError unless the model predicts these pushes; covariates that it does not need are ignored."""
-    needed = {name: column for name, column in pushes.covariates.items() if name in model.needs}
+    """Raise RequestError unless the model predicts these pushes; covariates that it does not use are ignored."""
+    needed = {name: column for name, column in pushes.covariates.items() if name in model.accepted}
     if len(pushes) > 1:
         check_requests(model, pushes.inputs, pushes.duration, needed)
     else:
@@ -95,11 +95,11 @@ def check_pushes(model: PushModel, pushes: Pushes) -> None:
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
-    """Raise RequestError unless the model predicts every row of a table; covariates that it does not need are ignored.
+    """Raise RequestError unless the model predicts every row of a table; covariates that it does not use are ignored.
 
     The index in the error is that of the row.
     """
-    needed = {name: column for name, column in table.covariates.items() if name in model.needs}
+    needed = {name: column for name, column in table.covariates.items() if name in model.accepted}
     check_requests(model, table.inputs, table.duration, needed)
 
 

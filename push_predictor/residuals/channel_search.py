@@ -86,9 +86,9 @@ def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
-    held = held_out_rows(again.table)
-    analysis, held_out = again.table.take(~held), again.table.take(held)
-    return Corrected(measured, evidence_of(question.model, analysis), held_out)
+    table = question.deployed.continued(again.table)
+    held = held_out_rows(table)
+    return Corrected(measured, evidence_of(question.model, table.take(~held)), table.take(held))
 
 
 def _explains_residuals(question: Question, corrected: Corrected) -> bool:

@@ -52,7 +52,11 @@ class Question:
         covariates: Sequence[str] | None = None,
         seed: int = 0,
     ) -> Question:
-        """Predict all windows, add the previous push's residual to their covariates, and split them."""
+        """Predict all windows, add the previous push's residual to their covariates, and split them.
+
+        Covariates that only grow go on from the trace that extended the model.
+        """
+        loaded = replace(loaded, table=model.continued(loaded.table))
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model

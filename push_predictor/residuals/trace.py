@@ -33,6 +33,7 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.by_the_clock import along, by_the_clock
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
@@ -191,12 +192,13 @@ def _extension(question: Question, motion: MotionFinding) -> _Extension:
     """The refit, extended by the effects that it cannot learn in its own inputs."""
     model, evidence = question.model, question.evidence
     refit = refit_base(model, evidence.table)
-    candidates = [term.best for term in motion.terms if not term.own]
-    after = extend(refit, evidence, candidates) if candidates else None
+    candidates = [by_the_clock(term.term, evidence.table) for term in motion.terms if not term.own]
+    session = question.deployed.predictor.session.followed_by(question.loaded.session)
+    after = extend(refit, evidence, candidates, session) if candidates else None
     added = iter(after.predictor.effects[-len(candidates) :] if after else ())
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(
-        estimated(fitted(FitRows(evidence), [t.best]), of_size=True)[0][0] if t.own else next(added)
+        estimated(fitted(FitRows(evidence), [t.best]), of_size=True)[0][0] if t.own else along(t.best, next(added))
         for t in motion.terms
     )
     gain = held_out_gain(model, refit, after, evidence.table, question.held_out) if after else None

@@ -110,8 +110,9 @@ def test_trace_of_a_table_writes_json_and_extended_model(traced: Traced) -> None
     result = json.loads(traced.out.read_text())
     assert set(result) >= SECTION_5 and result["pushes"] == {"analysis": 42, "held_out": 18}
     assert result["effects"][0]["covariate"] == "elapsed_time" and result["motion_model_changed"]
-    assert load_model(traced.model).needs == ("elapsed_time",)
-    assert "requests need elapsed_time" in traced.printed
+    model = load_model(traced.model)
+    assert model.needs == () and list(model.defaults) == ["elapsed_time"]
+    assert "requests need no further covariates; defaults: elapsed_time 1000" in traced.printed
 
 
 def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]) -> None:

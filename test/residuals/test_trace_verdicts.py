@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from push_predictor.residuals.selection.cross_validation import Judged
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -35,9 +37,7 @@ from push_predictor.residuals.question import Question
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.sentences import answer, worth
 from push_predictor.residuals.reporting.trace_json import trace_json
-from push_predictor.residuals.selection.cross_validation import Judged
 from push_predictor.residuals.selection.naming import Naming
-from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.residuals.trace import trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +33,10 @@ class CovariateRange:
         if self.heading:
             values = least + (values - least) % TURN
         return np.asarray((values >= least) & (values <= most))
+
+    def reaching(self, value: float) -> CovariateRange:
+        """The range, raised so that it contains this value."""
+        return replace(self, high=max(self.high, value))
 
     @cached_property
     def _ends(self) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
@@ -86,6 +87,18 @@ class Predictor(Protocol):
         """Names of the covariates that every push must bring."""
 
     @property
+    def session(self) -> TracedSession:
+        """The session that the effects were traced on."""
+
+    @property
+    def defaults(self) -> Mapping[str, float]:
+        """The values, by name, of covariates of the effects that a push may omit: those at the end of the session."""
+
+    @property
+    def past(self) -> tuple[str, ...]:
+        """Names of the covariates with a default in which the effects only have steps: these lie in the past."""
+
+    @property
     def covariates(self) -> tuple[str, ...]:
         """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
 
@@ -98,7 +111,7 @@ class Predictor(Protocol):
         """Limits of the pushes for which the base is meant; None if its training pushes bound its domain."""
 
     def completed(self, push: Push) -> Push:
-        """The pushes with those of `covariates` that follow from their inputs."""
+        """The pushes with those of `covariates` that follow from their inputs, and with defaults for others."""
 
     def moments(self, push: Push) -> Moments:
         """Moments of the outcomes of n pushes."""
@@ -134,6 +147,9 @@ class BasePredictor(ABC):
 
     effects: ClassVar[tuple[Effect, ...]] = ()
     cross: ClassVar[Cross] = MappingProxyType({})
+    session: ClassVar[TracedSession] = TracedSession()
+    defaults: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    past: ClassVar[tuple[str, ...]] = ()
 
     @property
     def base(self: Self) -> Self:

@@ -92,7 +92,7 @@ class Reader:
         cls, own = CLASSES[found[CLASS]], {name: value for name, value in found.items() if name != CLASS}
         hints = _hints(cls)
         if own.keys() != hints.keys():
-            _refuse(place, sorted(own), f"the fields {', '.join(hints)}")
+            _refuse(place, sorted(own), f"the fields {', '.join(hints)}: train the model again")
         arguments = {name: self.read(own[name], hint, f"{place}.{name}") for name, hint in hints.items()}
         arguments |= {name: value for (owner, name), value in self.given.items() if owner is cls}
         check(cls, arguments, place)

@@ -229,7 +229,7 @@ def _stepped(now: Fit) -> tuple[Fit, float]:
     clear, ridge = now.clear, _ridge(now, now.clear.columns)
     gram, slope = _normal(clear.columns, clear.residual)
     slope = slope - ridge * now.coefficients
-    step = np.linalg.solve(gram + np.diag(ridge), slope)
+    step = np.asarray(np.linalg.solve(gram + np.diag(ridge), slope), dtype=np.float64)
     before, best, most, length = _objective(now, ridge), now, 0.0, 1.0
     for _ in range(LENGTHS):
         tried = _moved(now, step * length)

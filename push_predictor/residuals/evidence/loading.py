@@ -13,6 +13,7 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection
 from push_predictor.recordings.read import read_recording
@@ -23,6 +24,7 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
+from push_predictor.residuals.evidence.session import session_of
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 
@@ -32,12 +34,14 @@ class LoadedData:
     """Windows in order of time, the recordings they were cut from, and the rig.
 
     recordings: None where a push table was given. dropped: covariates that some rows lack, each with the reason.
+    session: that these data are.
     """
 
     table: PushTable
     recordings: tuple[Recording, ...] | None
     rig: Rig
     dropped: dict[str, str] = field(default_factory=dict)
+    session: TracedSession = field(default_factory=TracedSession)
 
 
 def load_evidence(
@@ -98,21 +102,23 @@ def _loaded(
 ) -> LoadedData:
     """Recordings in order of time, then tables with their names."""
     names = [*(recording.name for recording in recordings), *(name for name, _ in files)]
-    cut = [*_cut(recordings, rig, options), *(table for _, table in files)]
+    windows = [find_windows(recording, rig, options) for recording in recordings]
+    own = [*map(_table, windows), *(table for _, table in files)]
+    cut = [*map(_table, _continued(windows)), *(table for _, table in files)]
     kept = None if files else tuple(recordings)
     if not any(map(len, cut)):
         return LoadedData(empty_table(), kept, rig)
     table, dropped = _joined(distinct_pushes(names, cut))
-    return LoadedData(table, kept, rig, dropped)
+    session = session_of([rows for rows in own if len(rows)], [rows for rows in cut if len(rows)])
+    return LoadedData(table, kept, rig, dropped, session)
 
 
 def _first_stamp(recording: Recording) -> int:
     return min((int(s.stamp[0]) for s in (recording.slider, recording.pusher) if len(s)), default=0)
 
 
-def _cut(recordings: Sequence[Recording], rig: Rig, options: WindowOptions) -> list[PushTable]:
-    windows = [find_windows(recording, rig, options) for recording in recordings]
-    return [with_inputs(windows_to_table(found)) for found in _continued(windows)]
+def _table(windows: Sequence[PushWindow]) -> PushTable:
+    return with_inputs(windows_to_table(windows))
 
 
 def _continued(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
