@@ -19,8 +19,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from push_predictor.residuals.selection.forward_selection import ForwardSelection
-from push_predictor.residuals.selection.term_choice import TermChoice
 
 from benchmarks.blind.levels import ALPHAS, later_windows, trained_rig
 from benchmarks.blind.scores import wilson
@@ -34,6 +32,7 @@ from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
+from push_predictor.residuals.selection.gate import Gate
 from push_predictor.types import Array
 
 UNEVEN = 0.4  # standard deviation of the logarithm of a push's spread
@@ -72,14 +71,14 @@ def _design(model: PushModel, table: PushTable) -> _Design:
 
 def _smallest(design: _Design, rng: np.random.Generator, draws: int) -> Iterator[float]:
     """The smallest family-wise p value of each draw of the noise."""
-    choice = TermChoice(design.evidence, design.candidates, design.inputs, 0)
     for _ in range(draws):
         before = design.baseline.evidence
         z = _noise(rng, before.table)
         residual = np.asarray(np.linalg.solve(before.whitener, z[:, :, None])[:, :, 0], dtype=np.float64)
         redrawn = replace(before, residual=residual)
-        selection = ForwardSelection(choice, max(ALPHAS), replace(design.baseline, evidence=redrawn))
-        yield float(selection.screened(_noise(rng, design.evidence.table)).p_value.min())
+        baseline = replace(design.baseline, evidence=redrawn)
+        gate = Gate(design.evidence, design.candidates, design.inputs, max(ALPHAS), 0, baseline)
+        yield float(gate.screened(_noise(rng, design.evidence.table)).p_value.min())
 
 
 def _noise(rng: np.random.Generator, table: PushTable) -> Array:

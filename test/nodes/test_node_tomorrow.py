@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from hosted_nodes import hosted_node
 from ros_harness import free_domain
+from search_bench import in_library
 from server_bench import GOOD, MANY, hosted_server_of
 from validator_bench import WRITTEN, assert_same_as_offline, hosting_replay, hosting_validator
 
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import metrics_json
-from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
@@ -89,8 +89,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Week:
     )
     found: list[PushModel] = []
     with pytest.MonkeyPatch.context() as patch:  # responses take most of the time
-        near = [m for m in LIBRARY if m.name in ("tilted_surface", "contact_friction", "anisotropic_friction")]
-        patch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", near)
+        in_library(patch, "tilted_surface", "contact_friction", "anisotropic_friction")
         for covariates in (COUNT, CLOCK):
             trace = trace_data([folder / "tuesday"], deployed, covariates=covariates)
             assert trace.extended is not None and trace.effects[0].mechanism == "tilted_surface", trace

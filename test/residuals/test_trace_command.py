@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 from made_up_traces import made_up_trace, pushes, slippery
+from search_bench import in_library
 from synthetic import square_rig
 
 import push_predictor.residuals.trace as trace_module
 from push_predictor.cli import main
-from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table_file import write_table
@@ -37,12 +37,9 @@ SECTION_5 = {
 
 @pytest.fixture(scope="module", autouse=True)
 def a_library_of_two() -> Iterator[None]:
-    """The search and the steps take most of the time, and the command does not depend on their mechanisms."""
-    few = [mechanism for mechanism in LIBRARY if mechanism.name in ("contact_friction", "pressure_spread")]
+    """The search takes most of the time, and the command does not depend on its mechanisms."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
-        patch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", few)
-        patch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
+        in_library(patch, "contact_friction", "pressure_spread")
         yield
 
 

@@ -14,19 +14,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from push_predictor.residuals.selection.cross_validation import Judged
-from push_predictor.residuals.selection.term_choice import SelectedTerm
+from search_bench import in_library
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding
+from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, MotionTerm
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
 from push_predictor.residuals.evidence.extrapolation import about_mechanics
@@ -38,6 +36,7 @@ from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.sentences import answer, worth
 from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.selection.naming import Naming
+from push_predictor.residuals.selection.search import Term
 from push_predictor.residuals.trace import trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
@@ -74,8 +73,7 @@ retrained = cache(about_mechanics)
 @pytest.fixture
 def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computing responses takes most of the time."""
-    few = [m for m in LIBRARY if m.name in ("contact_friction", "pressure_spread", "tilted_surface", "inertia")]
-    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
+    in_library(monkeypatch, "contact_friction", "pressure_spread", "tilted_surface", "inertia")
 
 
 def loaded(changes: Changes, faults: Faults, pushes: int = 45) -> LoadedData:
@@ -150,12 +148,10 @@ def test_effect_that_only_resembles_a_mechanism_has_no_size_and_its_rest_is_no_s
     assert "further" not in " ".join(answer(found))
 
 
-def _term(best: Candidate, resembles: str | None) -> SelectedTerm:
+def _term(best: Candidate, resembles: str | None) -> MotionTerm:
     """A term without a name."""
-    n, size = len(best.response), best.plain.shape[2]
-    naming = Naming((best.covariate,), (None,), False, 1.0, resembles)
-    judged = (Judged(best, np.array([100.0])),)
-    return SelectedTerm(best, judged, 0.001, np.zeros(size), np.ones((n, 3)), 0.1, naming, False)
+    naming = Naming((best.covariate,), (None,), False, resembles)
+    return MotionTerm(Term(best, 0.001, 100.0, naming), 0.001, ("dx", "dy"), 0.1, False, False, resembles is None)
 
 
 def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch: pytest.MonkeyPatch) -> None:
