@@ -61,6 +61,13 @@ def naming_of(chosen: Trial, tried: Sequence[Trial], base: Fit) -> Naming:
     return Naming(tuple(covariates), tuple(mechanisms), True)
 
 
+def simplest(tried: Sequence[Trial]) -> Trial:
+    """Of those that the one with the largest gain does not reject, the one with the fewest coefficients."""
+    best = max(tried, key=lambda t: t.gain)
+    near = [t for t in tried if not _rejected(t.fit, best.fit)]
+    return min(near, key=lambda t: (len(t.fit.coefficients), -t.gain))
+
+
 def unexplained_share(chosen: Trial, base: Fit) -> float:
     """Share of the gain along its covariate that only the generic polynomial achieves; 0 if that may be chance."""
     c, fit = chosen.candidate, chosen.fit
@@ -78,4 +85,4 @@ def surely(gains: Array, level: float) -> bool:
 
 
 def _rejected(fit: Fit, best: Fit) -> bool:
-    return surely(best.scores - fit.scores, REJECTED)
+    return fit is not best and surely(best.scores - fit.scores, REJECTED)

@@ -24,16 +24,17 @@ from push_predictor.residuals.candidates.enumeration import constant_refinements
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, fitted, standard_error
 from push_predictor.residuals.selection.forms import forms_of, step_places_near
 from push_predictor.residuals.selection.gate import Gate
-from push_predictor.residuals.selection.naming import Naming, Trial, naming_of
+from push_predictor.residuals.selection.naming import Naming, Trial, naming_of, simplest
 from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
 MOST_TERMS = 6
 MOST_MECHANISMS = 6  # of those that the gate let pass, with the largest statistics
-MOST_EXACT = 8  # labels that are fitted exactly, by their gain to first order
-CLOSE = 0.5  # of the best gain to first order: less is not fitted exactly
+MOST_EXACT = 6  # labels that are fitted exactly, by their gain to first order
+CLOSE = 0.6  # of the best gain to first order: less is not fitted exactly
 MOST_ROUNDS = 6  # of moves after an addition
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
+Key = tuple[str | None, str, DriverBasis]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +74,12 @@ def search(gate: Gate, rows: FitRows) -> SearchResult:
 
 @dataclass(eq=False)
 class _Search:
-    """passed: p of what the gate let pass, by label, in the order of their statistics."""
+    """passed: p of what the gate let pass, by label, in the order of their statistics. known: fits by their terms."""
 
     gate: Gate
     rows: FitRows
     passed: dict[Label, float] = field(default_factory=dict)
+    known: dict[tuple[Key, ...], Fit] = field(default_factory=dict)
 
     def found(self) -> SearchResult:
         chosen: list[Candidate] = []
@@ -123,11 +125,9 @@ class _Search:
     def _exchanged(self, chosen: list[Candidate], fit: Fit) -> tuple[list[Candidate], Fit] | None:
         for k in range(len(chosen)):
             others = chosen[:k] + chosen[k + 1 :]
-            best = self._best(self._fit(others, fit), others)
-            if best is None or best.candidate.same_as(chosen[k]):
-                continue
-            gains = best.fit.scores - fit.scores
-            if gains.sum() > standard_error(gains):
+            now, base = Trial(chosen[k], self._fit([*others, chosen[k]], fit)), self._fit(others, fit)
+            best = simplest([now, *(t for t in self._tried(base, others) if t.candidate.mechanism is not None)])
+            if not best.candidate.same_as(chosen[k]):
                 return [*others, best.candidate], best.fit
         return None
 
@@ -144,10 +144,10 @@ class _Search:
     # --- proposals ---------------------------------------------------------------------------------------------------
 
     def _best(self, base: Fit, others: Sequence[Candidate]) -> Trial | None:
-        """What gains most when it is added to a fit of the others; a mechanism rather than the generic polynomial."""
+        """What is best added to a fit of the others; a mechanism rather than the generic polynomial."""
         tried = self._tried(base, others)
         known = [t for t in tried if t.candidate.mechanism is not None and t.gain > base.scores.sum()]
-        return max(known or tried, key=lambda t: t.gain, default=None)
+        return simplest(known or tried) if tried else None
 
     def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
         """The labels that gain most to first order, each in its best form, fitted exactly."""
@@ -207,9 +207,11 @@ class _Search:
 
     def _fit(self, candidates: Sequence[Candidate], near: Fit | None = None) -> Fit:
         """The joint fit, begun at another where that has the same effects."""
-        known = {} if near is None else {(e.mechanism, e.covariate, e.basis): e.coefficients for e in near.effects}
-        start = [known.get((c.mechanism, c.covariate, c.basis)) for c in candidates]
-        return fitted(self.rows, candidates, start)
+        terms = tuple((c.mechanism, c.covariate, c.basis) for c in candidates)
+        if terms not in self.known:
+            there = {} if near is None else {(e.mechanism, e.covariate, e.basis): e.coefficients for e in near.effects}
+            self.known[terms] = fitted(self.rows, candidates, [there.get(term) for term in terms])
+        return self.known[terms]
 
     def _unexplained(self, fit: Fit) -> Array:
         """Standardised residuals (n, 3) of all windows of the gate, minus the effects."""
