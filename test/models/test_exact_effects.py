@@ -203,10 +203,10 @@ def deployed() -> PushModel:
     return train_model(pushes(60), square_rig(), "analytical", name="deployed")
 
 
-def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis) -> Effect:
+def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis, *, of_size: bool = True) -> Effect:
     evidence = evidence_of(deployed, table)
     fit = fitted(FitRows(evidence), [candidate(evidence, mechanism, "elapsed_time", basis)])
-    return estimated(fit, of_size=True)[0][0]
+    return estimated(fit, of_size=of_size)[0][0]
 
 
 def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
@@ -225,9 +225,9 @@ def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
     weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
     on_one_side = weak.inputs[:, differ_by] > limit
     mixed = replace(weak, outcomes=np.where(on_one_side[:, None], strong.outcomes, weak.outcomes))
-    estimate = found(deployed, mixed, "contact_friction", DRIFT)
-    assert 0.1 < estimate.coefficients[0] < 0.3
-    assert np.sqrt(estimate.covariance[0, 0]) > 0.1 * (0.3 - 0.1)
+    narrow, wide = (found(deployed, mixed, "contact_friction", DRIFT, of_size=of_size) for of_size in (False, True))
+    assert 0.1 < wide.coefficients[0] < 0.3
+    assert wide.covariance[0, 0] > 2.5**2 * narrow.covariance[0, 0]
 
 
 def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:

@@ -30,10 +30,10 @@ STEP = DriverBasis("step", ("push_index",), place=7.5)
 LATER = 100_000_000_000  # ns
 
 
-def term(basis: DriverBasis, *drivers: str) -> Any:
+def term(basis: DriverBasis, *covariates: str) -> Any:
     values = basis.values(TABLE.covariates, len(TABLE))
     best = Candidate("contact_friction", basis.drivers[0], basis, np.zeros((len(TABLE), 3, 1)), values)
-    return cast("Any", SimpleNamespace(best=best, naming=SimpleNamespace(drivers=drivers)))
+    return cast("Any", SimpleNamespace(best=best, naming=SimpleNamespace(covariates=covariates)))
 
 
 def test_step_that_time_explains_as_well_is_the_same_step_of_time() -> None:

@@ -207,9 +207,8 @@ def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
     )
     jump = found.value[found.place > 650.0, 0].mean() - found.value[found.place < 600.0, 0].mean()
     assert jump == pytest.approx(0.15, abs=0.04)
-    fitted = strength.curve({"elapsed_time": np.array([0.0, 600.0])}, 2)[0][:, 0]
     early = found.value[found.place < 600.0, 0]
-    assert abs(early[-1] - early[0]) < 0.5 * (fitted[1] - fitted[0])
+    assert abs(early[-1] - early[0]) < 0.4 * 0.15
 
 
 def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
