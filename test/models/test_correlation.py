@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from synthetic import square_rig
@@ -90,7 +90,6 @@ def model() -> PushModel:
 moderate = st.floats(-4.0, 4.0)
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     features=arrays(float, (12, 2), elements=moderate),
     residuals=arrays(float, (12, 3), elements=moderate),
@@ -137,7 +136,6 @@ def bounded(numbers: Array) -> Array:
     return of_process
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
     latent=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
@@ -152,7 +150,6 @@ def test_outcome_process_and_their_difference_are_covariances(numbers: Array, la
         assert np.all(np.linalg.eigvalsh(covariance / sd[:, :, None] / sd[:, None, :]) > 0.0)
 
 
-@settings(max_examples=50, deadline=None)
 @given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
 def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
     matrices = bounded(numbers)
