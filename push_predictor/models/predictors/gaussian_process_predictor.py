@@ -43,27 +43,27 @@ class GaussianProcessPredictor(BasePredictor):
 
     @property
     def learnt(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return True
 
     @property
     def gaussian(self) -> bool:
-        """See BasePredictor: with known noise and no tails."""
+        """Whether the exact predictive is the Gaussian of its moments: with known noise and no tails."""
         return self.tails is None and all(regression.gaussian for regression in self.regressions)
 
     @property
     def absorbs(self) -> bool:
-        """See Predictor: without a mean."""
+        """See BasePredictor: without a mean."""
         return self.mean is None
 
     @property
     def integrates(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.mean is not None
 
     @cached_property
     def mechanics(self) -> FittedMechanics:
-        """See Predictor: the mean, or the textbook's analytical model."""
+        """See BasePredictor: the mean, or the textbook's analytical model."""
         if self.mean is not None:
             return self.mean
         return analytical_mechanics(self.rig.outline, self.rig.pusher_radius)
@@ -81,7 +81,7 @@ class GaussianProcessPredictor(BasePredictor):
         return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
 
     def moments(self, push: Push) -> Moments:
-        """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
+        """See BasePredictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
         return self.of_outcomes(
@@ -89,18 +89,11 @@ class GaussianProcessPredictor(BasePredictor):
         )
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor. The correlation at a row is that of the other blocks' rows; the mean is that of all rows."""
+        """See BasePredictor. The correlation at a row is that of the other blocks' rows; the mean is that of all rows."""
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
         correlation = self.correlation.held_out(features, block) if self.correlation else None
         return self.of_outcomes(self._moments_of(latent, correlation), rows)
-
-    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Predictor."""
-        if self.tails is not None:
-            moments = self.moments(push)
-            return _student(self.tails, outcomes - moments.mean, _variances(moments.covariance))
-        return None if self.gaussian else self._log_density(self.latent(push.inputs), push, outcomes)
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
         """See BasePredictor.
@@ -175,7 +168,7 @@ class GaussianProcessPredictor(BasePredictor):
                 regression.free_matrices()
 
     def with_independent_outputs(self) -> GaussianProcessPredictor:
-        """See Predictor."""
+        """See BasePredictor."""
         return replace(self, correlation=None)
 
     def _size(self, push: Push) -> Array:

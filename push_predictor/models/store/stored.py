@@ -32,7 +32,6 @@ from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsPredictor,
-    Predictor,
     PriorPredictor,
     Scaling,
     Tails,
@@ -53,10 +52,7 @@ CLASSES: dict[str, type] = {
         *(FittedMechanics, PushMechanics, PressureDistribution, PowerSurface, ProcessNoise),
     )
 }
-CHOICES: dict[Any, tuple[type, ...]] = {
-    BasePredictor: BASES_OF_EFFECTS,
-    Predictor: (*BASES_OF_EFFECTS, ExtendedPredictor),
-}
+CHOICES: dict[Any, tuple[type, ...]] = {BasePredictor: BASES_OF_EFFECTS}
 # What follows from the rig and from the training rows.
 GIVEN = {(cls, name) for cls in REGRESSIONS for name in ("inputs", "outputs")} | {
     (GaussianProcessPredictor, "rig"),
