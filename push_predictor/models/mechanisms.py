@@ -96,11 +96,7 @@ LIBRARY: tuple[Mechanism, ...] = (
         gradient_y="the same along y",
     ),
     _mechanism(
-        "tilted_surface",
-        "1",
-        0.7,
-        slope_x="pull along the world's x, share of friction",
-        slope_y="the same along y",
+        "tilted_surface", "1", 0.7, slope_x="pull along the world's x, share of friction", slope_y="the same along y"
     ),
     _mechanism("inertia", "s^2/m", 3.0, inertia="inverse of surface friction times gravity"),
     _mechanism("pusher_radius", "m", 0.004, radius_error="change of the pusher's radius"),

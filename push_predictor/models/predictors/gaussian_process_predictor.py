@@ -89,7 +89,7 @@ class GaussianProcessPredictor(BasePredictor):
         )
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See BasePredictor. The correlation at a row is that of the other blocks' rows; the mean is that of all rows."""
+        """See BasePredictor. The correlation at a row is that of the other blocks; the mean is that of all rows."""
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
         correlation = self.correlation.held_out(features, block) if self.correlation else None

@@ -30,10 +30,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import load_model, model_digest
-from push_predictor.models.tabulated.prediction_table import TableNodes
+from push_predictor.models.tabulated.prediction_table import table_from_nodes
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
-from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_domain
+from push_predictor.models.tabulated.table_nodes import TableNodes
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_table
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
@@ -41,7 +41,7 @@ FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
 FORMAT_VERSION = 6  # also to be raised when a table's values change their meaning
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
-PARTS: dict[str, Any] = {  # of a file: fields of TabulatedDomain, TableNodes, TableAccuracy and Probes, in their order
+PARTS: dict[str, Any] = {  # of a file: fields of PredictionTable, TableNodes, TableAccuracy and Probes, in their order
     "ends": tuple[Array, Array],
     "nodes": tuple[list[int], list[int], list[float], list[Array]],
     "error": tuple[float, float],
@@ -155,22 +155,22 @@ def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | N
         if (record["format_version"], record["model"]) != (FORMAT_VERSION, digest):
             return None
         found = {name: Reader(arrays).read(record[name], hint, name) for name, hint in PARTS.items()}
-        domain = domain_from_nodes(learnt, learnt.predictor, found["ends"], TableNodes(*found["nodes"]))
-        accepted = Probes(*found["probes"]).error_of(domain).accepted
+        table = table_from_nodes(TableNodes(*found["nodes"]), learnt.predictor, found["ends"])
+        accepted = Probes(*found["probes"]).error_of(table).accepted
     except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None
-    return with_domain(model, domain, TableAccuracy(*found["error"])) if accepted else None
+    return with_table(model, table, TableAccuracy(*found["error"])) if accepted else None
 
 
 def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
     """Write the table of a model with this digest, if it has one. Raises OSError."""
-    domain, error = tabulated.domain, tabulated.error
-    if domain is None or error is None:
+    table, error = tabulated.table, tabulated.error
+    if table is None or error is None:
         return
-    nodes, probes = domain.table.nodes, probed(of_targets(tabulated.model.base), CHECKED)
+    probes = probed(of_targets(tabulated.model.base), CHECKED)
     parts = {
-        "ends": (domain.least, domain.most),
-        "nodes": tuple(vars(nodes).values()),
+        "ends": (table.least, table.most),
+        "nodes": tuple(vars(table.nodes).values()),
         "error": tuple(vars(error).values()),
         "probes": tuple(vars(probes).values()),
     }
