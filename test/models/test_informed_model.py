@@ -18,7 +18,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from synthetic import RADIUS, square_rig
 
+from push_predictor.models.features import DEVIATION
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.predictors.scaling import DEVIATION
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate

@@ -15,9 +15,9 @@ from sparse_rows import PARAMETERS, rows
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.sparse import vhgp as sparse_fit
-from push_predictor.models.gaussian_process.sparse.kernel import inducing_rows
-from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING, SparseVHGP, fit_sparse_vhgp
+from push_predictor.models.gaussian_process import sparse_vhgp as sparse_fit
+from push_predictor.models.gaussian_process.inducing import inducing_rows
+from push_predictor.models.gaussian_process.sparse_vhgp import DEFAULT_INDUCING, SparseVHGP, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model

@@ -13,14 +13,13 @@ import pytest
 from likelihoods import bound_and_gradient, log_marginal_likelihood
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import Found
 from push_predictor.models.gaussian_process.fit import _noise_at as noise_at
 from push_predictor.models.gaussian_process.fit import _search as search_of
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.types import Array
 
 

@@ -3,5 +3,5 @@
 
 """Gaussian process regression of one output: standard (`gp`) and variational heteroscedastic (`vhgp`).
 
-Import `gp`, `vhgp`, `sparse.vhgp`, `regression`, `prediction` and `kernels`; the other modules are steps of their fits.
+Import `gp`, `vhgp`, `sparse_vhgp`, `regression`, `prediction` and `kernels`; the other modules are steps of their fits.
 """

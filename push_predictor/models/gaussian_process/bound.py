@@ -11,7 +11,7 @@ Where the printed equations differ from these: docs/explanation/errata.md.
 K_g includes the nugget. At a maximum over (b, Lambda) the two are tied, b = Lambda - 1/2, which leaves one number per
 training row.
 
-With inducing inputs for f and g (sparse/kernel.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
+With inducing inputs for f and g (inducing.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
 K_g. The variances c that they do not explain add -1/2 sum_i c_f,i / R_ii, and c_g to the variances S_ii. If every row
 is an inducing input, the two bounds are equal.
 """
@@ -23,14 +23,67 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.posterior import Likelihood
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel, Regularisable, Ridge
 from push_predictor.types import Array, IntArray
 
+JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
 _SMALLEST_PRECISION = 1e-7  # below it S loses its precision
 _EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class VhgpParameters:
+    """Hyperparameters: ARD kernel of the signal f, ARD kernel of the log noise variance g, prior mean of g.
+
+    log_nugget_sd: log of the standard deviation of g's nugget, which is independent from row to row.
+    """
+
+    log_lengthscales: Array
+    log_signal_sd: float
+    noise_log_lengthscales: Array
+    noise_log_sd: float
+    noise_mean: float
+    log_nugget_sd: float
+
+    @property
+    def count(self) -> int:
+        """Number of hyperparameters."""
+        return 2 * len(self.log_lengthscales) + 4
+
+    @property
+    def signal(self) -> ArdKernel:
+        """Kernel of f."""
+        return ArdKernel(self.log_lengthscales, self.log_signal_sd)
+
+    @property
+    def noise(self) -> ArdKernel:
+        """Kernel of g, without its nugget."""
+        return ArdKernel(self.noise_log_lengthscales, self.noise_log_sd)
+
+    @property
+    def nugget(self) -> float:
+        """What is added to the diagonal of K_g, and to the variance of g at any input."""
+        return float(np.exp(2.0 * self.log_nugget_sd))
+
+    @property
+    def jitter(self) -> float:
+        """What is added to the diagonal of K_f."""
+        return JITTER * self.signal.variance
+
+    def to_vector(self) -> Array:
+        """The numbers in their order, shape (2 D + 4,)."""
+        signal = np.append(self.log_lengthscales, self.log_signal_sd)
+        rest = [self.noise_log_sd, self.noise_mean, self.log_nugget_sd]
+        return np.concatenate([signal, self.noise_log_lengthscales, rest])
+
+    @classmethod
+    def from_vector(cls, vector: Array) -> VhgpParameters:
+        """The inverse of `to_vector`."""
+        d = (len(vector) - 4) // 2
+        return cls(vector[:d], float(vector[d]), vector[d + 1 : -3], *(float(value) for value in vector[-3:]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,9 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_bound
 from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel

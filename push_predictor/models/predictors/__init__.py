@@ -9,6 +9,7 @@ mechanics, mechanisms and effects.
 
 from __future__ import annotations
 
+from push_predictor.models.features import Scaling
 from push_predictor.models.predictors.extended_predictor import ExtendedPredictor, Predictor
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
 from push_predictor.models.predictors.predictor import (
@@ -20,7 +21,6 @@ from push_predictor.models.predictors.predictor import (
     Shift,
 )
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
-from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
 
 __all__ = [

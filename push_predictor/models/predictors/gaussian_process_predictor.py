@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.features import DEVIATION, Scaling
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.predictor import BasePredictor, Moments, Shift
-from push_predictor.models.predictors.scaling import DEVIATION, Scaling
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
 from push_predictor.recordings.rig import Rig

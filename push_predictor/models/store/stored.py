@@ -15,10 +15,10 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, generic_width
 from push_predictor.models.effects.exact import covariance_of
+from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics

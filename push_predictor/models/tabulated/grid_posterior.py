@@ -25,7 +25,7 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.regression import ConstantNoise, Regression
 from push_predictor.models.gaussian_process.ridge import DenseKernel
-from push_predictor.models.gaussian_process.sparse.vhgp import InducedPosterior, SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import InducedPosterior, SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.types import Array, IntArray
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.descent import Descent
 from push_predictor.models.gaussian_process.fit import (
     FEW_ROWS,
@@ -29,10 +29,9 @@ from push_predictor.models.gaussian_process.fit import (
     Search,
 )
 from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array, IntArray
 
