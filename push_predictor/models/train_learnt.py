@@ -47,7 +47,8 @@ EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by
 class LearntOptions:
     """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
 
-    about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new pushes. per_path: whether outcomes are learnt per path length.
+    about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new
+    pushes. per_path: whether outcomes are learnt per path length.
     """
 
     kind: str

@@ -27,12 +27,7 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise
 from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import (
-    GaussianProcessPredictor,
-    MechanicsPredictor,
-    Predictor,
-    PriorPredictor,
-)
+from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor, Predictor, PriorPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push

@@ -16,8 +16,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -52,36 +51,20 @@ MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
 
 @one_blas_thread()
-def load_served(path: Path) -> TabulatedModel:
+def load_served(path: Path, *, at_once: bool = False) -> TabulatedModel:
     """The model of a file as the server predicts with it, its tables from disk where they are there.
 
-    Raises ModelFileError as `load_model` does, and if the model cannot predict.
-    """
-    with _naming(path):
-        return completed(load_at_once(path))
-
-
-@one_blas_thread()
-def load_at_once(path: Path) -> TabulatedModel:
-    """The same, but a model without tables on disk predicts by itself, and states that its table is missing.
-
-    `completed` adds the tables. Raises ModelFileError.
+    at_once: a model without tables on disk predicts by itself, and states that its table is missing; `completed` adds
+    it. Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
     model = load_model(path, check=False)
-    with _naming(path):
+    try:
         # The model of a kept table was checked before the table was computed.
         served = _read(model, path) or _without_tables(load_model(path))
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         served.predict_rows(first.inputs, first.duration, first.covariates)
-    return served
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Name the file of a model that cannot predict. Raises ModelFileError."""
-    try:
-        yield
+        return served if at_once else completed(served)
     except ModelFileError:
         raise
     except Exception as error:
@@ -90,12 +73,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 @one_blas_thread()
 def completed(served: TabulatedModel) -> TabulatedModel:
-    """A model of `load_at_once` with its tables; itself if it has them."""
+    """A model that was loaded at once, with its tables; itself if it has them."""
     if served.how != NO_TABLE_YET:
         return served
     tabulated = _computed(served.model)
     tabulated.free_matrices()
-    _return_memory()
+    gc.collect()
+    with suppress(AttributeError, OSError):  # another C library; glibc would keep 100 MB for later
+        ctypes.CDLL(None).malloc_trim(0)
     return tabulated
 
 
@@ -180,9 +165,8 @@ def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
 
 
 def _without_tables(model: PushModel) -> TabulatedModel:
-    if not isinstance(model.base.predictor, GaussianProcessPredictor):
-        return tabulate(model)
-    return TabulatedModel(model, NO_TABLE_YET)
+    learns = isinstance(model.base.predictor, GaussianProcessPredictor)
+    return TabulatedModel(model, NO_TABLE_YET) if learns else tabulate(model)
 
 
 def _computed(model: PushModel) -> TabulatedModel:
@@ -193,13 +177,6 @@ def _computed(model: PushModel) -> TabulatedModel:
             write_tables(kept, digest, served)
             _delete_oldest(kept.parent)
     return served
-
-
-def _return_memory() -> None:
-    """Give the memory of the computation back: glibc would keep 100 MB for later."""
-    gc.collect()
-    with suppress(AttributeError, OSError):  # another C library
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _kept(digest: str) -> Path | None:
