@@ -19,7 +19,7 @@ by exp(-x). For faster ones it stays in proportion, which is on the safe side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -87,10 +87,6 @@ class Scaling:
     def noise_growth(self, inputs: Array) -> Array:
         """Logarithms (n,) of the factor on the noise variance per path length; zero but for slow pushes."""
         return np.maximum(-self.beyond(inputs), 0.0)
-
-    def without_path(self) -> Scaling:
-        """The scaling of what is learnt, at a path of `travel`."""
-        return replace(self, travel=None)
 
 
 def within(speeds: tuple[float, float] | None, inputs: Array) -> Array:

@@ -145,9 +145,9 @@ class SignalFit:
             noise = level + problem.parameters.jitter
             return cls(level, Likelihood.of(problem.signal, problem.outputs, noise))
 
-    @property
+    @cached_property
     def optimal_precisions(self) -> Array:
-        """1/2 + dF/dm >= 0, shape (n,)."""
+        """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
         return self.level * self.likelihood.slopes + 0.5
 
 
@@ -187,26 +187,6 @@ class Bound:
         return cls.at(problem, Sites(site_precisions, site_precisions * mean + mean_weights))
 
     @property
-    def site_precisions(self) -> Array:
-        """Lambda, shape (n,)."""
-        return self.sites.precisions
-
-    @property
-    def noise_level(self) -> Array:
-        """R, shape (n,)."""
-        return self.signal.level
-
-    @property
-    def alpha(self) -> Array:
-        """(K_f + R)^-1 y, shape (n,)."""
-        return self.signal.likelihood.alpha
-
-    @cached_property
-    def optimal_precisions(self) -> Array:
-        """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
-        return self.signal.optimal_precisions
-
-    @property
     def tied_precisions(self) -> Array:
         """Site precisions tied to these mean weights, with the same m; near a maximum those of `sites`."""
         return np.maximum(self.mean_weights + 0.5, _SMALLEST_PRECISION)
@@ -214,14 +194,14 @@ class Bound:
     @property
     def optimal_sites(self) -> Sites:
         """The sites that a fixed point reproduces: where a step of natural gradient of length 1 ends."""
-        return Sites.optimal(self.optimal_precisions, self.noise_mean)
+        return Sites.optimal(self.signal.optimal_precisions, self.noise_mean)
 
     def hyperparameter_gradient(self) -> Array:
         """dF/d(parameters.to_vector()) at fixed Lambda and b; at a maximum over these, that of the maximum."""
         signal = self.signal.likelihood.gradient()
         signal[-1] += 2.0 * self.problem.parameters.jitter * float(self.signal.likelihood.slopes.sum())
         # dF/dm = gb gives b gb' + gb b' - b b', as one difference of squares
-        optimal = self.optimal_precisions - 0.5
+        optimal = self.signal.optimal_precisions - 0.5
         noise = self.noise_ridge.gradient(optimal, optimal - self.mean_weights)
         return np.concatenate([signal, noise[:-1], [optimal.sum()], noise[-1:]])
 
@@ -234,13 +214,13 @@ class Bound:
         variable models").
         """
         problem, parameters = self.problem, self.problem.parameters
-        errors, variance = self.signal.likelihood.ridge.held_out_errors(self.alpha, block)
+        errors, variance = self.signal.likelihood.ridge.held_out_errors(self.signal.likelihood.alpha, block)
         of_noise, noise_variance = self.noise_ridge.held_out_errors(self.mean_weights, block)
-        site_variance = 1.0 / self.site_precisions
+        site_variance = 1.0 / self.sites.precisions
         noise_variance = noise_variance + problem.noise.unexplained - site_variance
         return LatentPrediction(
             problem.outputs - errors,
-            np.maximum(variance + problem.signal.unexplained - self.noise_level, parameters.jitter),
+            np.maximum(variance + problem.signal.unexplained - self.signal.level, parameters.jitter),
             self.noise_mean + self.mean_weights * site_variance - of_noise,
             np.maximum(noise_variance, parameters.nugget + _EPSILON * parameters.noise.variance),
         )

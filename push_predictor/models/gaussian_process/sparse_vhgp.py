@@ -136,10 +136,7 @@ class SparseVHGP:
         return self.signal.covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
-
-        block (n,): number of each row's block.
-        """
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
         return self._solved()[0].held_out(block)
 
 

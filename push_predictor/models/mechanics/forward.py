@@ -62,6 +62,9 @@ class PushMechanics:
     support: PressureDistribution | PowerSurface | None = None
     supports: Mapping[int, PressureDistribution] = field(default_factory=dict)
     accuracy: float = 1e-3
+    _tables: dict[tuple[float, ...], SurfaceTables] = field(
+        default_factory=dict, init=False, repr=False
+    )  # by exponents
 
     def displacement(
         self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
@@ -141,11 +144,6 @@ class PushMechanics:
     def _known(self) -> tuple[PressureDistribution, ...]:
         own = (self.support,) if isinstance(self.support, PressureDistribution) else ()
         return (*own, *self.supports.values())
-
-    @cached_property
-    def _tables(self) -> dict[tuple[float, ...], SurfaceTables]:
-        """By the exponents of patches that they contain."""
-        return {}
 
 
 def mechanics_on(

@@ -74,12 +74,6 @@ class GaussianProcessPredictor(BasePredictor):
         sd = self.scaling.outcome_sd
         return sd if self.tails is None else np.asarray(sd * self.tails.factor)
 
-    @property
-    def targets(self) -> Array:
-        """What the regressions were trained on (n, 3), SI: outcomes, or residuals about the mean."""
-        scaled = np.column_stack([regression.outputs for regression in self.regressions])
-        return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
-
     def moments(self, push: Push) -> Moments:
         """See BasePredictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
@@ -133,8 +127,16 @@ class GaussianProcessPredictor(BasePredictor):
 
     def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
         """Moments of the outcomes from those of what was learnt, which know the training's speeds alone."""
-        mean, covariance, process_covariance = self.scaled(learnt, push)
-        return Moments(mean + self.displacement(push), covariance, process_covariance)
+        mean, covariance, process = learnt
+        if self.scaling.travel is not None:
+            size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
+            if beyond.any():
+                process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
+                deviation = (DEVIATION * beyond * self.reported_sd) ** 2
+                covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
+            square = (size * size)[:, :, None]
+            mean, covariance, process = mean * size, covariance * square, process * square
+        return Moments(mean + self.displacement(push), covariance, process)
 
     def displacement(self, push: Push) -> Array:
         """Displacement (n, 3) of the mean, zero if it has none."""
@@ -142,24 +144,11 @@ class GaussianProcessPredictor(BasePredictor):
             return np.zeros((len(push.inputs), 3))
         return self.mean.displacement(push.inputs, push.duration, push.covariates)
 
-    def scaled(self, learnt: Moments, push: Push) -> Moments:
-        """The same about the displacement of the mechanics."""
-        if self.scaling.travel is None:
-            return learnt
-        size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
-        mean, covariance, process = learnt
-        if beyond.any():
-            process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
-            deviation = (DEVIATION * beyond * self.reported_sd) ** 2
-            covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
-        square = (size * size)[:, :, None]
-        return Moments(mean * size, covariance * square, process * square)
-
     def of_targets(self) -> GaussianProcessPredictor:
         """The predictor of what was learnt, at a path of the scaling's travel; itself if that are the outcomes."""
         if self.mean is None and self.scaling.travel is None:
             return self
-        return replace(self, mean=None, scaling=self.scaling.without_path())
+        return replace(self, mean=None, scaling=replace(self.scaling, travel=None))
 
     def free_matrices(self) -> None:
         """Free what predictions would compute again."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, generic_width
+from push_predictor.models.effects.effect import GENERIC_WIDTH, Effect
 from push_predictor.models.effects.exact import covariance_of
 from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
@@ -219,7 +219,7 @@ def _basis(a: SimpleNamespace) -> None:
 def _effect(a: SimpleNamespace) -> None:
     if a.mechanism is not None and a.mechanism not in [known.name for known in (*LIBRARY, *REFINEMENTS)]:
         raise ValueError(f"mechanism {a.mechanism!r} is not in the library")
-    width = generic_width() if a.mechanism is None else len(mechanism_named(a.mechanism).parameters)
+    width = GENERIC_WIDTH if a.mechanism is None else len(mechanism_named(a.mechanism).parameters)
     size = width * columns_of(a.basis)
     if a.coefficients.shape != (size,) or a.covariance.shape != (size, size):
         raise ValueError(f"{size} coefficients and their covariance are needed")

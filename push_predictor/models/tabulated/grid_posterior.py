@@ -103,9 +103,9 @@ def _of_vhgp(regression: VHGP) -> GridRegression:
     bound = Bound.tied(problem, regression.site_precisions)
     jitter, nugget = parameters.jitter, parameters.nugget
     of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
-    seen_through, least = nugget + 1.0 / bound.site_precisions, nugget + _EPSILON * of_noise
-    jittered = bound.noise_level + jitter
-    signal = _factorised(parameters.signal, inputs, jittered, bound.alpha, of_signal + jitter, jitter)
+    seen_through, least = nugget + 1.0 / bound.sites.precisions, nugget + _EPSILON * of_noise
+    jittered = bound.signal.level + jitter
+    signal = _factorised(parameters.signal, inputs, jittered, bound.signal.likelihood.alpha, of_signal + jitter, jitter)
     noise = _factorised(parameters.noise, inputs, seen_through, bound.mean_weights, of_noise + nugget, least)
     return GridRegression(signal, parameters.noise_mean, noise)
 
