@@ -171,35 +171,25 @@ def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
 
     The text begins with OUT_OF_DOMAIN, and names what is outside for the first push that is.
     """
-    count = len(in_domain)
-    if count == 1:  # in plain numbers: a server adds it to single predictions
-        return "" if in_domain[0] else f"{OUT_OF_DOMAIN}: {_reason(model, push, 0)}"
     if in_domain.all():
         return ""
-    first, outside = int(in_domain.argmin()), int(np.count_nonzero(~in_domain))
-    reason = _reason(model, push, first)
-    return f"{OUT_OF_DOMAIN}: {outside} of {count} pushes, first push {first}: {reason}"
+    count, first, outside = len(in_domain), int(in_domain.argmin()), int(np.count_nonzero(~in_domain))
+    which = "" if count == 1 else f"{outside} of {count} pushes, first push {first}: "
+    return f"{OUT_OF_DOMAIN}: {which}{_reason(model, push, first)}"
 
 
 def _reason(model: PushModel, push: Push, row: int) -> str:
+    """What of a push is outside."""
     velocity, contact, angle = push.inputs[row].tolist()
     limits, outside = model.input_limits, []
     for name, value, (low, high) in (("velocity", velocity, limits.velocity), ("angle", angle, limits.angle)):
         if not low <= value <= high:
             outside.append(_outside(name, name, value, f"{low:.4g} to {high:.4g}"))
-    if model.covariate_ranges:
-        alone = push if len(push.inputs) == 1 else push.take(slice(row, row + 1))
-        outside += _outside_covariates(model, alone)
-    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
-
-
-def _outside_covariates(model: PushModel, alone: Push) -> list[str]:
-    """What is outside of the covariates of one push."""
-    completed, found = model.predictor.completed(alone).covariates, []
+    covariates = model.predictor.completed(push.take(slice(row, row + 1))).covariates
     for name, known in model.covariate_ranges.items():
-        if not known.contains(completed[name])[0]:
-            found.append(_outside(f"covariate {name}", name, float(completed[name][0]), str(known)))
-    return found
+        if not known.contains(covariates[name])[0]:
+            outside.append(_outside(f"covariate {name}", name, float(covariates[name][0]), str(known)))
+    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
 
 
 def _outside(title: str, name: str, value: float, accepted: str) -> str:
