@@ -24,9 +24,14 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import Likelihood
+from push_predictor.models.gaussian_process.posterior import (
+    Likelihood,
+    NuggetKernel,
+    Ridge,
+    SmoothKernel,
+)
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel, Regularisable, Ridge
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
 JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
@@ -92,8 +97,8 @@ class VhgpProblem:
 
     outputs: Array
     parameters: VhgpParameters
-    signal: Regularisable
-    noise: Regularisable
+    signal: SmoothKernel
+    noise: NuggetKernel
 
     @classmethod
     def of(cls, inputs: Array, outputs: Array, parameters: VhgpParameters) -> VhgpProblem:
@@ -103,7 +108,7 @@ class VhgpProblem:
 
     @classmethod
     def about(
-        cls, outputs: Array, parameters: VhgpParameters, signal: Regularisable, noise: Regularisable
+        cls, outputs: Array, parameters: VhgpParameters, signal: SmoothKernel, noise: SmoothKernel
     ) -> VhgpProblem:
         """With these kernels of f and g, to which g's nugget is added."""
         return cls(outputs, parameters, signal, NuggetKernel(noise, parameters.nugget))
