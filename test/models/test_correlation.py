@@ -18,14 +18,22 @@ from synthetic import square_rig
 
 from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.predictors import GaussianProcessPredictor, correlation_fit
-from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
-from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import correlation as correlation_module
+from push_predictor.models.predictors.correlation import (
+    FEWEST_PUSHES,
+    LONGEST,
+    Correlation,
+    correlated,
+    correlations,
+    covariances,
+    fit_correlation,
+)
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.prediction_table import unbounded
 from push_predictor.models.tabulated.spline import table_moments
+from push_predictor.models.tabulated.table_nodes import unbounded
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -67,7 +75,7 @@ def alone(model: PushModel) -> GaussianProcessPredictor:
 
 def with_fitted_correlation(model: PushModel) -> GaussianProcessPredictor:
     """Its predictor with a correlation that is fitted again."""
-    return replace(alone(model), correlation=fit_correlation(alone(model), model.training.push_id))
+    return replace(alone(model), correlation=fit_correlation(alone(model).regressions, model.training.push_id))
 
 
 def without(model: PushModel) -> PushModel:
@@ -197,7 +205,7 @@ def test_no_correlation_is_fitted_to_independent_outputs() -> None:
             for r, column in zip(model.predictor.regressions, scaled.T, strict=True)
             if isinstance(r, GaussianProcess)
         )
-        found += fit_correlation(replace(model.predictor, regressions=regressions), table.push_id) is not None
+        found += fit_correlation(regressions, table.push_id) is not None
     assert found <= 1
 
 
@@ -226,8 +234,8 @@ def test_held_out_correlation_is_that_of_the_other_blocks(model: PushModel) -> N
 
 
 def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(correlation_fit, "MOST_ROWS", 150)
-    monkeypatch.setattr(correlation_fit, "MOST_BLOCKS", 30)
+    monkeypatch.setattr(correlation_module, "MOST_ROWS", 150)
+    monkeypatch.setattr(correlation_module, "MOST_BLOCKS", 30)
     whole = trained_once("gp")
     model = replace(whole, predictor=with_fitted_correlation(whole))
     correlation = correlation_of(model)

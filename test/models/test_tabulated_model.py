@@ -25,8 +25,9 @@ from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_cache import read_tables, write_tables
-from push_predictor.models.tabulated import prediction_table
-from push_predictor.models.tabulated.prediction_table import on_grid
+from push_predictor.models.tabulated import table_nodes
+from push_predictor.models.tabulated.grid_posterior import on_grid
+from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
 from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
@@ -35,7 +36,6 @@ from push_predictor.models.tabulated.table_accuracy import (
     probed,
     relative_error,
 )
-from push_predictor.models.tabulated.tabulated_domain import FASTEST, tabulated_domain, wide_box
 from push_predictor.models.tabulated.tabulated_model import COMPUTED, REFINEMENTS, TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
@@ -186,12 +186,13 @@ def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
 
 def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.MonkeyPatch) -> None:
     model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
-    monkeypatch.setattr(prediction_table, "COUPLING_CELLS", 1.5)
+    monkeypatch.setattr(table_nodes, "COUPLING_CELLS", 1.5)
     assert isinstance(model.predictor, GaussianProcessPredictor)
     posteriors = [on_grid(regression) for regression in model.predictor.regressions]
-    first = tabulated_domain(model, model.predictor, posteriors, wide_box(model), REFINEMENTS[0]).table.knots
+    ends = wide_box(model, model.predictor)
+    first = prediction_table(model.predictor, posteriors, ends, REFINEMENTS[0]).spline.knots
     answers = tabulate(model)
-    assert answers.domain is not None and answers.domain.table.knots > first
+    assert answers.table is not None and answers.table.spline.knots > first
     assert_true_to_the_model(answers)
 
 
@@ -300,8 +301,8 @@ def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: s
 
 def test_the_table_is_of_the_domain_alone_where_a_wide_one_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = tabulate(independent(trained(OUTLINES["square"], "gp", *WIDE, per_path=False)))
-    assert wide.domain is not None
-    monkeypatch.setattr(prediction_table, "MOST_KNOTS", wide.domain.table.knots - 1)
+    assert wide.table is not None
+    monkeypatch.setattr(table_nodes, "MOST_KNOTS", wide.table.spline.knots - 1)
     narrow, outside = tabulate(wide.model), outside_pushes(wide.model, 50)
     assert_true_to_the_model(narrow)
     assert narrow.exact_count(outside) == 50 and narrow.exact_count(inside(wide.model, 50)) == 0
@@ -344,7 +345,7 @@ def test_analytical_model_has_no_table() -> None:
 def test_too_large_table_is_not_built(monkeypatch: pytest.MonkeyPatch) -> None:
     for limit in ("MOST_KNOTS", "MOST_NODES"):
         with monkeypatch.context() as patch:
-            patch.setattr(prediction_table, limit, 100)
+            patch.setattr(table_nodes, limit, 100)
             answers = tabulate(tabulated("square", "gp").model)
         assert not answers.tabulated
         assert "at most 100" in answers.how
@@ -353,9 +354,9 @@ def test_too_large_table_is_not_built(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     model = tabulated("square", "vhgp").model
     for name in ("SIGNAL", "NOISE"):
-        monkeypatch.setattr(prediction_table, name, prediction_table.Density(nodes=0.3, cells=0.3))
+        monkeypatch.setattr(table_nodes, name, table_nodes.Density(nodes=0.3, cells=0.3))
     for name in ("FEWEST_NODES", "FEWEST_CELLS"):
-        monkeypatch.setattr(prediction_table, name, 4)
+        monkeypatch.setattr(table_nodes, name, 4)
     answers, inputs = tabulate(model), inside(model, 5)
     assert not answers.tabulated
     assert "too far off" in answers.how

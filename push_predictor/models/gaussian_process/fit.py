@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import SignalFit, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import SignalFit, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.descent import Descent, part_of_rows
 from push_predictor.models.gaussian_process.gp import GpParameters
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.types import Array
 

@@ -81,10 +81,7 @@ class GaussianProcess:
         return kernel.matrix(inputs) - self._posterior.explained_covariance(kernel.cross(inputs, self.inputs))
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
-
-        block (n,): number of each row's block.
-        """
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
         kernel, noise = self.parameters.kernel, np.full(len(self.outputs), self.parameters.noise_variance)
         likelihood = Likelihood.of(DenseKernel.of(kernel, self.inputs), self.outputs, noise)
         errors, variance = likelihood.ridge.held_out_errors(likelihood.alpha, block)

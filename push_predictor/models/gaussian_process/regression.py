@@ -21,7 +21,7 @@ import numpy as np
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess, check_rows
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.types import Array, IntArray
 

@@ -17,10 +17,9 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_bound
 from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel
@@ -65,7 +64,7 @@ class VHGP:
             parameters = self.parameters
             signal, noise = (DenseKernel.of(kernel, self.inputs) for kernel in (parameters.signal, parameters.noise))
             bound = Bound.tied(VhgpProblem.about(self.outputs, parameters, signal, noise), self.site_precisions)
-            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
+            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.signal.level
             del bound  # frees its matrices before the factors are computed
             of_signal = KernelPosterior(signal.matrix, noise_level + parameters.jitter)
             of_noise = KernelPosterior(noise.matrix, parameters.nugget + 1.0 / self.site_precisions)
@@ -91,10 +90,7 @@ class VHGP:
         return kernel.matrix(inputs) - self._posterior.signal.explained_covariance(kernel.cross(inputs, self.inputs))
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
-
-        block (n,): number of each row's block.
-        """
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
         problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
         return Bound.tied(problem, self.site_precisions).held_out(block)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.mechanics.kernel.push import displacements, shifts
 from push_predictor.models.mechanics.parameters import PARAMETERS, ParameterValues
-from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.mechanics.surface import (
     NO_SLOPES,
     PowerSurface,
@@ -61,6 +62,9 @@ class PushMechanics:
     support: PressureDistribution | PowerSurface | None = None
     supports: Mapping[int, PressureDistribution] = field(default_factory=dict)
     accuracy: float = 1e-3
+    _tables: dict[tuple[float, ...], SurfaceTables] = field(
+        default_factory=dict, init=False, repr=False
+    )  # by exponents
 
     def displacement(
         self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
@@ -141,10 +145,19 @@ class PushMechanics:
         own = (self.support,) if isinstance(self.support, PressureDistribution) else ()
         return (*own, *self.supports.values())
 
-    @cached_property
-    def _tables(self) -> dict[tuple[float, ...], SurfaceTables]:
-        """By the exponents of patches that they contain."""
-        return {}
+
+def mechanics_on(
+    outline: Outline,
+    pusher_radius: float,
+    support_points: Array | None,
+    supports: Mapping[int, Array] = MappingProxyType({}),
+) -> PushMechanics:
+    """The mechanics on a rig's support_points (k, 3: x, y in m, load share), on a patch where these are None.
+
+    supports: other points, by number of the recording, in place of the rig's.
+    """
+    own = None if support_points is None or supports else supported_at(support_points)
+    return PushMechanics(outline, pusher_radius, own, {number: supported_at(k) for number, k in supports.items()})
 
 
 def _writeable(values: Array) -> Array:
