@@ -46,7 +46,7 @@ def prior_draws(fitted: FittedMechanics, seed: int) -> Array:
 
 def normal_draws(fitted: FittedMechanics, seed: int) -> Array:
     """Draws (DRAWS, p) about the values with their covariance, moved into the plausible ranges."""
-    root = np.linalg.cholesky(fitted.covariance)
+    root = np.asarray(np.linalg.cholesky(fitted.covariance), dtype=np.float64)
     p = len(root)
     directions = _directions(_sensitivity(fitted, root), np.arange(p), 2 * HALF)
     draws = np.array(list(fitted.values.values())) + _design(seed)[:, : len(directions)] @ directions @ root.T
