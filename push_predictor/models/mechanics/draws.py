@@ -59,8 +59,14 @@ def _design(seed: int) -> Array:
     Changing the sign of the first h columns, or of the others, gives the same points.
     """
     rng = np.random.default_rng(seed)
-    one, other = (np.sqrt(HALF) * np.linalg.qr(rng.standard_normal((HALF, HALF)))[0] for _ in range(2))
+    one, other = (np.sqrt(HALF) * _rotation(rng) for _ in range(2))
     return np.concatenate([np.hstack([a * one, b * other]) for a in (1.0, -1.0) for b in (1.0, -1.0)])
+
+
+def _rotation(rng: np.random.Generator) -> Array:
+    """A random orthogonal matrix (h, h), all equally likely (Mezzadri 2007)."""
+    q, r = np.linalg.qr(rng.standard_normal((HALF, HALF)))
+    return np.asarray(q * np.sign(np.diagonal(r)))
 
 
 def _sensitivity(fitted: FittedMechanics, root: Array) -> Array:
