@@ -95,7 +95,7 @@ def check_pushes(model: PushModel, pushes: Pushes) -> None:
     else:
         velocity, contact, angle = pushes.inputs[0].tolist()
         covariates = {name: float(column[0]) for name, column in needed.items()}
-        check_request(model, PushRequest(velocity, contact, angle, float(pushes.duration[0]), covariates))
+        _check(model, velocity, contact, angle, float(pushes.duration[0]), covariates)
 
 
 def check_table(model: PushModel, table: PushTable) -> None:

@@ -10,19 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.models.mechanics.draws import normal_draws, prior_draws
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics, mechanics_on
 from push_predictor.models.mechanics.ladder import Rung, climb
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import (
-    ProcessNoise,
-    drawn_parameters,
-    normal_draws,
-    prior_draws,
-    prior_spreads,
-    updated,
-)
+from push_predictor.models.mechanics.prior import ProcessNoise, drawn_parameters, prior_spreads, updated
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.rig import Rig
@@ -68,7 +62,7 @@ def prior_predictor(mechanics: PushMechanics, rig: Rig, seed: int = 0) -> PriorP
     means = {name: known.get(name, BY_NAME[name].textbook) for name in names}
     within = {name: float(np.clip(mean, BY_NAME[name].low, BY_NAME[name].high)) for name, mean in means.items()}
     fitted = FittedMechanics(mechanics, within, np.diag(prior_spreads(names) ** 2))
-    return PriorPredictor(fitted, prior_draws(names, _values(within), seed), ProcessNoise())
+    return PriorPredictor(fitted, prior_draws(fitted, seed), ProcessNoise())
 
 
 def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPredictor:
@@ -78,8 +72,8 @@ def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPr
     mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
     found = updated(mechanics, names, _values(before.fitted.values), fit_rows(rows), before.fitted.ellipsoid.length)
     values = dict(zip(names, found.values.tolist(), strict=True))
-    draws = normal_draws(names, found.values, found.covariance, seed)
-    return PriorPredictor(FittedMechanics(mechanics, values, found.covariance), draws, found.noise)
+    fitted = FittedMechanics(mechanics, values, found.covariance)
+    return PriorPredictor(fitted, normal_draws(fitted, seed), found.noise)
 
 
 def _values(values: Mapping[str, float]) -> Array:

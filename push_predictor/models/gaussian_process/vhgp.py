@@ -19,9 +19,9 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_bound
-from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.gp import ROUGH_STOP, SHORTEST, GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
@@ -48,6 +48,7 @@ class VHGP:
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
+        self._held_out = Remembered(self._predicted_without)
 
     @property
     def bound(self) -> float:
@@ -91,6 +92,9 @@ class VHGP:
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
+        return self._held_out.of(block)
+
+    def _predicted_without(self, block: IntArray) -> LatentPrediction:
         problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
         return Bound.tied(problem, self.site_precisions).held_out(block)
 
@@ -105,10 +109,10 @@ def fit_vhgp(
 ) -> VHGP:
     """Maximise the variational bound (plus weak priors, see fit.py) over hyperparameters and site precisions.
 
-    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows; None computes it
-    first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
+    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of these rows or some of them; None
+    computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
     finite.
     """
     check_rows(inputs, outputs)
-    near = start or fit_gp(inputs, outputs, shortest=shortest).parameters
+    near = start or fit_gp(inputs, outputs, shortest=shortest, stop=ROUGH_STOP).parameters
     return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, most_iterations, shortest))

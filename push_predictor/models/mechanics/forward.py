@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.mechanics.kernel.push import displacements, shifts
+from push_predictor.models.mechanics.kernel.push import displacements, drawn, shifts
 from push_predictor.models.mechanics.parameters import PARAMETERS, ParameterValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.mechanics.surface import (
@@ -98,6 +98,21 @@ class PushMechanics:
         if len(inputs):
             shape = shape or self.shape_of(values)
             displacements(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
+        return found
+
+    def drawn(
+        self,
+        values: Array,
+        inputs: Array,
+        duration: Array,
+        covariates: Mapping[str, Array] | None = None,
+        shape: Shape | None = None,
+    ) -> Array:
+        """Displacements (n, k, 3) of each push with each of k rows of values (k, 28); shape as in `displaced`."""
+        found = np.empty((len(inputs), len(values), 3))
+        if found.size:
+            shape = shape or self.shape_of(values)
+            drawn(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
         return found
 
     def shifted(self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push) -> Array:
