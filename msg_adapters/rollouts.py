@@ -16,7 +16,7 @@ from msg_adapters.slider_poses import FLAT, PLANAR, pose_of_message
 from push_predictor.errors import RequestError, TooLargeError
 from push_predictor.geometry.frames import yaw_of_quaternion
 from push_predictor.geometry.spatial import SpatialPose
-from push_predictor.models.domain_remark import OUT_OF_DOMAIN
+from push_predictor.models.request import OUT_OF_DOMAIN
 from push_predictor.planning.rollout import A_COVARIANCE, FARTHEST, MOST_PARTICLES, Rollout, is_covariance
 from push_predictor.types import Array
 

@@ -24,7 +24,7 @@ from benchmarks.models.peers import Measured, square_rows
 from benchmarks.models.training import cpu_seconds
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.gaussian_process.prediction import exact_log_density
-from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.types import Array
 

@@ -29,8 +29,7 @@ from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.evaluation.push_scores import by_push
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap
 from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.predictors.correlation import Correlation
-from push_predictor.models.predictors.correlation_fit import fit_correlation
+from push_predictor.models.predictors.correlation import Correlation, fit_correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
@@ -77,7 +76,7 @@ def judged(model: PushModel, test: PushTable, cpu: float) -> Judged:
     """Score a learned model on windows that it was not trained on."""
     assert isinstance(model.predictor, GaussianProcessPredictor)
     start = time.process_time()
-    correlation = fit_correlation(model.predictor, model.training.push_id)
+    correlation = fit_correlation(model.predictor.regressions, model.training.push_id)
     of_correlation = time.process_time() - start
     constant = replace(correlation, bandwidth=EVERYWHERE) if correlation else None
     columns = [_nlpd(model, kind, test) for kind in (correlation, constant, None)]

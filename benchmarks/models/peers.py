@@ -32,7 +32,7 @@ from benchmarks.models.training import cpu_seconds, fit_reference, made_up_pushe
 from push_predictor.evaluation.splits import random_split, split_by_push
 from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density, gaussian_log_density
-from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.train_learnt import fitted_mean

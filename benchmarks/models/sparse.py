@@ -40,7 +40,7 @@ from benchmarks.models.peers import (
 )
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.features import push_features
-from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import random_pushes

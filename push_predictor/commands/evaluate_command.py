@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.validation import compare, metrics_json
     from push_predictor.models.request import check_table
     from push_predictor.models.store.model_file import load_model
-    from push_predictor.models.supports import on_supports
+    from push_predictor.models.train_mechanics import on_supports
     from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, known_rig, load_data
     from push_predictor.recordings.rig import load_rig

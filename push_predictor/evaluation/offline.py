@@ -17,7 +17,7 @@ from push_predictor.evaluation.validation import Comparison, compare, comparison
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.supports import on_supports
+from push_predictor.models.train_mechanics import on_supports
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig

@@ -39,6 +39,7 @@ USUAL_SPEED, USUAL_DURATION = 0.02, 0.2  # m/s, s: of the pushes of an untrained
 DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
 SMALLEST_LARGE = 100  # rows of a matrix on which a BLAS may use several threads
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
+_ANY_THREADS = nullcontext()
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class PushModel:
         """
         push = Push(inputs, duration, covariates or {})
         inside = self.in_domain(inputs) & self.covariates_seen(push)
-        with one_blas_thread() if self._has_large_matrices else nullcontext():
+        with one_blas_thread() if self._has_large_matrices else _ANY_THREADS:
             return Prediction(*self.predictor.moments(push), inside, self.predictor.tails)
 
     @property

@@ -1,7 +1,10 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The rules of a request: which pushes a model predicts. Services, command line and library share them."""
+"""The rules of a request: which pushes a model predicts, and what to remark on those far from its training data.
+
+Services, command line and library share them.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from push_predictor.errors import CovariateError, RequestError
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
@@ -39,6 +42,7 @@ UNITS = {
     "free_force_x": "N",
     "free_force_y": "N",
 }  # of the covariates that every window has; the unit of a recorded topic is its publisher's
+OUT_OF_DOMAIN = "out of domain"
 FARTHEST = 1.0  # m per push; the mechanics are integrated along the path
 
 
@@ -91,7 +95,7 @@ def check_pushes(model: PushModel, pushes: Pushes) -> None:
     else:
         velocity, contact, angle = pushes.inputs[0].tolist()
         covariates = {name: float(column[0]) for name, column in needed.items()}
-        check_request(model, PushRequest(velocity, contact, angle, float(pushes.duration[0]), covariates))
+        _check(model, velocity, contact, angle, float(pushes.duration[0]), covariates)
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
@@ -160,3 +164,34 @@ def _at(values: object, index: int) -> object:
 
 def _finite_number(covariate: str) -> str:
     return f"a finite number, in {UNITS[covariate]}" if covariate in UNITS else "a finite number"
+
+
+def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
+    """What a client should know of n predicted pushes, of which in_domain (n,) are in the domain; empty if all are.
+
+    The text begins with OUT_OF_DOMAIN, and names what is outside for the first push that is.
+    """
+    if in_domain.all():
+        return ""
+    count, first, outside = len(in_domain), int(in_domain.argmin()), int(np.count_nonzero(~in_domain))
+    which = "" if count == 1 else f"{outside} of {count} pushes, first push {first}: "
+    return f"{OUT_OF_DOMAIN}: {which}{_reason(model, push, first)}"
+
+
+def _reason(model: PushModel, push: Push, row: int) -> str:
+    """What of a push is outside."""
+    velocity, contact, angle = push.inputs[row].tolist()
+    limits, outside = model.input_limits, []
+    for name, value, (low, high) in (("velocity", velocity, limits.velocity), ("angle", angle, limits.angle)):
+        if not low <= value <= high:
+            outside.append(_outside(name, name, value, f"{low:.4g} to {high:.4g}"))
+    covariates = model.predictor.completed(push.take(slice(row, row + 1))).covariates
+    for name, known in model.covariate_ranges.items():
+        if not known.contains(covariates[name])[0]:
+            outside.append(_outside(f"covariate {name}", name, float(covariates[name][0]), str(known)))
+    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
+
+
+def _outside(title: str, name: str, value: float, accepted: str) -> str:
+    unit = f" {UNITS[name]}" if name in UNITS else ""
+    return f"{title} {value:.4g}{unit}, training covers {accepted}{unit}"

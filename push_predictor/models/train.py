@@ -13,19 +13,17 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING
+from push_predictor.models.gaussian_process.sparse_vhgp import DEFAULT_INDUCING
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
-from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.forward import mechanics_on
 from push_predictor.models.mechanics.ladder import Rung
-from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import (
     GaussianProcessPredictor,
-    MechanicsPredictor,
     Predictor,
     PriorPredictor,
 )
-from push_predictor.models.push_model import KINDS, Provenance, PushModel
-from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_about, train_learnt
+from push_predictor.models.push_model import KINDS, LEARNT, Provenance, PushModel
+from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_learnt
 from push_predictor.models.train_mechanics import predictor_about, prior_predictor, sharpened, train_mechanics
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -52,7 +50,7 @@ class TrainingOptions:
     that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about
     which the residual is learnt, zero, or auto, which takes mechanics unless zero predicts held-out pushes clearly
     better. about: mechanics to learn about, as they are; mean is then not used. per_path: of a learnt model: whether
-    outcomes are learnt per path length of the tip (predictors/scaling.py); without it, as they are, as in Bauza and
+    outcomes are learnt per path length of the tip (models/features.py); without it, as they are, as in Bauza and
     Rodriguez 2017. tails: of a learnt model: whether to fit the distribution of new pushes (predictors/tails.py);
     without it, windows of a push are taken for independent.
     """
@@ -123,29 +121,16 @@ def _predictor(
     rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
 ) -> tuple[Predictor, list[Rung]]:
     inducing = inducing_inputs(kind, len(rows), options.inducing)
-    if kind == "prior":
-        watch("train prior", 0.1)
-        return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
-    if kind != "analytical":
-        learnt = LearntOptions(kind, inducing, options.mean, options.tails, options.per_path)
-        if options.about is not None:
-            return train_about(options.about, rows, rig, learnt), []
+    if kind in LEARNT:
+        learnt = LearntOptions(kind, inducing, options.mean, options.about, options.tails, options.per_path)
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
-    if options.fit:
-        return _fitted(rows, rig, options, watch)
-    return predictor_about(analytical_mechanics(rig.outline, rig.pusher_radius), rows), []
-
-
-def _fitted(rows: PushTable, rig: Rig, options: TrainingOptions, watch: Watch) -> tuple[MechanicsPredictor, list[Rung]]:
-    search = _spread(rows, MOST_SEARCHED_ROWS, options.seed)
-    trained = train_mechanics(_mechanics(rig, options), rows, search, watch)
-    return trained.predictor, trained.ladder
-
-
-def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
-    support = None if rig.support_points is None or options.supports else supported_at(rig.support_points)
-    supports = {number: supported_at(points) for number, points in options.supports.items()}
-    return PushMechanics(rig.outline, rig.pusher_radius, support, supports)
+    if kind == "analytical" and not options.fit:
+        return predictor_about(analytical_mechanics(rig.outline, rig.pusher_radius), rows), []
+    mechanics = mechanics_on(rig.outline, rig.pusher_radius, rig.support_points, options.supports)
+    if kind == "analytical":
+        return train_mechanics(mechanics, rows, _spread(rows, MOST_SEARCHED_ROWS, options.seed), watch)
+    watch("train prior", 0.1)
+    return sharpened(prior_predictor(mechanics, rig, options.seed), rows, options.seed), []
 
 
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:

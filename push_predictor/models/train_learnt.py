@@ -11,21 +11,26 @@ from typing import Literal
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.features import push_features
-from push_predictor.models.gaussian_process.gp import SHORTEST, fit_gp
+from push_predictor.models.features import push_features, within
+from push_predictor.models.gaussian_process.gp import (
+    ROUGH_STOP,
+    SHORTEST,
+    STOP,
+    GaussianProcess,
+    GpParameters,
+    fit_gp,
+)
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant
-from push_predictor.models.gaussian_process.sparse.vhgp import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.fit import fit_jointly, held_out_residuals
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.forward import mechanics_on
 from push_predictor.models.mechanics.ladder import candidates
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import GaussianProcessPredictor, Scaling
-from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
-from push_predictor.models.predictors.scaling import within
+from push_predictor.models.predictors.correlation import MOST_BLOCKS, fit_correlation
 from push_predictor.models.predictors.tails import fit_tails
 from push_predictor.models.pushes import Push
 from push_predictor.models.train_mechanics import fit_rows
@@ -49,14 +54,18 @@ EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by
 class LearntOptions:
     """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
 
-    tails: whether to fit the distribution of new pushes. per_path: whether outcomes are learnt per path length.
+    about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new
+    pushes. per_path: whether outcomes are learnt per path length. stop: relative decrease of the likelihood at which
+    the search of a gp ends.
     """
 
     kind: str
     inducing: int | None = None
     mean: MeanChoice = "auto"
+    about: FittedMechanics | None = None
     tails: bool = True
     per_path: bool = True
+    stop: float = STOP
 
 
 def train_learnt(
@@ -68,16 +77,20 @@ def train_learnt(
     outcomes that do not vary, and for options that the kind does not have.
     """
     _check_rows(rows, rig)
-    about = None
-    if options.mean != "zero":
+    about, near = None, None
+    if options.about is not None:
+        about = FittedMean(options.about, rows.outcomes - _moved(options.about, rows))
+    elif options.mean != "zero":
         watch(f"train {options.kind}: mechanics as mean", 0.0)
         about = fitted_mean(of_mean, rig)
-    if about is not None and options.mean == "auto":
+    if options.about is None and about is not None and options.mean == "auto":
         watch(f"train {options.kind}: choice of the mean", 0.2)
-        each = [_trained(of_mean, rig, replace(options, kind="gp", inducing=None), mean) for mean in (None, about)]
+        rough = replace(options, kind="gp", inducing=None, stop=ROUGH_STOP)
+        each = [_trained(of_mean, rig, rough, mean) for mean in (None, about)]
         zero, mechanics = (trained.density(of_mean) for trained in each)
         about = None if zero_is_better(zero, mechanics) else about
-    trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9))
+        near = each[0 if about is None else 1].predictor
+    trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9), near)
     return _completed(trained, rows, options, watch)
 
 
@@ -92,17 +105,10 @@ def zero_is_better(zero: Array, mechanics: Array) -> bool:
     return len(gain) > 1 and bool(gain.sum() > np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
-def train_about(mean: FittedMechanics, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
-    """The predictor of residuals about mechanics that were fitted to other rows. Raises as `train_learnt`."""
-    _check_rows(rows, rig)
-    about = FittedMean(mean, rows.outcomes - _moved(mean, rows))
-    return _completed(_trained(rows, rig, options, about), rows, options, no_watch)
-
-
 def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch: Watch) -> GaussianProcessPredictor:
     """The predictor with what only held-out pushes show: the correlation of the outputs, and the tails."""
     watch(f"train {options.kind}: correlation of the outputs", 0.9)
-    predictor = replace(trained.predictor, correlation=fit_correlation(trained.predictor, rows.push_id))
+    predictor = replace(trained.predictor, correlation=fit_correlation(trained.predictor.regressions, rows.push_id))
     if not options.tails:
         return predictor
     watch(f"train {options.kind}: tails", 0.95)
@@ -127,8 +133,7 @@ def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
     Those that need a covariate stay at their textbook values, so that a push needs nothing else than before. So does
     inertia where all pushes are slow.
     """
-    support = None if rig.support_points is None else supported_at(rig.support_points)
-    mechanics, known = PushMechanics(rig.outline, rig.pusher_radius, support), fit_rows(rows)
+    mechanics, known = mechanics_on(rig.outline, rig.pusher_radius, rig.support_points), fit_rows(rows)
     names = [name for name in candidates(mechanics, known) if not BY_NAME[name].needs]
     if float(rows.inputs[:, 0].max()) < QUASI_STATIC:
         names = [name for name in names if name != "inertia"]
@@ -168,8 +173,14 @@ class _Trained:
 
 
 def _trained(
-    rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch = no_watch
+    rows: PushTable,
+    rig: Rig,
+    options: LearntOptions,
+    about: FittedMean | None,
+    watch: Watch = no_watch,
+    near: GaussianProcessPredictor | None = None,
 ) -> _Trained:
+    """near: GPs of some of the rows about the same mean, where the search of a VHGP begins."""
     mean = None if about is None else about.mean
     path = rows.inputs[:, 0] * rows.duration
     size = (path / path.mean() if options.per_path else np.ones(len(path)))[:, None]
@@ -181,10 +192,12 @@ def _trained(
     if options.per_path:
         scaling = replace(scaling, travel=float(path.mean()))
     features, block = scaling.features(rig.outline, rows.inputs), _blocks(rows)
+    starts = _starts(near, scaling)
     regressions: list[Regression] = []
     for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
         watch(f"train {options.kind}: {OUTPUTS[k]}", k / len(OUTPUTS))
-        regression = _learnt(features, column, options, SHORTEST if mean is None else SHORTEST_OF_RESIDUAL)
+        shortest = SHORTEST if mean is None else SHORTEST_OF_RESIDUAL
+        regression = _learnt(features, column, options, shortest, starts[k])
         if mean is not None:
             constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
             regression = best_held_out([constant, regression], block, seen)
@@ -207,11 +220,20 @@ def _blocks(rows: PushTable) -> IntArray:
     return np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
 
 
-def _learnt(features: Array, column: Array, options: LearntOptions, shortest: float) -> Regression:
+def _starts(near: GaussianProcessPredictor | None, scaling: Scaling) -> list[GpParameters | None]:
+    """Hyperparameters of each output's GP, where there is one of the same features."""
+    if near is None or near.scaling.columns != scaling.columns:
+        return [None] * len(OUTPUTS)
+    return [one.parameters if isinstance(one, GaussianProcess) else None for one in near.regressions]
+
+
+def _learnt(
+    features: Array, column: Array, options: LearntOptions, shortest: float, start: GpParameters | None
+) -> Regression:
     if options.kind == "gp":
-        return fit_gp(features, column, shortest=shortest)
+        return fit_gp(features, column, shortest=shortest, stop=options.stop)
     if options.inducing is None:
-        return fit_vhgp(features, column, shortest=shortest)
+        return fit_vhgp(features, column, start=start, shortest=shortest)
     return fit_sparse_vhgp(features, column, options.inducing)
 
 

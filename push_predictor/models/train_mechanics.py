@@ -1,56 +1,43 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Training of models that are mechanics: fitted by the ladder, or a prior that pushes update."""
+"""Models that are mechanics: fitted by the ladder, a prior that pushes update, or moved to other supports."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.models.mechanics.draws import normal_draws, prior_draws
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.forward import PushMechanics, mechanics_on
 from push_predictor.models.mechanics.ladder import Rung, climb
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import (
-    ProcessNoise,
-    drawn_parameters,
-    normal_draws,
-    prior_draws,
-    prior_spreads,
-    updated,
-)
-from push_predictor.models.predictors import MechanicsPredictor, PriorPredictor
+from push_predictor.models.mechanics.prior import ProcessNoise, drawn_parameters, prior_spreads, updated
+from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor, PriorPredictor
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 from push_predictor.watch import Watch, no_watch
 
 
-@dataclass(frozen=True, eq=False)
-class TrainedMechanics:
-    """A predictor of fitted mechanics, and the ladder that chose its parameters."""
-
-    predictor: MechanicsPredictor
-    ladder: list[Rung]
-
-
 def train_mechanics(
     mechanics: PushMechanics, rows: PushTable, search: PushTable, watch: Watch = no_watch
-) -> TrainedMechanics:
+) -> tuple[MechanicsPredictor, list[Rung]]:
     """Choose the free parameters on the rows `search`, fit them to all rows, and take the covariance of those.
 
-    Raises TrainingError for fewer than two rows.
+    Returns the ladder of parameters too. Raises TrainingError for fewer than two rows.
     """
     ladder = climb(mechanics, fit_rows(search), watch)
     last = ladder[-1].fit
     if len(search) < len(rows):
         watch("fit mechanics: all rows", 0.9)
         last = fit_jointly(mechanics, fit_rows(rows), last.names, last.values)
-    return TrainedMechanics(predictor_about(FittedMechanics(mechanics, last.values, last.covariance), rows), ladder)
+    return predictor_about(FittedMechanics(mechanics, last.values, last.covariance), rows), ladder
 
 
 def predictor_about(fitted: FittedMechanics, rows: PushTable) -> MechanicsPredictor:
@@ -75,7 +62,7 @@ def prior_predictor(mechanics: PushMechanics, rig: Rig, seed: int = 0) -> PriorP
     means = {name: known.get(name, BY_NAME[name].textbook) for name in names}
     within = {name: float(np.clip(mean, BY_NAME[name].low, BY_NAME[name].high)) for name, mean in means.items()}
     fitted = FittedMechanics(mechanics, within, np.diag(prior_spreads(names) ** 2))
-    return PriorPredictor(fitted, prior_draws(names, _values(within), seed), ProcessNoise())
+    return PriorPredictor(fitted, prior_draws(fitted, seed), ProcessNoise())
 
 
 def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPredictor:
@@ -83,13 +70,28 @@ def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPr
     if not len(rows):
         return before
     mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
-    push = np.unique(rows.push_id, return_inverse=True)[1]
-    fit_rows = FitRows(rows.inputs, rows.duration, rows.outcomes, push, rows.covariates)
-    found = updated(mechanics, names, _values(before.fitted.values), fit_rows, before.fitted.ellipsoid.length)
+    found = updated(mechanics, names, _values(before.fitted.values), fit_rows(rows), before.fitted.ellipsoid.length)
     values = dict(zip(names, found.values.tolist(), strict=True))
-    draws = normal_draws(names, found.values, found.covariance, seed)
-    return PriorPredictor(FittedMechanics(mechanics, values, found.covariance), draws, found.noise)
+    fitted = FittedMechanics(mechanics, values, found.covariance)
+    return PriorPredictor(fitted, normal_draws(fitted, seed), found.noise)
 
 
 def _values(values: Mapping[str, float]) -> Array:
     return np.array(list(values.values()))
+
+
+def on_supports(model: PushModel, rig: Rig | None, supports: Mapping[int, Array]) -> PushModel:
+    """The model for recordings on these supports; itself unless it knows the supports of several recordings.
+
+    supports: support points (k, 3) as in Rig, by number of the recording; empty if all stand on those of the rig.
+    """
+    base = model.predictor.base
+    if not isinstance(base, MechanicsPredictor | GaussianProcessPredictor):
+        return model
+    known = base.fitted if isinstance(base, MechanicsPredictor) else base.mean
+    if known is None or not known.mechanics.supports or (rig is None and not supports):
+        return model
+    points = None if rig is None else rig.support_points
+    moved = replace(known, mechanics=mechanics_on(known.outline, known.mechanics.pusher_radius, points, supports))
+    again = replace(base, fitted=moved) if isinstance(base, MechanicsPredictor) else replace(base, mean=moved)
+    return replace(model, predictor=model.predictor.with_base(again))

@@ -14,11 +14,10 @@ import numpy as np
 from push_predictor.errors import ContactError, CovariateError, RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
-from push_predictor.models.domain_remark import domain_remark
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.request import PushRequest, check_request
+from push_predictor.models.request import PushRequest, check_request, domain_remark
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions

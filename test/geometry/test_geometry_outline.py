@@ -100,7 +100,6 @@ def test_point_off_the_outline_projects_back_to_its_contact(outline, offset):
     assert found.normal == pytest.approx(-outline.inward_normal(contact), abs=1e-6)
 
 
-@settings(max_examples=100, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
     point = np.array([[x, y]])
@@ -129,7 +128,6 @@ def winds_around(outline: Outline, point: Array) -> bool:
     return bool(abs(turned.sum()) > np.pi)
 
 
-@settings(max_examples=150, deadline=None)
 @given(polygons(), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_projection_on_any_polygon_is_the_nearest_point_of_all_edges(outline: Outline, x: float, y: float) -> None:
     point, ends = np.array([x, y]), np.roll(outline.vertices, -1, axis=0)
@@ -150,7 +148,6 @@ def test_projection_on_any_polygon_is_the_nearest_point_of_all_edges(outline: Ou
     assert outline.point(found.contact) == pytest.approx(found.point, abs=1e-9)
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     st.floats(0.01, 0.1), st.floats(0.01, 0.1), st.tuples(*[st.floats(-0.1, 0.1)] * 2, st.floats(-3.0, 3.0)),
     st.floats(-0.2, 0.2), st.floats(-0.2, 0.2),
@@ -191,7 +188,6 @@ def test_a_point_that_is_not_finite_has_no_nearest_one(outline: Outline, bad: fl
     assert np.isfinite(found.distance[[0, 2]]).all() and np.array_equal(found.point[0], found.point[2])
 
 
-@settings(max_examples=100, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_normal_outside_points_from_the_nearest_point_to_the_query(outline, x, y):
     point = np.array([[x, y]])
@@ -250,7 +246,6 @@ def test_distance_is_constant_along_an_edge(name, radius, contact):
     assert outline.project(at).distance[0] == pytest.approx(radius, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(some_outline, contacts)
 def test_contact_is_recovered_from_edge_and_fraction(outline, contact):
     edge, fraction = outline.edge(np.array([contact]))

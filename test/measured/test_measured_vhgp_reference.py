@@ -18,8 +18,8 @@ import pytest
 from mit_square_fits import fit_scaled, load_square
 from scipy.interpolate import RBFInterpolator
 
+from push_predictor.models.gaussian_process.bound import JITTER
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.parameters import JITTER
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
 from push_predictor.types import Array

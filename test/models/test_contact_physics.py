@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from forward_pushes import RADIUS, mechanics
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lynch import Instant, lynch
 
@@ -127,7 +127,6 @@ def test_very_high_friction_sticks_unless_the_pusher_would_have_to_pull(kind: st
         assert np.array_equal(sticks, np.abs(wanted) < np.arctan(1e3) - 1e-9)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.floats(0.0, 0.999), st.floats(-1.45, 1.45), st.floats(0.0, 1.5), st.sampled_from(KINDS))
 def test_turn_direction_follows_mason_voting_theorem(contact: float, angle: float, friction: float, kind: str) -> None:
     """Mason 1986: two of the push direction and the two edges of the friction cone agree on the side to turn to."""

@@ -11,21 +11,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from synthetic import square_rig
 
 from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.predictors import GaussianProcessPredictor, correlation_fit
-from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
-from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import correlation as correlation_module
+from push_predictor.models.predictors.correlation import (
+    FEWEST_PUSHES,
+    LONGEST,
+    Correlation,
+    correlated,
+    correlations,
+    covariances,
+    fit_correlation,
+)
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.prediction_table import unbounded
 from push_predictor.models.tabulated.spline import table_moments
+from push_predictor.models.tabulated.table_nodes import unbounded
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -67,7 +75,7 @@ def alone(model: PushModel) -> GaussianProcessPredictor:
 
 def with_fitted_correlation(model: PushModel) -> GaussianProcessPredictor:
     """Its predictor with a correlation that is fitted again."""
-    return replace(alone(model), correlation=fit_correlation(alone(model), model.training.push_id))
+    return replace(alone(model), correlation=fit_correlation(alone(model).regressions, model.training.push_id))
 
 
 def without(model: PushModel) -> PushModel:
@@ -90,7 +98,6 @@ def model() -> PushModel:
 moderate = st.floats(-4.0, 4.0)
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     features=arrays(float, (12, 2), elements=moderate),
     residuals=arrays(float, (12, 3), elements=moderate),
@@ -137,7 +144,6 @@ def bounded(numbers: Array) -> Array:
     return of_process
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
     latent=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
@@ -152,7 +158,6 @@ def test_outcome_process_and_their_difference_are_covariances(numbers: Array, la
         assert np.all(np.linalg.eigvalsh(covariance / sd[:, :, None] / sd[:, None, :]) > 0.0)
 
 
-@settings(max_examples=50, deadline=None)
 @given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
 def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
     matrices = bounded(numbers)
@@ -200,7 +205,7 @@ def test_no_correlation_is_fitted_to_independent_outputs() -> None:
             for r, column in zip(model.predictor.regressions, scaled.T, strict=True)
             if isinstance(r, GaussianProcess)
         )
-        found += fit_correlation(replace(model.predictor, regressions=regressions), table.push_id) is not None
+        found += fit_correlation(regressions, table.push_id) is not None
     assert found <= 1
 
 
@@ -229,8 +234,8 @@ def test_held_out_correlation_is_that_of_the_other_blocks(model: PushModel) -> N
 
 
 def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(correlation_fit, "MOST_ROWS", 150)
-    monkeypatch.setattr(correlation_fit, "MOST_BLOCKS", 30)
+    monkeypatch.setattr(correlation_module, "MOST_ROWS", 150)
+    monkeypatch.setattr(correlation_module, "MOST_BLOCKS", 30)
     whole = trained_once("gp")
     model = replace(whole, predictor=with_fitted_correlation(whole))
     correlation = correlation_of(model)

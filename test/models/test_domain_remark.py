@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from synthetic import square_pushes, square_rig
 
-from push_predictor.models.domain_remark import domain_remark
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.request import own_window
+from push_predictor.models.request import domain_remark, own_window
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import empty_table
 from push_predictor.types import Array

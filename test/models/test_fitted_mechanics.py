@@ -22,10 +22,9 @@ from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredict
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.supports import on_supports
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
-from push_predictor.models.train_mechanics import predictor_about
+from push_predictor.models.train_mechanics import on_supports, predictor_about
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 

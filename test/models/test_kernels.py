@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import KernelPosterior
-from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel
+from push_predictor.models.gaussian_process.posterior import KernelPosterior, NuggetKernel
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array
 
 KERNEL = ArdKernel(np.array([0.3, -0.4, 1.0]), 0.2)

@@ -7,7 +7,22 @@ from __future__ import annotations
 
 from repository import REPOSITORY
 
-from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, parameter_table
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+
+
+def parameter_table() -> str:
+    """All parameters as a Markdown table."""
+    head = ["| parameter | part | unit | textbook | range | prior sd | meaning |", "|" + " --- |" * 7]
+    rows = [
+        f"| `{p.name}` | {p.part} | {p.unit} | {p.textbook:g} | {minus(p.low)} to {minus(p.high)} | {p.spread:g} "
+        f"| {p.meaning}{' *' if p.needs else ''} |"
+        for p in PARAMETERS
+    ]
+    return "\n".join([*head, *rows])
+
+
+def minus(value: float) -> str:
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def test_the_docs_show_the_table_of_parameters() -> None:

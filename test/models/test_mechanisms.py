@@ -138,7 +138,7 @@ def test_a_plausible_parameter_lies_within_the_limit() -> None:
 # --- every mechanism on every outline --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("outline", ["ellip1", "ellip3", "tri"])
+@pytest.mark.parametrize("outline", ["ellip1", pytest.param("ellip3", marks=pytest.mark.long), "tri"])
 @EVERY_MECHANISM
 def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism, outline: str) -> None:
     response = mechanism.response(patched(outline), pushes(30))

@@ -297,7 +297,7 @@ def test_quantiles_of_tails_do_not_decrease(tailed: PushModel, tmp_path: Path) -
 @pytest.fixture(scope="module")
 def tailed() -> PushModel:
     """A model of enough pushes for tails."""
-    model = train_model(pushes(60), square_rig(), "gp", name="tailed")
+    model = train_model(pushes(60), square_rig(), "gp", name="tailed", options=TrainingOptions(mean="zero"))
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.tails is not None
     return model
 

@@ -18,10 +18,12 @@ from push_predictor.errors import ModelFileError, RequestError, RigError, Traini
 from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.mechanics.draws import DRAWS, normal_draws, prior_draws
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanics.prior import DRAWS, ProcessNoise, displacements, prior_spreads
+from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, displacements, prior_spreads
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
@@ -155,8 +157,8 @@ def test_windows_of_one_push_count_less_than_windows_of_many() -> None:
 
 def test_process_noise_is_what_variations_of_friction_and_pressure_do() -> None:
     shifts = np.array([[1e-3, 0.0, 0.0], [0.0, 2e-3, 0.02], [0.0, 0.0, 0.03]])
-    around = np.concatenate([np.zeros((1, 3)), shifts, -shifts])[None]
-    covariance = ProcessNoise(np.array([1.0, 4.0, 1.0])).covariance(around, np.array([0.004]), np.array([0.03]))
+    varied = np.concatenate([shifts, -shifts])[None]
+    covariance = ProcessNoise(np.array([1.0, 4.0, 1.0])).covariance(varied, np.array([0.004]), 0.03)
     along = 1e-6 + (0.05 * 0.004) ** 2 + 1e-8
     across = 4.0 * (4e-6 + (0.05 * 0.004) ** 2 + 1e-8)
     turn = 4e-4 + 9e-4 + (0.05 * 0.004 / 0.03) ** 2 + 1e-6
@@ -167,8 +169,8 @@ def test_process_noise_is_what_variations_of_friction_and_pressure_do() -> None:
 def test_process_noise_varies_parameters_to_both_sides_within_their_ranges() -> None:
     names = ("contact_friction", "centre_x", "centre_y")
     rows = ProcessNoise.changed(names, np.array([0.05, 0.0, 0.01]))
-    np.testing.assert_allclose(rows[:, 0], [0.05, 0.15, 0.05, 0.05, 0.0, 0.05, 0.05])
-    np.testing.assert_allclose(rows[:, 2], [0.01, 0.01, 0.01, 0.014, 0.01, 0.01, 0.006])
+    np.testing.assert_allclose(rows[:, 0], [0.15, 0.05, 0.05, 0.0, 0.05, 0.05])
+    np.testing.assert_allclose(rows[:, 2], [0.01, 0.01, 0.014, 0.01, 0.01, 0.006])
 
 
 @pytest.mark.parametrize(
@@ -227,6 +229,47 @@ def test_the_same_seed_gives_the_same_model(untrained: PushModel) -> None:
     assert predictor_of(again).draws.shape == (DRAWS, len(predictor_of(again).fitted.values))
 
 
+def test_draws_have_the_covariance_of_the_priors_along_all_that_pushes_show(untrained: PushModel) -> None:
+    fitted = predictor_of(untrained).fitted
+    names, values = tuple(fitted.values), np.array(list(fitted.values.values()))
+    spread, inputs, duration = prior_spreads(names), some_inputs(30, 2), np.full(30, 0.2)
+    steps = np.diag(0.1 * spread)
+    found = displacements(
+        fitted.mechanics, names, np.concatenate([values + steps, values - steps]), inputs, duration, {}
+    )
+    slopes = (found[:, : len(names)] - found[:, len(names) :]) / 0.2
+    deviates = (prior_draws(fitted, 3) - values) / spread
+    drawn = np.einsum("npk,pq,nqk->nk", slopes, deviates.T @ deviates / DRAWS, slopes)
+    np.testing.assert_allclose(drawn, np.einsum("npk,npk->nk", slopes, slopes), rtol=0.05)
+
+
+def test_draws_of_a_posterior_have_its_mean_and_its_correlations(after_ten: PushModel) -> None:
+    fitted = predictor_of(after_ten).fitted
+    values = {name: (0.5 if name == "contact_friction" else value) for name, value in fitted.values.items()}
+    inside = FittedMechanics(fitted.mechanics, values, fitted.covariance)
+    away = normal_draws(inside, 0) - list(values.values())
+    names, spread = list(values), np.sqrt(np.diagonal(fitted.covariance))
+    np.testing.assert_allclose(away.mean(axis=0) / spread, 0.0, atol=1e-9)
+    one, other = names.index("contact_friction"), names.index("centre_x")
+    drawn, true = away.T @ away / DRAWS, fitted.covariance
+    for row, column in ((one, one), (other, other), (one, other)):
+        scale = spread[row] * spread[column]
+        np.testing.assert_allclose(drawn[row, column] / scale, true[row, column] / scale, atol=0.1)
+
+
+def test_mirror_images_of_prior_draws_are_draws(untrained: PushModel) -> None:
+    predictor = predictor_of(untrained)
+    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in predictor.fitted.values])
+    distance = np.abs((predictor.draws * sign)[:, None] - predictor.draws).max(axis=2)
+    assert distance.min(axis=1).max() < 1e-12
+
+
+def test_squares_of_deviates_vary_over_the_draws(untrained: PushModel) -> None:
+    fitted = predictor_of(untrained).fitted
+    deviates = (prior_draws(fitted, 0) - list(fitted.values.values())) / prior_spreads(tuple(fitted.values))
+    assert np.var(np.square(deviates), axis=0).mean() > 0.5  # of a Gaussian 2, of a two-level design 0
+
+
 def test_priors_use_what_the_rig_knows() -> None:
     on_points = train_model(empty_table(), replace(RIG, contact_friction=0.6), "prior", name="p")
     patch = train_model(empty_table(), square_rig(), "prior", name="p")
@@ -277,12 +320,12 @@ def test_trained_model_returns_from_its_file_with_its_noise(after_ten: PushModel
 
 
 @pytest.mark.parametrize(
-    "draws", [np.zeros((4, 3)), np.zeros((1, 16)), *(np.full((64, 16), value) for value in (9.0, -9.0, np.nan))]
+    "draws", [np.zeros((4, 3)), np.zeros((1, 16)), *(np.full((DRAWS, 16), value) for value in (9.0, -9.0, np.nan))]
 )
 def test_rejects_damaged_draws(untrained: PushModel, tmp_path: Path, draws: Array) -> None:
     untrained.save(tmp_path / "m.pushmodel")
     record, arrays = read_archive(tmp_path / "m.pushmodel")
-    assert arrays["predictor.draws"].shape == (64, 16)
+    assert arrays["predictor.draws"].shape == (DRAWS, 16)
     (tmp_path / "bad.npz").write_bytes(archived(record, {**arrays, "predictor.draws": draws}))
     with pytest.raises(ModelFileError, match="draws"):
         load_model(tmp_path / "bad.npz")

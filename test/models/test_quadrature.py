@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from push_predictor.models.gaussian_process.prediction import (
     LatentPrediction,
@@ -16,13 +18,17 @@ from push_predictor.models.gaussian_process.prediction import (
     exact_log_density,
     gaussian_log_density,
 )
-from push_predictor.types import Array
 
 
 def prediction(
     mean: float, variance: float, log_noise: float, log_noise_variance: float, m: int = 1
 ) -> LatentPrediction:
     return LatentPrediction(*(np.full(m, value) for value in (mean, variance, log_noise, log_noise_variance)))
+
+
+def normal_density(x: float, mean: float, sd: float) -> float:
+    """As scipy.stats has it, which takes a hundred times as long for a single number."""
+    return float(np.exp(-0.5 * ((x - mean) / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
 def density(at: float, of: LatentPrediction) -> float:
@@ -34,14 +40,15 @@ def density(at: float, of: LatentPrediction) -> float:
 def test_density_and_cdf_equal_adaptive_integration(d: float, outcome: float) -> None:
     of = prediction(0.3, 0.05, -1.0, d**2)
 
-    def integral(function: Array) -> float:
+    def integral(function: Callable[[float, float, float], float]) -> float:
         def integrand(g: float) -> float:
-            return float(function(outcome, 0.3, np.sqrt(0.05 + np.exp(g))) * norm.pdf(g, -1.0, d))
+            return function(outcome, 0.3, np.sqrt(0.05 + np.exp(g))) * normal_density(g, -1.0, d)
 
         return float(quad(integrand, -1 - 12 * d, -1 + 12 * d, epsabs=1e-14, epsrel=1e-12, limit=400)[0])
 
-    assert density(outcome, of) == pytest.approx(integral(norm.pdf), rel=1e-6)
-    assert exact_cdf(of, np.array([outcome]))[0] == pytest.approx(integral(norm.cdf), abs=1e-8)
+    assert density(outcome, of) == pytest.approx(integral(normal_density), rel=1e-6)
+    below = integral(lambda x, mean, sd: float(ndtr((x - mean) / sd)))
+    assert exact_cdf(of, np.array([outcome]))[0] == pytest.approx(below, abs=1e-8)
 
 
 def test_moments_are_those_of_the_matched_gaussian() -> None:
@@ -57,7 +64,7 @@ def test_a_known_noise_level_makes_both_densities_the_same() -> None:
     outcomes = np.linspace(-3, 3, 9)
     np.testing.assert_allclose(exact_log_density(of, outcomes), gaussian_log_density(of, outcomes), atol=1e-12)
     np.testing.assert_allclose(
-        exact_cdf(of, outcomes), norm.cdf(outcomes, 0.2, np.sqrt(0.1 + np.exp(-0.5))), atol=1e-12
+        exact_cdf(of, outcomes), ndtr((outcomes - 0.2) / np.sqrt(0.1 + np.exp(-0.5))), atol=1e-12
     )
 
 

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from sparse_rows import PARAMETERS, rows
 
-from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
+from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
-from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel, inducing_rows
-from push_predictor.models.gaussian_process.sparse.vhgp import noise_prior
+from push_predictor.models.gaussian_process.sparse_vhgp import noise_prior
 from push_predictor.types import Array
 
 
@@ -31,7 +30,7 @@ def test_bound_equals_dense_one_if_every_row_is_inducing() -> None:
     dense = Bound.tied(VhgpProblem.of(inputs, outputs, PARAMETERS), sites)
     sparse = Bound.tied(problem(60, 60, 60), sites)
     assert sparse.value == pytest.approx(dense.value, abs=1e-6)
-    np.testing.assert_allclose(sparse.optimal_precisions, dense.optimal_precisions, atol=1e-6)
+    np.testing.assert_allclose(sparse.signal.optimal_precisions, dense.signal.optimal_precisions, atol=1e-6)
 
 
 def test_maximum_over_q_equals_that_of_the_dense_bound() -> None:
@@ -151,7 +150,7 @@ def test_held_out_prediction_is_that_of_the_dense_matrices_and_has_what_is_unexp
     found, sites = problem(n, 12, 9), np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
     bound = Bound.tied(found, sites)
     held_out = bound.held_out(block)
-    level = bound.noise_level
+    level = bound.signal.level
     kernels = (found.signal, 1.0 / (level + PARAMETERS.jitter), level), (found.noise, sites, 1.0 / sites)
     for (kernel, weights, own), variance in zip(kernels, (held_out.variance, held_out.log_noise_variance), strict=True):
         explained = np.column_stack([kernel.times(column) for column in np.eye(n)])

@@ -15,13 +15,13 @@ from sparse_rows import PARAMETERS, rows
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.sparse import vhgp as sparse_fit
-from push_predictor.models.gaussian_process.sparse.kernel import inducing_rows
-from push_predictor.models.gaussian_process.sparse.vhgp import DEFAULT_INDUCING, SparseVHGP, fit_sparse_vhgp
+from push_predictor.models.gaussian_process import sparse_vhgp as sparse_fit
+from push_predictor.models.gaussian_process.inducing import inducing_rows
+from push_predictor.models.gaussian_process.sparse_vhgp import DEFAULT_INDUCING, SparseVHGP, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.grid_posterior import sparse_grid_regression
+from push_predictor.models.tabulated.grid_posterior import GridRegression, on_grid
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
 from push_predictor.recordings.table import PushTable
@@ -114,7 +114,8 @@ def test_held_out_prediction_does_not_depend_on_the_row_itself() -> None:
 
 
 def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
-    regression = sparse_grid_regression(fitted)
+    regression = on_grid(fitted)
+    assert isinstance(regression, GridRegression)
     axes = np.linspace(-1.0, 1.0, 7), np.linspace(-1.5, 1.0, 5)
     points = fitted.predict(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
     assert regression.noise is not None
@@ -126,9 +127,9 @@ def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
         factors = [
             np.exp(-0.5 * ((axis[:, None] - posterior.inputs[:, d]) / scale[d]) ** 2) for d, axis in enumerate(axes)
         ]
-        on_grid = posterior.moments(factors)
-        np.testing.assert_allclose(on_grid[0].ravel() + prior, mean, atol=1e-9)
-        np.testing.assert_allclose(on_grid[1].ravel(), variance, rtol=1e-7)
+        found = posterior.moments(factors)
+        np.testing.assert_allclose(found[0].ravel() + prior, mean, atol=1e-9)
+        np.testing.assert_allclose(found[1].ravel(), variance, rtol=1e-7)
 
 
 def test_prediction_far_from_data_is_the_prior(fitted: SparseVHGP) -> None:
@@ -203,7 +204,7 @@ def test_sparse_push_model_is_trained_saved_loaded_and_tabulated(tmp_path: Path)
     push = rows.inputs[:40], rows.duration[:40]
     np.testing.assert_array_equal(again.predict_rows(*push).covariance, model.predict_rows(*push).covariance)
     tabulated = tabulate(again)
-    assert tabulated.domain is not None, tabulated.how
+    assert tabulated.tabulated, tabulated.how
     variance = np.diagonal(model.predict_rows(*push).covariance, axis1=1, axis2=2)
     of_table = np.diagonal(tabulated.predict_rows(*push).covariance, axis1=1, axis2=2)
     np.testing.assert_allclose(of_table, variance, rtol=1e-2)

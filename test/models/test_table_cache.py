@@ -27,7 +27,6 @@ from push_predictor.models.store.table_cache import (
     as_served,
     completed,
     keep_tables,
-    load_at_once,
     load_served,
     table_folder,
     tables_of,
@@ -155,7 +154,7 @@ def test_a_model_without_tables_predicts_exactly_until_they_are_computed(
     found = after.predict_rows(rows.inputs, rows.duration)
     assert np.max(np.abs(found.mean - exact.mean) / exact.std) < 1e-3
     monkeypatch.setattr(table_cache, "tabulate", never)
-    kept = load_at_once(file)  # the table is on disk now
+    kept = load_served(file, at_once=True)  # the table is on disk now
     assert kept.tabulated and completed(kept) is kept and completed(after) is after
 
 

@@ -13,14 +13,13 @@ import pytest
 from likelihoods import bound_and_gradient, log_marginal_likelihood
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import Found
 from push_predictor.models.gaussian_process.fit import _noise_at as noise_at
 from push_predictor.models.gaussian_process.fit import _search as search_of
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
 
@@ -106,9 +105,9 @@ def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
 def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
     problem = VhgpProblem.of(*rows(60), PARAMETERS)
     best = maximise_over_noise(problem, None, 1e-13)
-    np.testing.assert_allclose(best.mean_weights, best.site_precisions - 0.5, atol=1e-5)
-    np.testing.assert_allclose(best.optimal_precisions, best.site_precisions, atol=1e-5)
-    assert Bound.tied(problem, best.site_precisions).value == pytest.approx(best.value, abs=1e-8)
+    np.testing.assert_allclose(best.mean_weights, best.sites.precisions - 0.5, atol=1e-5)
+    np.testing.assert_allclose(best.signal.optimal_precisions, best.sites.precisions, atol=1e-5)
+    assert Bound.tied(problem, best.sites.precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
 def test_q_of_a_loose_search_has_one_parameter_per_row() -> None:

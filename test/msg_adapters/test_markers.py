@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2, f, norm, t
 from visualization_msgs.msg import Marker, MarkerArray
@@ -101,7 +101,6 @@ def test_an_outcome_equal_to_the_prediction_is_centred_in_all_markers():
     assert "error 0.0 sd" in shown["label"].text
 
 
-@settings(max_examples=60, deadline=None)
 @given(ERRORS)
 def test_true_and_enlarged_markers_agree_on_inside_or_outside(error):
     """Inside is as the covariance defines it, for the centre and for the heading."""

@@ -94,7 +94,6 @@ def assert_same_pose(one: SpatialPose, other: SpatialPose, atol: float = 1e-12) 
 # --- poses in space ---------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(POSES, POSES, st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array))
 def test_poses_compose_as_rotations_and_translations(outer: SpatialPose, inner: SpatialPose, point: np.ndarray) -> None:
     np.testing.assert_allclose(outer.rotation, Rotation.from_quat(outer.quaternion).as_matrix(), atol=1e-12)
@@ -105,7 +104,6 @@ def test_poses_compose_as_rotations_and_translations(outer: SpatialPose, inner: 
     assert_same_pose(SAME_FRAME @ inner, inner, atol=0.0)
 
 
-@settings(deadline=None)
 @given(POSES, NUMBERS)
 def test_tilt_is_the_angle_between_the_vertical_axes(pose: SpatialPose, turn: float) -> None:
     up = pose.vector(np.array([0.0, 0.0, 1.0]))

@@ -112,7 +112,6 @@ def test_push_through_the_centre_moves_the_slider_with_the_tip() -> None:
     assert np.all(np.abs(after.pose - [SPEED * DURATION, 0.0, 0.0]) < 1e-9)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.sampled_from(sorted(OUTLINES)), st.floats(0.0, 0.999), st.floats(-1.3, 1.3), METRES, METRES, ANGLES)
 def test_prediction_is_equivariant_under_rotation_and_translation(
     shape: str, contact: float, angle: float, x: float, y: float, turn: float

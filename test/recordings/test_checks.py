@@ -247,8 +247,12 @@ def test_an_orientation_that_is_not_recorded_is_refused(name: str) -> None:
     assert found(without_orientation(sample(name)), rig_of(name))["heading_constant"].severity == "refused"
 
 
-@pytest.mark.parametrize("name", SLIDERS)
-@pytest.mark.parametrize("place", [(0.03, 0.0), (0.0, -0.03), (-0.08, 0.0), (0.05, 0.06)])
+PLACES = [(0.03, 0.0), (0.0, -0.03), (-0.08, 0.0), (0.05, 0.06)]
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [*((ONE_SIDE, place) for place in PLACES), *zip(SLIDERS[:3], PLACES[1:], strict=True)]
+)
 def test_a_body_on_the_robots_hand_is_refused(name: str, place: tuple[float, float]) -> None:
     """Whether the tip seems to be inside the outline, on it, or outside."""
     (finding,) = check_recording(on_hand(sample(name), place), rig_of(name))

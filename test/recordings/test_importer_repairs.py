@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.geometry.frames import wrap_angle
@@ -51,7 +51,6 @@ def test_ellipse_is_symmetric_under_half_turns_and_circle_under_all() -> None:
     assert repair_heading(*_jumping(np.pi / 2, spread=0)[::2], 2).cut == 1
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.floats(-12.0, 12.0), st.floats(-10.0, 10.0))
 def test_continuous_heading_is_kept_over_many_turns(start: float, speed: float) -> None:
     time = 0.004 * np.arange(300)
@@ -88,7 +87,6 @@ def test_unix_seconds_keep_their_precision(seconds: float) -> None:
     assert abs(float(nanoseconds(np.array([seconds]))[0] / 10**9) - seconds) < 3e-7
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.floats(-2.5, 2.5), st.floats(0.5, 3.0))
 def test_heading_is_recovered_without_the_sign_of_qw(start: float, turned: float) -> None:
     true = np.linspace(start, start + turned, 600)

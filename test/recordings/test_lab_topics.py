@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
@@ -222,7 +222,6 @@ numbers = st.floats(-2.0, 2.0)
 poses = st.lists(st.tuples(*[numbers] * 7).filter(lambda row: np.linalg.norm(row[3:]) > 0.1), min_size=1, max_size=6)
 
 
-@settings(max_examples=40, deadline=None)
 @given(poses, st.data())
 def test_composition_through_a_random_tree_is_that_of_matrices(
     rows: list[tuple[float, ...]], data: st.DataObject

@@ -182,7 +182,6 @@ def tabulated(shape: str, kind: str) -> TabulatedModel:
     return tabulate(model_of(shape, kind))
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     which=st.sampled_from(MODELS),
     from_table=st.booleans(),
@@ -222,7 +221,6 @@ def tip_at(point: Array, normal: Array, slider: tuple[float, float, float], angl
     return WorldPush(np.array(slider), tip, 0.02 * (turn @ aside @ normal), 0.2)
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     which=st.sampled_from(MODELS),
     from_table=st.booleans(),

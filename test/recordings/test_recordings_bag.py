@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -154,7 +154,6 @@ def test_damaged_chunk_is_skipped_and_noted(tmp_path: Path, compression: Compres
     assert f"messages were found, the summary lists {2 * N}" in counted
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
 )

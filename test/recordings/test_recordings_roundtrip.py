@@ -124,7 +124,6 @@ def test_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Pat
 LAYOUTS = st.builds(Layout, st.booleans(), st.integers(1, 7), st.just(8)) | st.just(Layout(False, 1, 4))
 
 
-@settings(max_examples=40, deadline=None)
 @given(stamps(0), LAYOUTS, st.text(max_size=20), st.data())
 def test_columns_read_back_from_cdr_with_any_frame_id(
     stamp: np.ndarray, layout: Layout, frame: str, data: st.DataObject
@@ -138,7 +137,6 @@ def test_columns_read_back_from_cdr_with_any_frame_id(
     assert decoded.frames == (frozenset({frame}) if layout.header and len(stamp) else frozenset())
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(st.binary(max_size=100), max_size=10), LAYOUTS)
 def test_decoder_accepts_any_bytes(messages: list[bytes], layout: Layout) -> None:
     decoded = decode(messages, layout)

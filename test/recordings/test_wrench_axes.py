@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
@@ -73,7 +73,6 @@ def test_a_torque_about_another_point_has_the_lever_of_the_force() -> None:
 rows = st.tuples(*[st.floats(-2.0, 2.0)] * 7).filter(lambda row: np.linalg.norm(row[3:]) > 0.1)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.tuples(*[st.floats(-9.0, 9.0)] * 6), rows)
 def test_turning_keeps_size_and_angle_and_has_an_inverse(measured: tuple[float, ...], row: tuple[float, ...]) -> None:
     wrenches, poses = np.array([measured]), normalised(np.array([row]))

@@ -139,17 +139,30 @@ def stacked() -> tuple[FitRows, FitRows]:
     friction = np.vstack([0.1 * candidates(e, CONSTANT)[0].plain[:, :, 0] for e in (new, before)])
     error = controls @ np.linalg.lstsq(controls, friction, rcond=None)[0]
     z = error + np.random.default_rng(0).normal(size=error.shape)
-    new, before = (
-        replace(e, residual=np.linalg.solve(e.whitener, own[:, :, None])[:, :, 0])
-        for e, own in ((new, z[: len(new.table)]), (before, z[len(new.table) :]))
-    )
+    new, before = _standardised(new, z[: len(new.table)]), _standardised(before, z[len(new.table) :])
     return FitRows(new, before, controls), FitRows(new)
+
+
+def _standardised(evidence: Evidence, z: np.ndarray) -> Evidence:
+    """The evidence with these standardised residuals (n, 3)."""
+    return replace(evidence, residual=np.linalg.solve(evidence.whitener, z[:, :, None])[:, :, 0])
 
 
 def test_error_of_the_inputs_in_both_is_no_effect(stacked: tuple[FitRows, FitRows]) -> None:
     both, new = (fitted(rows, candidates(rows.evidence, CONSTANT)) for rows in stacked)
     assert abs(both.coefficients[0]) < 3.0 * deviations(both)[0]
     assert abs(new.coefficients[0]) > 10.0 * deviations(new)[0]
+
+
+def test_an_error_that_the_controls_express_is_removed_whatever_the_weights(stacked: tuple[FitRows, FitRows]) -> None:
+    rows = stacked[0]
+    fit = fitted(rows, [])
+    uneven = replace(fit, weight=np.random.default_rng(1).uniform(0.01, 1.0, len(rows.z)))
+    error = np.outer(rows.controls @ np.ones(rows.controls.shape[1]), [1.0, -2.0, 0.5])
+    expressed = replace(rows, evidence=_standardised(rows.evidence, error[: len(rows.evidence.table)]))
+    assert rows.training is not None
+    expressed = replace(expressed, training=_standardised(rows.training, error[len(rows.evidence.table) :]))
+    assert np.abs(replace(uneven, rows=expressed).clear.residual).max() < 1e-9 * np.abs(error).max()
 
 
 def test_change_since_training_is_kept(stacked: tuple[FitRows, FitRows]) -> None:

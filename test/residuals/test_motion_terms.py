@@ -52,6 +52,15 @@ def test_two_effects_of_other_mechanisms_and_covariates_are_two(
     assert [term.part for term in terms] == [False, False]
 
 
+def test_a_small_further_term_of_the_same_mechanism_is_a_part_and_comes_last(deployed: PushModel) -> None:
+    changed = pushes(120, 3, slippery(0.3), planted("contact_friction", "slider_x", ALONG_X, 0.05))
+    terms = found(deployed, changed)
+    assert [(term.best.label, term.part) for term in terms] == [
+        (("contact_friction", "elapsed_time"), False),
+        (("contact_friction", "slider_x"), True),
+    ]
+
+
 def test_shares_of_the_terms_add_up_to_what_all_explain(deployed: PushModel) -> None:
     changed = pushes(120, 3, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1))
     finding = motion_effects(deployed, evidence_of(deployed, changed), 0.01, ["elapsed_time", "slider_x"])

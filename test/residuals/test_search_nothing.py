@@ -14,6 +14,7 @@ from square_session import (
     ANALYTICAL,
     COUNT,
     DRIVERS,
+    EXACT,
     FOUR,
     MECHANICS,
     RIG,
@@ -32,6 +33,8 @@ from push_predictor.residuals.candidates.enumeration import candidates_of, confo
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import Controlled, screen
+
+WEAK = 0.02
 
 
 @pytest.fixture(autouse=True)
@@ -95,6 +98,18 @@ class TestNoEffect:
             base, with_effect(pushes(COUNT, 3), "centre_of_friction", DriverBasis("constant"), -0.003, 0.002)
         )
         assert other.terms[0].best.label == ("centre_of_friction", "edge")
+
+    def test_the_gate_alone_decides_at_its_level(self) -> None:
+        """A weak effect, at levels above and below its p value."""
+        plain = pushes(COUNT, 106)
+        weak = with_effect(plain, "contact_friction", linear(plain, "slider_x"), WEAK)
+        gate = gate_of(EXACT, seen(EXACT, weak), DRIVERS, baseline=baseline(EXACT))
+        p = float(gate.screened(gate.evidence.z).p_value.min())
+        assert 0.001 < p < 0.2
+        above, below = (search_with(EXACT, replace(gate, alpha=share * p)).terms for share in (1.1, 0.9))
+        assert [term.best.label for term in above] == [("contact_friction", "slider_x")]
+        assert above[0].p_value == p
+        assert not below
 
     def test_covariate_confounded_with_the_inputs_is_not_tried(self) -> None:
         """In pushes ordered by angle, time would be blamed for errors of the base in the angle."""

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.types import Array
 
 
@@ -35,13 +34,13 @@ def bound_and_gradient(
 def _site_gradient(bound: Bound, kernel: Array, precision: Array) -> Array:
     """dF/dLambda with b = Lambda - 1/2 tied to it: -(K_g + 1/2 S o S)(Lambda - optimal), shape (n,)."""
     posterior = kernel - kernel @ precision @ kernel
-    return np.asarray(-(kernel + 0.5 * posterior**2) @ (bound.site_precisions - bound.optimal_precisions))
+    return np.asarray(-(kernel + 0.5 * posterior**2) @ (bound.sites.precisions - bound.signal.optimal_precisions))
 
 
 def _tied_gradient(bound: Bound, inputs: Array, matrix: Array, precision: Array) -> Array:
     """dF/d(parameters) with b tied to Lambda: the product's gradient and a term that vanishes at a maximum."""
     parameters, gradient = bound.problem.parameters, bound.hyperparameter_gradient()
-    unbalance = (bound.optimal_precisions - bound.site_precisions) / bound.site_precisions**2
+    unbalance = (bound.signal.optimal_precisions - bound.sites.precisions) / bound.sites.precisions**2
     weights = (precision * unbalance) @ precision
     size = len(parameters.log_lengthscales) + 1
     gradient[size : 2 * size] -= 0.5 * parameters.noise.gradient(inputs, matrix, weights)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.types import Array
 
 PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0, -0.8)

@@ -15,7 +15,7 @@ from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
-GENERIC_TERMS = 6  # of the polynomial, for each output
+GENERIC_WIDTH = 3 * 6  # responses of the generic mechanism: the terms of a polynomial for each output
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +60,11 @@ def design_of(
     mechanism: str | None, basis: DriverBasis, mechanics: FittedMechanics, push: Push, outcome_scale: Array
 ) -> Array:
     """The design matrices (n, 3, p * m) of an effect: products of responses and basis columns."""
-    responses = responses_of(mechanism, mechanics, push, outcome_scale)
-    return products(responses, basis.values(push.covariates, len(push.inputs)))
-
-
-def responses_of(mechanism: str | None, mechanics: FittedMechanics, push: Push, outcome_scale: Array) -> Array:
-    """Derivatives (n, 3, p) of the outcome by the parameters of a mechanism."""
     if mechanism is None:
-        return generic_responses(mechanics, push, outcome_scale)
-    return mechanism_named(mechanism).response(mechanics, push)
+        responses = generic_responses(mechanics, push, outcome_scale)
+    else:
+        responses = mechanism_named(mechanism).response(mechanics, push)
+    return products(responses, basis.values(push.covariates, len(push.inputs)))
 
 
 def products(responses: Array, values: Array) -> Array:
@@ -97,8 +93,3 @@ def _polynomial(mechanics: FittedMechanics, inputs: Array) -> Array:
     arm = mechanics.outline.point(contact) - surface.centre
     lever = (arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]) / surface.length
     return np.column_stack([np.ones_like(angle), lever, angle, lever * angle, lever**2, angle**2])
-
-
-def generic_width() -> int:
-    """Number of responses of the generic mechanism."""
-    return 3 * GENERIC_TERMS

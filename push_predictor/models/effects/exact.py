@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import columns_of
+from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import Changes, FittedMechanics
 from push_predictor.models.mechanisms import LARGEST
@@ -35,10 +35,15 @@ class JointEffects:
         """Names of the parameters that change, each once."""
         return tuple(dict.fromkeys(name for effect in self.effects for name in effect.quantities))
 
+    @cached_property
+    def _bases(self) -> tuple[DriverBasis, ...]:
+        """The bases of all effects, each once."""
+        return tuple(dict.fromkeys(effect.basis for effect in self.effects))
+
     def columns(self, push: Push) -> Array:
-        """The bases (n, b) of all effects, one after the other."""
-        n = len(push.inputs)
-        return np.concatenate([effect.basis.values(push.covariates, n) for effect in self.effects], axis=1)
+        """The columns (n, b) of the bases, one after the other."""
+        values = [basis.values(push.covariates, len(push.inputs)) for basis in self._bases]
+        return values[0] if len(values) == 1 else np.concatenate(values, axis=1)
 
     def changes(self, columns: Array) -> Array:
         """The changes (n, q), at most the largest that a rig can have."""
@@ -52,13 +57,13 @@ class JointEffects:
     @cached_property
     def _acting(self) -> tuple[IntArray, IntArray]:
         """The parameter and the column of the bases that each coefficient (m,) acts on."""
-        parameters, columns, begin = [], [], 0
+        ends = np.cumsum([columns_of(basis) for basis in self._bases]).tolist()
+        columns_of_basis = dict(zip(self._bases, map(range, [0, *ends], ends), strict=False))
+        parameters, columns = [], []
         for effect in self.effects:
-            width = columns_of(effect.basis)
-            own = [self.names.index(name) for name in effect.quantities]
-            parameters.append(np.repeat(own, width))
-            columns.append(np.tile(begin + np.arange(width), len(own)))
-            begin += width
+            own, used = [self.names.index(name) for name in effect.quantities], columns_of_basis[effect.basis]
+            parameters.append(np.repeat(own, len(used)))
+            columns.append(np.tile(used, len(own)))
         return np.concatenate(parameters), np.concatenate(columns)
 
     @cached_property

@@ -1,7 +1,4 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Gaussian process regression of one output: standard (`gp`) and variational heteroscedastic (`vhgp`).
-
-Import `gp`, `vhgp`, `sparse.vhgp`, `regression`, `prediction` and `kernels`; the other modules are steps of their fits.
-"""
+"""Gaussian process regression of one output: standard (`gp`), variational heteroscedastic (`vhgp`, `sparse_vhgp`)."""

@@ -11,7 +11,7 @@ Where the printed equations differ from these: docs/explanation/errata.md.
 K_g includes the nugget. At a maximum over (b, Lambda) the two are tied, b = Lambda - 1/2, which leaves one number per
 training row.
 
-With inducing inputs for f and g (sparse/kernel.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
+With inducing inputs for f and g (inducing.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
 K_g. The variances c that they do not explain add -1/2 sum_i c_f,i / R_ii, and c_g to the variances S_ii. If every row
 is an inducing input, the two bounds are equal.
 """
@@ -23,14 +23,72 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
-from push_predictor.models.gaussian_process.posterior import Likelihood
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.posterior import (
+    Likelihood,
+    NuggetKernel,
+    Ridge,
+    SmoothKernel,
+)
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.ridge import DenseKernel, NuggetKernel, Regularisable, Ridge
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
+JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
 _SMALLEST_PRECISION = 1e-7  # below it S loses its precision
 _EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class VhgpParameters:
+    """Hyperparameters: ARD kernel of the signal f, ARD kernel of the log noise variance g, prior mean of g.
+
+    log_nugget_sd: log of the standard deviation of g's nugget, which is independent from row to row.
+    """
+
+    log_lengthscales: Array
+    log_signal_sd: float
+    noise_log_lengthscales: Array
+    noise_log_sd: float
+    noise_mean: float
+    log_nugget_sd: float
+
+    @property
+    def count(self) -> int:
+        """Number of hyperparameters."""
+        return 2 * len(self.log_lengthscales) + 4
+
+    @property
+    def signal(self) -> ArdKernel:
+        """Kernel of f."""
+        return ArdKernel(self.log_lengthscales, self.log_signal_sd)
+
+    @property
+    def noise(self) -> ArdKernel:
+        """Kernel of g, without its nugget."""
+        return ArdKernel(self.noise_log_lengthscales, self.noise_log_sd)
+
+    @property
+    def nugget(self) -> float:
+        """What is added to the diagonal of K_g, and to the variance of g at any input."""
+        return float(np.exp(2.0 * self.log_nugget_sd))
+
+    @property
+    def jitter(self) -> float:
+        """What is added to the diagonal of K_f."""
+        return JITTER * self.signal.variance
+
+    def to_vector(self) -> Array:
+        """The numbers in their order, shape (2 D + 4,)."""
+        signal = np.append(self.log_lengthscales, self.log_signal_sd)
+        rest = [self.noise_log_sd, self.noise_mean, self.log_nugget_sd]
+        return np.concatenate([signal, self.noise_log_lengthscales, rest])
+
+    @classmethod
+    def from_vector(cls, vector: Array) -> VhgpParameters:
+        """The inverse of `to_vector`."""
+        d = (len(vector) - 4) // 2
+        return cls(vector[:d], float(vector[d]), vector[d + 1 : -3], *(float(value) for value in vector[-3:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +97,8 @@ class VhgpProblem:
 
     outputs: Array
     parameters: VhgpParameters
-    signal: Regularisable
-    noise: Regularisable
+    signal: SmoothKernel
+    noise: NuggetKernel
 
     @classmethod
     def of(cls, inputs: Array, outputs: Array, parameters: VhgpParameters) -> VhgpProblem:
@@ -50,7 +108,7 @@ class VhgpProblem:
 
     @classmethod
     def about(
-        cls, outputs: Array, parameters: VhgpParameters, signal: Regularisable, noise: Regularisable
+        cls, outputs: Array, parameters: VhgpParameters, signal: SmoothKernel, noise: SmoothKernel
     ) -> VhgpProblem:
         """With these kernels of f and g, to which g's nugget is added."""
         return cls(outputs, parameters, signal, NuggetKernel(noise, parameters.nugget))
@@ -92,9 +150,9 @@ class SignalFit:
             noise = level + problem.parameters.jitter
             return cls(level, Likelihood.of(problem.signal, problem.outputs, noise))
 
-    @property
+    @cached_property
     def optimal_precisions(self) -> Array:
-        """1/2 + dF/dm >= 0, shape (n,)."""
+        """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
         return self.level * self.likelihood.slopes + 0.5
 
 
@@ -134,26 +192,6 @@ class Bound:
         return cls.at(problem, Sites(site_precisions, site_precisions * mean + mean_weights))
 
     @property
-    def site_precisions(self) -> Array:
-        """Lambda, shape (n,)."""
-        return self.sites.precisions
-
-    @property
-    def noise_level(self) -> Array:
-        """R, shape (n,)."""
-        return self.signal.level
-
-    @property
-    def alpha(self) -> Array:
-        """(K_f + R)^-1 y, shape (n,)."""
-        return self.signal.likelihood.alpha
-
-    @cached_property
-    def optimal_precisions(self) -> Array:
-        """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
-        return self.signal.optimal_precisions
-
-    @property
     def tied_precisions(self) -> Array:
         """Site precisions tied to these mean weights, with the same m; near a maximum those of `sites`."""
         return np.maximum(self.mean_weights + 0.5, _SMALLEST_PRECISION)
@@ -161,14 +199,14 @@ class Bound:
     @property
     def optimal_sites(self) -> Sites:
         """The sites that a fixed point reproduces: where a step of natural gradient of length 1 ends."""
-        return Sites.optimal(self.optimal_precisions, self.noise_mean)
+        return Sites.optimal(self.signal.optimal_precisions, self.noise_mean)
 
     def hyperparameter_gradient(self) -> Array:
         """dF/d(parameters.to_vector()) at fixed Lambda and b; at a maximum over these, that of the maximum."""
         signal = self.signal.likelihood.gradient()
         signal[-1] += 2.0 * self.problem.parameters.jitter * float(self.signal.likelihood.slopes.sum())
         # dF/dm = gb gives b gb' + gb b' - b b', as one difference of squares
-        optimal = self.optimal_precisions - 0.5
+        optimal = self.signal.optimal_precisions - 0.5
         noise = self.noise_ridge.gradient(optimal, optimal - self.mean_weights)
         return np.concatenate([signal, noise[:-1], [optimal.sum()], noise[-1:]])
 
@@ -181,13 +219,13 @@ class Bound:
         variable models").
         """
         problem, parameters = self.problem, self.problem.parameters
-        errors, variance = self.signal.likelihood.ridge.held_out_errors(self.alpha, block)
+        errors, variance = self.signal.likelihood.ridge.held_out_errors(self.signal.likelihood.alpha, block)
         of_noise, noise_variance = self.noise_ridge.held_out_errors(self.mean_weights, block)
-        site_variance = 1.0 / self.site_precisions
+        site_variance = 1.0 / self.sites.precisions
         noise_variance = noise_variance + problem.noise.unexplained - site_variance
         return LatentPrediction(
             problem.outputs - errors,
-            np.maximum(variance + problem.signal.unexplained - self.noise_level, parameters.jitter),
+            np.maximum(variance + problem.signal.unexplained - self.signal.level, parameters.jitter),
             self.noise_mean + self.mean_weights * site_variance - of_noise,
             np.maximum(noise_variance, parameters.nugget + _EPSILON * parameters.noise.variance),
         )

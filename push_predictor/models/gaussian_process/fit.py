@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import SignalFit, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.bound import SignalFit, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.descent import Descent, part_of_rows
 from push_predictor.models.gaussian_process.gp import GpParameters
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.types import Array
 
@@ -33,7 +32,7 @@ _NUGGET_SD = (np.log(1e-3), np.log(3.0))
 _REFUSED = 1e10
 _SEARCH_TOLERANCE, _FINAL_TOLERANCE = 5e-2, 2e-2  # nats
 _FAR = 10.0  # by this factor the first evaluation, far from the maximum, is less accurate
-_STOP = 1e-4
+_STOP = 3e-4  # relative decrease: a third of a nat for a thousand rows
 
 # Gaussian priors on the logarithms. Without them the bound of 100 rows often peaks at far too confident a noise model,
 # or at a homoscedastic one. The signal stays near the homoscedastic fit, the noise varies by a factor of exp(0.67) over

@@ -13,7 +13,7 @@ from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum, part_of_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.posterior import KernelPosterior, Likelihood
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
@@ -24,7 +24,7 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
-_STOP, _ROUGH_STOP = 1e-6, 1e-4  # relative decrease; rough: of the descents that are compared
+STOP, ROUGH_STOP = 1e-6, 1e-4  # relative decrease; rough: of fits that are compared, or that another begins from
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
 _FEWEST_TO_BEGIN_FROM = 300  # rows of a part; the likelihood of fewer often has its highest maximum elsewhere
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
@@ -64,6 +64,7 @@ class GaussianProcess:
         noise = np.full(len(outputs), parameters.noise_variance)
         self._posterior = KernelPosterior(parameters.kernel.matrix(inputs), noise)
         self._weights = self._posterior.weights(outputs)
+        self._held_out = Remembered(self._predicted_without)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and the noise at inputs (m, D)."""
@@ -81,10 +82,10 @@ class GaussianProcess:
         return kernel.matrix(inputs) - self._posterior.explained_covariance(kernel.cross(inputs, self.inputs))
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
+        return self._held_out.of(block)
 
-        block (n,): number of each row's block.
-        """
+    def _predicted_without(self, block: IntArray) -> LatentPrediction:
         kernel, noise = self.parameters.kernel, np.full(len(self.outputs), self.parameters.noise_variance)
         likelihood = Likelihood.of(DenseKernel.of(kernel, self.inputs), self.outputs, noise)
         errors, variance = likelihood.ridge.held_out_errors(likelihood.alpha, block)
@@ -92,18 +93,20 @@ class GaussianProcess:
         return LatentPrediction(self.outputs - errors, variance, np.log(noise), np.zeros(len(noise)))
 
 
-def fit_gp(inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST) -> GaussianProcess:
+def fit_gp(
+    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, stop: float = STOP
+) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. Raises TrainingError when the rows
-    do not match or are not finite.
+    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. stop: relative decrease at which it ends. Raises
+    TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     d = inputs.shape[1]
     box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    descent, cost = Descent(box, most_iterations, _STOP), _cost(inputs, outputs)
+    descent, cost = Descent(box, most_iterations, stop), _cost(inputs, outputs)
     rows = part_of_rows(len(outputs))
-    start, rough = _first(inputs, outputs, rows, replace(descent, stop=_ROUGH_STOP))
+    start, rough = _first(inputs, outputs, rows, replace(descent, stop=ROUGH_STOP))
     if rows is None or len(rows) >= _FEWEST_TO_BEGIN_FROM:
         found = descent.refine(cost, rough)
     else:

@@ -9,12 +9,13 @@ section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
 # With a hundred nodes the density is accurate to 1e-6 up to a standard deviation of g of 1.5.
@@ -44,6 +45,20 @@ class LatentPrediction:
         return self.variance + self.process_variance
 
 
+class Remembered:
+    """Held-out predictions, computed again only for other blocks: choices, correlation and tails share them."""
+
+    def __init__(self, predicted: Callable[[IntArray], LatentPrediction]) -> None:
+        self._predicted = predicted
+        self._last: tuple[IntArray, LatentPrediction] | None = None
+
+    def of(self, block: IntArray) -> LatentPrediction:
+        """The prediction of the rows of each block (n,) from the others."""
+        if self._last is None or not np.array_equal(self._last[0], block):
+            self._last = block.copy(), self._predicted(block)
+        return self._last[1]
+
+
 def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
     """Log p(outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
     variances = _variances_at_nodes(prediction)
@@ -52,6 +67,21 @@ def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
             _log_normal(outcomes[:, None], prediction.mean[:, None], variances) + _LOG_WEIGHTS, axis=1
         )
     )
+
+
+def density_of_constant_noise(squares: Array, noise_mean: float, noise_spread: float) -> tuple[float, float, float]:
+    """Sum of log p(y) over outcomes of squares y^2 (m,), f = 0 and g ~ N(noise_mean, noise_spread^2) everywhere.
+
+    Also its derivatives by noise_mean and noise_spread.
+    """
+    halves = 0.5 * squares[:, None] * np.exp(-noise_mean - noise_spread * _NODES)  # y^2 / 2 v at each node, (m, nodes)
+    logs = _LOG_WEIGHTS - 0.5 * (np.log(2.0 * np.pi) + noise_mean + noise_spread * _NODES) - halves
+    highest = logs.max(axis=1, keepdims=True)
+    shares = np.exp(logs - highest)
+    sums = shares.sum(axis=1)
+    slopes = ((shares * (halves - 0.5)).T @ (1.0 / sums)).T  # by the log variance at each node
+    value = float((np.log(sums) + highest[:, 0]).sum())
+    return value, float(slopes.sum()), float(slopes @ _NODES)
 
 
 def gaussian_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:

@@ -20,13 +20,18 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess, check_rows
-from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.prediction import (
+    LatentPrediction,
+    density_of_constant_noise,
+    exact_log_density,
+)
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.types import Array, IntArray
 
 _WIDEST = 1.5  # spread of the log noise variance, up to which the quadrature of the density is accurate
 _USUAL_LOG_SPREAD, _LOG_SPREAD_SD = 0.0, 0.5  # weak prior of the spread's logarithm
+_STOP = 1e-9  # relative decrease
 _SMALLEST_VARIANCE = 1e-12  # of standardised outputs
 
 
@@ -89,14 +94,18 @@ def fit_constant(inputs: Array, outputs: Array, *, heavy_tails: bool, observed: 
         return ConstantNoise(inputs, outputs, ConstantParameters(gaussian, 0.0))
     from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
 
-    def cost(vector: Array) -> float:
-        spread = min(float(np.exp(vector[1])), _WIDEST)
-        latent = _same_everywhere(ConstantParameters(float(vector[0]), spread), 0.0, len(observed))
-        penalty = 0.5 * ((vector[1] - _USUAL_LOG_SPREAD) / _LOG_SPREAD_SD) ** 2
-        return float(penalty - exact_log_density(latent, observed).sum())
+    squares = np.square(observed)
 
-    found = minimize(cost, [gaussian - 0.5, _USUAL_LOG_SPREAD], method="Nelder-Mead", options={"xatol": 1e-4}).x
-    return ConstantNoise(inputs, outputs, ConstantParameters(float(found[0]), min(float(np.exp(found[1])), _WIDEST)))
+    def cost(vector: Array) -> tuple[float, Array]:
+        spread = float(np.exp(vector[1]))
+        value, by_mean, by_spread = density_of_constant_noise(squares, float(vector[0]), spread)
+        away = (vector[1] - _USUAL_LOG_SPREAD) / _LOG_SPREAD_SD
+        slopes = np.array([-by_mean, away / _LOG_SPREAD_SD - spread * by_spread])
+        return 0.5 * away**2 - value, slopes
+
+    start, box = [gaussian - 0.5, _USUAL_LOG_SPREAD], [(None, None), (None, np.log(_WIDEST))]
+    found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=box, options={"ftol": _STOP}).x
+    return ConstantNoise(inputs, outputs, ConstantParameters(float(found[0]), float(np.exp(found[1]))))
 
 
 def held_out_score(regression: Regression, block: IntArray, observed: Array | None = None) -> float:

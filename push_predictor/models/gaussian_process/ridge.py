@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -27,57 +27,12 @@ _LARGEST_SHARE = 0.5
 _LARGEST_SHARE_OF_HALF = 0.35  # of all rows: a higher rank of every second row makes the search not worthwhile
 
 
-class Ridge(Protocol):
-    """Quantities of P = (K + D)^-1 with D = 1/w."""
-
-    @property
-    def weights(self) -> Array:
-        """w, shape (n,)."""
-
-    @property
-    def log_determinant(self) -> float:
-        """Log det(I + w^1/2 K w^1/2)."""
-
-    @property
-    def posterior_diagonal(self) -> Array:
-        """Diagonal of K - K P K, shape (n,)."""
-
-    def residual(self, values: Array) -> Array:
-        """P D values, shape (n,): the residual of a smoother of these values."""
-
-    def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
-        """1/2 tr((added added' - removed removed' - P) dK) - 1/2 sum weights d(unexplained), vectors (n,).
-
-        d is by the kernel's log_lengthscales and log_sd, and by the log standard deviation of its nugget if there is
-        one, shape (D + 1,) or (D + 2,). weights: w if not given.
-        """
-
-    def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
-        """Errors (n,) of the leave-block-out predictions of n values, and their variances (n,), D included.
-
-        weights (n,): P times the values; block (n,): number of each row's block. For a block B of the rows, the mean is
-        y_B - P_BB^-1 (P y)_B and the variance is diag P_BB^-1 (Rasmussen and Williams 2006, section 5.4.2, for a block
-        in place of a row).
-        """
-
-
-class Regularisable(Protocol):
-    """K, factorised once, to be regularised by many diagonals."""
-
-    @property
-    def unexplained(self) -> Array | float:
-        """Prior variance of the function at the rows (n,) that K lacks."""
-
-    def regularise(self, weights: Array) -> Ridge:
-        """The ridge for D = 1/weights, weights (n,) > 0. Raises LinAlgError if it is not positive definite."""
-
-    def times(self, vector: Array) -> Array:
-        """K vector, shape (n,)."""
-
-
 @dataclass(frozen=True, eq=False)
 class DenseKernel:
-    """The matrix K (n, n) of a kernel between inputs (n, D), with its root (r, n), K = root' root, if r is low."""
+    """The matrix K (n, n) of a kernel between inputs (n, D), with its root (r, n), K = root' root, if r is low.
+
+    Factorised once, to be regularised by many diagonals. unexplained: prior variance of the function that K lacks.
+    """
 
     kernel: ArdKernel
     inputs: Array
@@ -92,11 +47,11 @@ class DenseKernel:
         return cls(kernel, inputs, matrix, _low_rank_root(matrix))
 
     def regularise(self, weights: Array) -> DenseRidge:
-        """See Regularisable."""
+        """The ridge for D = 1/weights, weights (n,) > 0. Raises LinAlgError if it is not positive definite."""
         return _FullRankRidge.of(self, weights) if self.root is None else _LowRankRidge.of(self, self.root, weights)
 
     def times(self, vector: Array) -> Array:
-        """See Regularisable."""
+        """K vector, shape (n,)."""
         return np.asarray(self.matrix @ vector)
 
 
@@ -132,7 +87,7 @@ def cholesky_in_place(matrix: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DenseRidge(ABC):
-    """The ridge of a dense kernel, see Ridge."""
+    """Quantities of P = (K + D)^-1 with D = 1/w: weights w (n,), log_determinant of I + w^1/2 K w^1/2."""
 
     of_kernel: DenseKernel
     weights: Array
@@ -141,11 +96,11 @@ class DenseRidge(ABC):
     @property
     @abstractmethod
     def posterior_diagonal(self) -> Array:
-        """See Ridge."""
+        """Diagonal of K - K P K, shape (n,)."""
 
     @abstractmethod
     def residual(self, values: Array) -> Array:
-        """See Ridge."""
+        """P D values, shape (n,): the residual of a smoother of these values."""
 
     @abstractmethod
     def upper_precision(self) -> Array:
@@ -156,7 +111,11 @@ class DenseRidge(ABC):
         return mirror_upper(self.upper_precision())
 
     def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
-        """See Ridge. A dense kernel leaves nothing unexplained, to which `weights` could apply."""
+        """1/2 tr((added added' - removed removed' - P) dK) - 1/2 sum weights d(unexplained), vectors (n,).
+
+        d is by the kernel's log_lengthscales and log_sd, and by the log standard deviation of its nugget if there is
+        one, shape (D + 1,) or (D + 2,). weights: w if not given. A dense kernel leaves nothing unexplained.
+        """
         precision, kernel = self.upper_precision(), self.of_kernel
         for sign, vector in ((-1.0, added), (1.0, removed)):
             if vector is not None:
@@ -164,7 +123,12 @@ class DenseRidge(ABC):
         return -0.5 * kernel.kernel.gradient(kernel.inputs, kernel.matrix, precision)
 
     def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
-        """See Ridge."""
+        """Errors (n,) of the leave-block-out predictions of n values, and their variances (n,), D included.
+
+        weights (n,): P times the values; block (n,): number of each row's block. For a block B of the rows, the mean is
+        y_B - P_BB^-1 (P y)_B and the variance is diag P_BB^-1 (Rasmussen and Williams 2006, section 5.4.2, for a block
+        in place of a row).
+        """
         precision = self.precision()
         errors, variance = np.empty(len(weights)), np.empty(len(weights))
         for number in np.unique(block):
@@ -238,58 +202,3 @@ class _FullRankRidge(DenseRidge):
 
 def _log_determinant(factor: Array) -> float:
     return 2.0 * float(np.log(np.diagonal(factor)).sum())
-
-
-@dataclass(frozen=True, eq=False)
-class NuggetKernel:
-    """K + nugget times the identity. The nugget is kept separate, because with it no matrix has low rank."""
-
-    smooth: Regularisable
-    nugget: float
-
-    @property
-    def unexplained(self) -> Array | float:
-        """See Regularisable."""
-        return self.smooth.unexplained
-
-    def regularise(self, weights: Array) -> _NuggetRidge:
-        """See Regularisable."""
-        return _NuggetRidge(self.nugget, weights, self.smooth.regularise(weights / (1.0 + self.nugget * weights)))
-
-    def times(self, vector: Array) -> Array:
-        """See Regularisable."""
-        return self.smooth.times(vector) + self.nugget * vector
-
-
-@dataclass(frozen=True, eq=False)
-class _NuggetRidge:
-    """P is that of K without the nugget and D + nugget in place of D."""
-
-    nugget: float
-    weights: Array
-    smooth: Ridge
-
-    @property
-    def share(self) -> Array:
-        """D / (D + nugget), shape (n,)."""
-        return self.smooth.weights / self.weights
-
-    @property
-    def log_determinant(self) -> float:
-        return self.smooth.log_determinant - float(np.log(self.share).sum())
-
-    @property
-    def posterior_diagonal(self) -> Array:
-        return self.share * (self.nugget + self.share * self.smooth.posterior_diagonal)
-
-    def residual(self, values: Array) -> Array:
-        return self.smooth.residual(self.share * values)
-
-    def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
-        of_smooth = self.smooth.gradient(added, removed, self.weights if weights is None else weights)
-        squares = added**2 if removed is None else added**2 - removed**2
-        precision = self.smooth.weights - self.smooth.posterior_diagonal * self.smooth.weights**2
-        return np.append(of_smooth, self.nugget * float((squares - precision).sum()))
-
-    def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
-        return self.smooth.held_out_errors(weights, block)

@@ -17,12 +17,11 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_bound
-from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
+from push_predictor.models.gaussian_process.gp import ROUGH_STOP, SHORTEST, GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
@@ -49,6 +48,7 @@ class VHGP:
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
+        self._held_out = Remembered(self._predicted_without)
 
     @property
     def bound(self) -> float:
@@ -65,7 +65,7 @@ class VHGP:
             parameters = self.parameters
             signal, noise = (DenseKernel.of(kernel, self.inputs) for kernel in (parameters.signal, parameters.noise))
             bound = Bound.tied(VhgpProblem.about(self.outputs, parameters, signal, noise), self.site_precisions)
-            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
+            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.signal.level
             del bound  # frees its matrices before the factors are computed
             of_signal = KernelPosterior(signal.matrix, noise_level + parameters.jitter)
             of_noise = KernelPosterior(noise.matrix, parameters.nugget + 1.0 / self.site_precisions)
@@ -91,10 +91,10 @@ class VHGP:
         return kernel.matrix(inputs) - self._posterior.signal.explained_covariance(kernel.cross(inputs, self.inputs))
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
+        return self._held_out.of(block)
 
-        block (n,): number of each row's block.
-        """
+    def _predicted_without(self, block: IntArray) -> LatentPrediction:
         problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
         return Bound.tied(problem, self.site_precisions).held_out(block)
 
@@ -109,10 +109,10 @@ def fit_vhgp(
 ) -> VHGP:
     """Maximise the variational bound (plus weak priors, see fit.py) over hyperparameters and site precisions.
 
-    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows; None computes it
-    first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
+    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of these rows or some of them; None
+    computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
     finite.
     """
     check_rows(inputs, outputs)
-    near = start or fit_gp(inputs, outputs, shortest=shortest).parameters
+    near = start or fit_gp(inputs, outputs, shortest=shortest, stop=ROUGH_STOP).parameters
     return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, most_iterations, shortest))

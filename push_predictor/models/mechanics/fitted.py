@@ -38,6 +38,8 @@ class FittedMechanics:
     mechanics: PushMechanics
     values: dict[str, float] = field(default_factory=dict)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    _shapes: dict[tuple[str, ...], Shape] = field(default_factory=dict, init=False, repr=False)
+    _differences: dict[tuple[tuple[str, ...], float], Array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -100,10 +102,6 @@ class FittedMechanics:
         return self._shapes[names]
 
     @cached_property
-    def _shapes(self) -> dict[tuple[str, ...], Shape]:
-        return {}
-
-    @cached_property
     def _shape(self) -> Shape:
         return self.mechanics.shape_of(self._row)
 
@@ -115,10 +113,6 @@ class FittedMechanics:
             own = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
             self._differences[names, difference] = own
         return self._differences[names, difference]
-
-    @cached_property
-    def _differences(self) -> dict[tuple[tuple[str, ...], float], Array]:
-        return {}
 
     def value(self, name: str) -> float:
         """The value of a parameter: the fitted one, or the textbook's."""

@@ -12,14 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.mechanics.kernel.push import displacements, shifts
+from push_predictor.models.mechanics.kernel.push import displacements, drawn, shifts
 from push_predictor.models.mechanics.parameters import PARAMETERS, ParameterValues
-from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.mechanics.surface import (
     NO_SLOPES,
     PowerSurface,
@@ -61,6 +62,9 @@ class PushMechanics:
     support: PressureDistribution | PowerSurface | None = None
     supports: Mapping[int, PressureDistribution] = field(default_factory=dict)
     accuracy: float = 1e-3
+    _tables: dict[tuple[float, ...], SurfaceTables] = field(
+        default_factory=dict, init=False, repr=False
+    )  # by exponents
 
     def displacement(
         self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
@@ -94,6 +98,21 @@ class PushMechanics:
         if len(inputs):
             shape = shape or self.shape_of(values)
             displacements(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
+        return found
+
+    def drawn(
+        self,
+        values: Array,
+        inputs: Array,
+        duration: Array,
+        covariates: Mapping[str, Array] | None = None,
+        shape: Shape | None = None,
+    ) -> Array:
+        """Displacements (n, k, 3) of each push with each of k rows of values (k, 28); shape as in `displaced`."""
+        found = np.empty((len(inputs), len(values), 3))
+        if found.size:
+            shape = shape or self.shape_of(values)
+            drawn(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
         return found
 
     def shifted(self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push) -> Array:
@@ -141,10 +160,19 @@ class PushMechanics:
         own = (self.support,) if isinstance(self.support, PressureDistribution) else ()
         return (*own, *self.supports.values())
 
-    @cached_property
-    def _tables(self) -> dict[tuple[float, ...], SurfaceTables]:
-        """By the exponents of patches that they contain."""
-        return {}
+
+def mechanics_on(
+    outline: Outline,
+    pusher_radius: float,
+    support_points: Array | None,
+    supports: Mapping[int, Array] = MappingProxyType({}),
+) -> PushMechanics:
+    """The mechanics on a rig's support_points (k, 3: x, y in m, load share), on a patch where these are None.
+
+    supports: other points, by number of the recording, in place of the rig's.
+    """
+    own = None if support_points is None or supports else supported_at(support_points)
+    return PushMechanics(outline, pusher_radius, own, {number: supported_at(k) for number, k in supports.items()})
 
 
 def _writeable(values: Array) -> Array:

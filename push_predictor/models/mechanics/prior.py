@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-import scipy
 
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
@@ -73,7 +73,7 @@ class _Update:
         self.spread = prior_spreads(names)
         windows = np.bincount(rows.push)[rows.push]
         self.weight = 1.0 / (1.0 + (windows - 1.0) * CORRELATION)
-        self.travel, self.length = rows.inputs[:, 0] * rows.duration, np.full(len(rows.push), length)
+        self.travel, self.length = rows.inputs[:, 0] * rows.duration, length
 
     def solved(self) -> ParameterUpdate:
         """See `updated`."""
@@ -94,9 +94,9 @@ class _Update:
     def _local(self, values: Array) -> _Local:
         step = np.where(values + DIFFERENCE * self.spread > self.high, -DIFFERENCE, DIFFERENCE) * self.spread
         changed = ProcessNoise.changed(self.names, values)
-        found = self._displacements(np.concatenate([changed, values + np.diag(step)]))
-        jacobian = (found[:, len(changed) :] - found[:, :1]).transpose(0, 2, 1) / step
-        noise = ProcessNoise().covariance(found[:, : len(changed)], self.travel, self.length)
+        found = self._displacements(np.concatenate([values[None], values + np.diag(step), changed]))
+        jacobian = (found[:, 1 : 1 + len(values)] - found[:, :1]).transpose(0, 2, 1) / step
+        noise = ProcessNoise().covariance(found[:, 1 + len(values) :], self.travel, self.length)
         return _Local(self.rows.outcomes - found[:, 0], jacobian, noise)
 
     def _displacements(self, draws: Array) -> Array:
@@ -142,7 +142,6 @@ def _inverse(matrix: Array) -> Array:
     return 0.5 * (inverse + inverse.T)
 
 
-DRAWS = 64
 # Their sign changes in a mirror along the body's x axis, where the others keep theirs.
 MIRRORED = (
     "friction_difference",
@@ -172,29 +171,6 @@ def prior_spreads(names: Sequence[str]) -> Array:
     return np.array([PRIOR_SHARE * BY_NAME[name].spread for name in names])
 
 
-def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAWS) -> Array:
-    """Draws (count, p) from the priors, normal about `means` (p,) and cut off at the plausible ranges.
-
-    A scrambled Sobol' sequence of half of them; the other half are their mirror images, so that a symmetric outline
-    gets symmetric predictions. Deterministic for a seed.
-    """
-    table = [BY_NAME[name] for name in names]
-    spread = prior_spreads(names)
-    low = scipy.special.ndtr((np.array([p.low for p in table]) - means) / spread)
-    high = scipy.special.ndtr((np.array([p.high for p in table]) - means) / spread)
-    half = means + spread * scipy.special.ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))
-    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in names])
-    return np.concatenate([half, sign * half])
-
-
-def normal_draws(names: Sequence[str], means: Array, covariance: Array, seed: int, count: int = DRAWS) -> Array:
-    """Draws (count, p) in pairs on opposite sides of `means` (p,), moved into the plausible ranges."""
-    table = [BY_NAME[name] for name in names]
-    half = scipy.special.ndtri(_sobol(len(names), count // 2, seed)) @ np.linalg.cholesky(covariance).T
-    draws = means + np.concatenate([half, -half])
-    return np.asarray(np.clip(draws, [p.low for p in table], [p.high for p in table]))
-
-
 def displacements(
     mechanics: PushMechanics,
     names: Sequence[str],
@@ -207,26 +183,20 @@ def displacements(
 
     inputs (n, 3), duration (n,) s, covariates as in PushMechanics.displacement.
     """
-    n, k = len(inputs), len(draws)
-    values = np.tile(TEXTBOOK, (n, k, 1))
-    values[:, :, [COLUMN[name] for name in names]] = draws
-    repeated = {name: np.repeat(column, k) for name, column in covariates.items()}
-    moved = mechanics.displaced(
-        values.reshape(n * k, -1), np.repeat(inputs, k, axis=0), np.repeat(duration, k), repeated
-    )
-    return moved.reshape(n, k, 3)
+    return mechanics.drawn(table_of(names, draws), inputs, duration, covariates)
 
 
-def _sobol(dimensions: int, count: int, seed: int) -> Array:
-    from scipy.stats import qmc  # its import would take every node 0.4 s at the start
-
-    uniform = qmc.Sobol(dimensions, scramble=True, seed=seed).random(count)
-    return np.asarray(np.clip(uniform, 1e-9, 1.0 - 1e-9))
+def table_of(names: Sequence[str], draws: Array) -> Array:
+    """Values (k, 28) of all parameters, from draws (k, p) of some."""
+    values = np.tile(TEXTBOOK, (len(draws), 1))
+    values[:, [COLUMN[name] for name in names]] = draws
+    return values
 
 
 VARYING = {"contact_friction": 0.1, "centre_x": 0.004, "centre_y": 0.004}  # standard deviations within a session
 SHARE = 0.05  # of the distance travelled, and of the turn that moves a point at the length c that far
 TRACKER = (1e-4, 1e-4, 1e-3)  # m, m, rad: of the difference of two poses
+_TRACKED = np.square(TRACKER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,24 +207,27 @@ class ProcessNoise:
 
     @staticmethod
     def changed(names: Sequence[str], values: Array) -> Array:
-        """Rows (1 + 2 v, p) of parameters: the values (p,), and each of those that vary increased, then decreased."""
-        rows = np.tile(values, (1 + 2 * len(VARYING), 1))
+        """Rows (2 v, p) of parameters: the values (p,) with each of those that vary increased, then decreased."""
+        rows = np.tile(values, (2 * len(VARYING), 1))
         for k, (name, spread) in enumerate(VARYING.items()):
             column, low, high = names.index(name), BY_NAME[name].low, BY_NAME[name].high
             above, below = min(values[column] + spread, high), max(values[column] - spread, low)
-            rows[1 + k, column], rows[1 + len(VARYING) + k, column] = above, below
+            rows[k, column], rows[len(VARYING) + k, column] = above, below
         return rows
 
-    def covariance(self, displacements: Array, travel: Array, length: Array) -> Array:
+    def covariance(self, varied: Array, travel: Array, length: float) -> Array:
         """Covariance (n, 3, 3) of the noise.
 
-        displacements (n, 1 + 2 v, 3): under the parameters of `changed`. travel (n,), length c (n,) in m.
+        varied (n, 2 v, 3): displacements under the parameters of `changed`. travel (n,), length c in m.
         """
-        varied = displacements[:, 1:]
         shift = 0.5 * (varied[:, : len(VARYING)] - varied[:, len(VARYING) :])
-        covariance = np.einsum("nka,nkb->nab", shift, shift)
-        unit = np.column_stack([travel, travel, travel / length])
-        index = np.arange(3)
-        covariance[:, index, index] += (SHARE * unit) ** 2 + np.square(TRACKER)
+        covariance = shift.transpose(0, 2, 1) @ shift
+        share = SHARE * np.array([1.0, 1.0, 1.0 / length])
+        covariance.reshape(-1, 9)[:, ::4] += np.square(travel[:, None] * share) + _TRACKED  # the diagonals
+        return np.asarray(covariance * self._factors)
+
+    @cached_property
+    def _factors(self) -> Array:
+        """Of the covariance, (3, 3)."""
         root = np.sqrt(self.factor)
-        return np.asarray(covariance * root[:, None] * root)
+        return np.outer(root, root)

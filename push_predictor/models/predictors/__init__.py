@@ -3,18 +3,24 @@
 
 """What a push model predicts with: learnt (Gaussian processes), analytical, prior, or one of them extended by effects.
 
-Callers use the protocol `Predictor` and need not know the class. This folder may import from gaussian_process,
+Callers use what all of them have, as `BasePredictor` describes it. This folder may import from gaussian_process,
 mechanics, mechanisms and effects.
 """
 
 from __future__ import annotations
 
-from push_predictor.models.predictors.extended_predictor import ExtendedPredictor
+from push_predictor.models.features import Scaling
+from push_predictor.models.predictors.extended_predictor import ExtendedPredictor, Predictor
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
-from push_predictor.models.predictors.mechanics_predictor import MechanicsPredictor
-from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
+from push_predictor.models.predictors.predictor import (
+    BasePredictor,
+    Cross,
+    InputLimits,
+    MechanicsPredictor,
+    Moments,
+    Shift,
+)
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
-from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
 
 __all__ = [

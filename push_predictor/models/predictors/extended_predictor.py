@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
 from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Shift
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import INPUTS
@@ -29,7 +30,7 @@ class ExtendedPredictor:
     """A base with effects: each shifts the mean and adds its own uncertainty to the covariance.
 
     scale (3,): factor on the base's standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see
-    Predictor; pairs that it lacks are independent. Without it, two effects with correlated covariates would seem far
+    Cross; pairs that it lacks are independent. Without it, two effects with correlated covariates would seem far
     less certain than their sum is. session: the one that the effects were traced on.
     """
 
@@ -41,58 +42,58 @@ class ExtendedPredictor:
 
     @property
     def mechanics(self) -> FittedMechanics:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.base.mechanics
 
     @property
     def learnt(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.base.learnt
 
     @property
     def tails(self) -> Tails | None:
-        """See Predictor: those of the base."""
+        """See BasePredictor: those of the base."""
         return self.base.tails
 
     @property
     def absorbs(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.base.absorbs
 
     @property
     def integrates(self) -> bool:
-        """See Predictor: responses of effects are derivatives of integrated mechanics."""
+        """See BasePredictor: responses of effects are derivatives of integrated mechanics."""
         return True
 
     @cached_property
     def covariates(self) -> tuple[str, ...]:
-        """See Predictor."""
+        """See BasePredictor."""
         of_effects = (name for effect in self.effects for name in effect.needs)
         return tuple(dict.fromkeys((*self.base.covariates, *of_effects)))
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
-        """See Predictor."""
+        """See BasePredictor."""
         return tuple(name for name in self.covariates if name not in (*GIVEN_BY_INPUTS, *self.defaults))
 
     @cached_property
     def defaults(self) -> dict[str, float]:
-        """See Predictor."""
+        """See BasePredictor."""
         return {name: self.session.now[name] for name in self.covariates if name in self.session.now}
 
     @cached_property
     def past(self) -> tuple[str, ...]:
-        """See Predictor."""
+        """See BasePredictor."""
         growing = {name for effect in self.effects if effect.basis.name != "step" for name in effect.needs}
         return tuple(name for name in self.defaults if name not in growing)
 
     @property
     def own_limits(self) -> InputLimits | None:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.base.own_limits
 
     def completed(self, push: Push) -> Push:
-        """See Predictor."""
+        """See BasePredictor."""
         if not self._of_inputs and self.defaults.keys() <= push.covariates.keys():
             return push
         given = dict(zip(INPUTS, push.inputs.T, strict=True))
@@ -107,15 +108,15 @@ class ExtendedPredictor:
         return tuple(name for name in self.covariates if name in GIVEN_BY_INPUTS)
 
     def moments(self, push: Push) -> Moments:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.with_effects(self.base.moments(push), push)
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor; the effects are those estimated from all rows."""
+        """See BasePredictor; the effects are those estimated from all rows."""
         return self.with_effects(self.base.held_out_moments(rows, block), rows)
 
     def with_effects(self, moments: Moments, push: Push) -> Moments:
-        """See Predictor."""
+        """See BasePredictor."""
         mean, total, process = moments
         shift, uncertainty = self.shift(push)
         return Moments(mean + shift, total * self._factor + uncertainty, process * self._factor)
@@ -126,7 +127,7 @@ class ExtendedPredictor:
         return np.outer(self.scale, self.scale)
 
     def shift(self, push: Push) -> Shift:
-        """See Predictor."""
+        """See BasePredictor."""
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
@@ -149,15 +150,16 @@ class ExtendedPredictor:
         return covariance_of(self.effects, self.cross)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Predictor."""
-        if self.base.gaussian:
-            return None
+        """See BasePredictor."""
         return self.base.shifted_log_density(push, outcomes, self.shift(push), self.scale)
 
-    def with_base(self, base: BasePredictor) -> Predictor:
-        """See Predictor."""
+    def with_base(self, base: BasePredictor) -> ExtendedPredictor:
+        """See BasePredictor."""
         return replace(self, base=base)
 
-    def with_independent_outputs(self) -> Predictor:
-        """See Predictor."""
+    def with_independent_outputs(self) -> ExtendedPredictor:
+        """See BasePredictor."""
         return replace(self, base=self.base.with_independent_outputs())
+
+
+Predictor: TypeAlias = BasePredictor | ExtendedPredictor

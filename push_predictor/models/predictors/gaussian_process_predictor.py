@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.features import DEVIATION, Scaling
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.predictor import BasePredictor, Moments, Shift
-from push_predictor.models.predictors.scaling import DEVIATION, Scaling
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
 from push_predictor.recordings.rig import Rig
@@ -43,27 +43,27 @@ class GaussianProcessPredictor(BasePredictor):
 
     @property
     def learnt(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return True
 
     @property
     def gaussian(self) -> bool:
-        """See BasePredictor: with known noise and no tails."""
+        """Whether the exact predictive is the Gaussian of its moments: with known noise and no tails."""
         return self.tails is None and all(regression.gaussian for regression in self.regressions)
 
     @property
     def absorbs(self) -> bool:
-        """See Predictor: without a mean."""
+        """See BasePredictor: without a mean."""
         return self.mean is None
 
     @property
     def integrates(self) -> bool:
-        """See Predictor."""
+        """See BasePredictor."""
         return self.mean is not None
 
     @cached_property
     def mechanics(self) -> FittedMechanics:
-        """See Predictor: the mean, or the textbook's analytical model."""
+        """See BasePredictor: the mean, or the textbook's analytical model."""
         if self.mean is not None:
             return self.mean
         return analytical_mechanics(self.rig.outline, self.rig.pusher_radius)
@@ -74,14 +74,8 @@ class GaussianProcessPredictor(BasePredictor):
         sd = self.scaling.outcome_sd
         return sd if self.tails is None else np.asarray(sd * self.tails.factor)
 
-    @property
-    def targets(self) -> Array:
-        """What the regressions were trained on (n, 3), SI: outcomes, or residuals about the mean."""
-        scaled = np.column_stack([regression.outputs for regression in self.regressions])
-        return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
-
     def moments(self, push: Push) -> Moments:
-        """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
+        """See BasePredictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
         return self.of_outcomes(
@@ -89,18 +83,11 @@ class GaussianProcessPredictor(BasePredictor):
         )
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor. The correlation at a row is that of the other blocks' rows; the mean is that of all rows."""
+        """See BasePredictor. The correlation at a row is that of the other blocks; the mean is that of all rows."""
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
         correlation = self.correlation.held_out(features, block) if self.correlation else None
         return self.of_outcomes(self._moments_of(latent, correlation), rows)
-
-    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Predictor."""
-        if self.tails is not None:
-            moments = self.moments(push)
-            return _student(self.tails, outcomes - moments.mean, _variances(moments.covariance))
-        return None if self.gaussian else self._log_density(self.latent(push.inputs), push, outcomes)
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
         """See BasePredictor.
@@ -140,8 +127,16 @@ class GaussianProcessPredictor(BasePredictor):
 
     def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
         """Moments of the outcomes from those of what was learnt, which know the training's speeds alone."""
-        mean, covariance, process_covariance = self.scaled(learnt, push)
-        return Moments(mean + self.displacement(push), covariance, process_covariance)
+        mean, covariance, process = learnt
+        if self.scaling.travel is not None:
+            size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
+            if beyond.any():
+                process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
+                deviation = (DEVIATION * beyond * self.reported_sd) ** 2
+                covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
+            square = (size * size)[:, :, None]
+            mean, covariance, process = mean * size, covariance * square, process * square
+        return Moments(mean + self.displacement(push), covariance, process)
 
     def displacement(self, push: Push) -> Array:
         """Displacement (n, 3) of the mean, zero if it has none."""
@@ -149,24 +144,11 @@ class GaussianProcessPredictor(BasePredictor):
             return np.zeros((len(push.inputs), 3))
         return self.mean.displacement(push.inputs, push.duration, push.covariates)
 
-    def scaled(self, learnt: Moments, push: Push) -> Moments:
-        """The same about the displacement of the mechanics."""
-        if self.scaling.travel is None:
-            return learnt
-        size, beyond = self._size(push), self.scaling.beyond(push.inputs)[:, None]
-        mean, covariance, process = learnt
-        if beyond.any():
-            process = process * np.exp(self.scaling.noise_growth(push.inputs))[:, None, None]
-            deviation = (DEVIATION * beyond * self.reported_sd) ** 2
-            covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
-        square = (size * size)[:, :, None]
-        return Moments(mean * size, covariance * square, process * square)
-
     def of_targets(self) -> GaussianProcessPredictor:
         """The predictor of what was learnt, at a path of the scaling's travel; itself if that are the outcomes."""
         if self.mean is None and self.scaling.travel is None:
             return self
-        return replace(self, mean=None, scaling=self.scaling.without_path())
+        return replace(self, mean=None, scaling=replace(self.scaling, travel=None))
 
     def free_matrices(self) -> None:
         """Free what predictions would compute again."""
@@ -175,7 +157,7 @@ class GaussianProcessPredictor(BasePredictor):
                 regression.free_matrices()
 
     def with_independent_outputs(self) -> GaussianProcessPredictor:
-        """See Predictor."""
+        """See BasePredictor."""
         return replace(self, correlation=None)
 
     def _size(self, push: Push) -> Array:

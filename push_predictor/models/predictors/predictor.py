@@ -1,14 +1,15 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a push model asks of the mathematics behind it: the protocol of predictors, and what bases have in common."""
+"""What a push model asks of the mathematics behind it, as mechanics alone do it; other bases override parts of it."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import ClassVar, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array, BoolArray, IntArray
 
+# For effects i < j that were estimated jointly: the covariance (coefficients of i, coefficients of j).
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
 Self = TypeVar("Self", bound="BasePredictor")
 
@@ -51,99 +53,8 @@ class InputLimits(NamedTuple):
         return np.asarray(fast & (angle >= self.angle[0]) & (angle <= self.angle[1]))
 
 
-class Predictor(Protocol):
-    """Predicts the outcome of pushes. Every predictor is a base, learnt or analytical, with any number of effects."""
-
-    @property
-    def base(self) -> BasePredictor:
-        """The predictor without its effects."""
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The effects that extend the base."""
-
-    @property
-    def cross(self) -> Cross:
-        """For effects i < j that were estimated jointly: the covariance (coefficients of i, coefficients of j)."""
-
-    @property
-    def mechanics(self) -> FittedMechanics:
-        """Mechanics whose parameters effects change: its own, or the textbook's if it has none."""
-
-    @property
-    def learnt(self) -> bool:
-        """Whether the base was fitted as a function of its inputs, so that its training data bound its domain."""
-
-    @property
-    def absorbs(self) -> bool:
-        """Whether a refit learns a constant change of the mechanics, because it keeps no parameters of theirs."""
-
-    @property
-    def integrates(self) -> bool:
-        """Whether predicting integrates mechanics, which takes longer the further the push."""
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Names of the covariates that every push must bring."""
-
-    @property
-    def session(self) -> TracedSession:
-        """The session that the effects were traced on."""
-
-    @property
-    def defaults(self) -> Mapping[str, float]:
-        """The values, by name, of covariates of the effects that a push may omit: those at the end of the session."""
-
-    @property
-    def past(self) -> tuple[str, ...]:
-        """Names of the covariates with a default in which the effects only have steps: these lie in the past."""
-
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
-
-    @property
-    def tails(self) -> Tails | None:
-        """Distribution of the outcomes in units of the standard deviations; None for a Gaussian or a VHGP's own."""
-
-    @property
-    def own_limits(self) -> InputLimits | None:
-        """Limits of the pushes for which the base is meant; None if its training pushes bound its domain."""
-
-    def completed(self, push: Push) -> Push:
-        """The pushes with those of `covariates` that follow from their inputs, and with defaults for others."""
-
-    def moments(self, push: Push) -> Moments:
-        """Moments of the outcomes of n pushes."""
-
-    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """Moments at the n training rows, each predicted without the rows of its block; hyperparameters are kept.
-
-        block (n,): number of each row's block.
-        """
-
-    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """Log density (n, 3) of outcomes under the exact predictive, or None where that is a Gaussian."""
-
-    def with_effects(self, moments: Moments, push: Push) -> Moments:
-        """Moments of the base, from `moments` or a table, with the effects added."""
-
-    def shift(self, push: Push) -> Shift:
-        """The sum of the effects at n pushes."""
-
-    def with_base(self, base: BasePredictor) -> Predictor:
-        """The same effects on another base."""
-
-    def with_independent_outputs(self) -> Predictor:
-        """The same predictor without the correlation of its outputs; an analytical base keeps its covariance."""
-
-
 class BasePredictor(ABC):
-    """A predictor without effects, which effects can extend: see Predictor for what is not described here.
-
-    What is not overridden holds for mechanics alone, without a learnt function of the inputs: training rows are
-    predicted like others, and the predictive is taken for a Gaussian.
-    """
+    """A predictor without effects, which effects can extend; what is not overridden holds for mechanics alone."""
 
     effects: ClassVar[tuple[Effect, ...]] = ()
     cross: ClassVar[Cross] = MappingProxyType({})
@@ -153,72 +64,70 @@ class BasePredictor(ABC):
 
     @property
     def base(self: Self) -> Self:
-        """Itself."""
+        """The predictor without its effects."""
         return self
 
     @property
     @abstractmethod
     def mechanics(self) -> FittedMechanics:
-        """See Predictor."""
+        """Mechanics whose parameters effects change: its own, or the textbook's if it has none."""
 
     @property
     def learnt(self) -> bool:
-        """See Predictor."""
+        """Whether it was fitted as a function of its inputs, so that its training data bound its domain."""
         return False
 
     @property
     def absorbs(self) -> bool:
-        """See Predictor: parameters are kept."""
+        """Whether a refit learns a constant change of the mechanics, because it keeps no parameters of theirs."""
         return False
 
     @property
     def integrates(self) -> bool:
-        """See Predictor."""
-        return True
-
-    @property
-    def gaussian(self) -> bool:
-        """Whether the exact predictive is the Gaussian of its moments."""
+        """Whether predicting integrates mechanics, which takes longer the further the push."""
         return True
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """See Predictor: those of the mechanics."""
+        """Names of the covariates that every push must bring."""
         return self.mechanics.needs
 
     @property
     def covariates(self) -> tuple[str, ...]:
-        """See Predictor: those that the mechanics depend on."""
+        """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
         return self.needs
 
     @property
     def tails(self) -> Tails | None:
-        """See Predictor."""
+        """Distribution of the outcomes in units of the standard deviations; None for a Gaussian or a VHGP's own."""
         return None
 
     @property
     def own_limits(self) -> InputLimits | None:
-        """See Predictor."""
+        """Limits of the pushes for which it is meant; None if its training pushes bound its domain."""
         return None
 
     def completed(self, push: Push) -> Push:
-        """See Predictor."""
+        """The pushes with those of `covariates` that follow from their inputs."""
         return push
 
     @abstractmethod
     def moments(self, push: Push) -> Moments:
-        """See Predictor."""
+        """Moments of the outcomes of n pushes."""
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor."""
+        """Moments at the n training rows, each predicted without the rows of its block; hyperparameters are kept.
+
+        block (n,): number of each row's block. Without a learnt function, training rows are predicted like others.
+        """
         return self.moments(rows)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Predictor."""
-        return None
+        """Log density (n, 3) of outcomes under the exact predictive, or None where that is a Gaussian."""
+        return self.shifted_log_density(push, outcomes, self.shift(push), np.ones(3))
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
-        """Like `exact_log_density` with a shift added and the standard deviations multiplied by scale (3,)."""
+        """The same with a shift added and the standard deviations multiplied by scale (3,)."""
         return None
 
     def of_outcomes(self, learnt: Moments, push: Push) -> Moments:
@@ -226,17 +135,36 @@ class BasePredictor(ABC):
         return learnt
 
     def with_effects(self, moments: Moments, push: Push) -> Moments:
-        """See Predictor."""
+        """Moments of the base, from `moments` or a table, with the effects added."""
         return moments
 
     def shift(self, push: Push) -> Shift:
-        """See Predictor: zero."""
+        """The sum of the effects at n pushes."""
         return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
 
-    def with_base(self, base: BasePredictor) -> Predictor:
-        """See Predictor."""
+    def with_base(self, base: BasePredictor) -> BasePredictor:
+        """The same effects on another base."""
         return base
 
     def with_independent_outputs(self: Self) -> Self:
-        """See Predictor."""
+        """The same predictor without the correlation of its outputs; mechanics keep their covariance."""
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class MechanicsPredictor(BasePredictor):
+    """Mechanics, textbook's or fitted; covariance (3, 3) of the outcomes of all pushes about them."""
+
+    fitted: FittedMechanics
+    covariance: Array
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See BasePredictor."""
+        return self.fitted
+
+    def moments(self, push: Push) -> Moments:
+        """See BasePredictor."""
+        mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
+        of_all = self.covariance[None].repeat(len(mean), axis=0)
+        return Moments(mean, of_all, of_all.copy())

@@ -80,8 +80,7 @@ class Tails:
 
     def half_width(self, level: float, kind: IntervalKind = "student") -> Array:
         """Half-width (3,) of the central interval of that level, in (0, 1). Raises RequestError."""
-        if not 0.0 < level < 1.0:
-            raise RequestError("level", level, "a number above 0 and below 1")
+        _check_level(level)
         if kind == "student":
             return np.asarray(self.unit_scale * scipy.special.stdtrit(self.degrees, 0.5 + 0.5 * level))
         if kind == "conformal":
@@ -121,18 +120,20 @@ def half_widths(tails: Tails | None, level: float, kind: IntervalKind = "student
         return tails.half_width(level, kind)
     if kind != "student":
         raise RequestError("interval", kind, "student, for a model without residuals of held-out training pushes")
-    if not 0.0 < level < 1.0:
-        raise RequestError("level", level, "a number above 0 and below 1")
+    _check_level(level)
     return np.full(3, float(scipy.special.ndtri(0.5 + 0.5 * level)))
 
 
 def joint_radius(tails: Tails | None, level: float, outputs: int = 3) -> float:
     """See Tails; that of a Gaussian without tails."""
-    return (
-        float(np.sqrt(scipy.special.chdtri(outputs, 1.0 - level)))
-        if tails is None
-        else tails.joint_radius(level, outputs)
-    )
+    if tails is not None:
+        return tails.joint_radius(level, outputs)
+    return float(np.sqrt(scipy.special.chdtri(outputs, 1.0 - level)))
+
+
+def _check_level(level: float) -> None:
+    if not 0.0 < level < 1.0:
+        raise RequestError("level", level, "a number above 0 and below 1")
 
 
 def student_log_density(residuals: Array, scale: Array | float, degrees: Array | float) -> Array:

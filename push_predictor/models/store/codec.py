@@ -80,20 +80,21 @@ class Reader:
             )
         if hint in NUMBERS:
             return hint(found) if type(found) in NUMBERS[hint] else _refuse(place, found, hint.__name__)
-        return self._object(found, CHOICES.get(hint, (hint,)), place)
+        return self._object(found, [hint], place)
 
     def _one_of(self, choices: Sequence[Any], found: Any, place: str) -> Any:
         return self.read(found, choices[0], place) if len(choices) == 1 else self._object(found, choices, place)
 
-    def _object(self, found: Any, choices: Sequence[type], place: str) -> Any:
+    def _object(self, found: Any, hints: Sequence[type], place: str) -> Any:
+        choices = [cls for hint in hints for cls in CHOICES.get(hint, (hint,))]
         names = [name for name, cls in CLASSES.items() if cls in choices]
         if not isinstance(found, dict) or found.get(CLASS) not in names:
             _refuse(place, found, f"an object of class {' or '.join(names)}")
         cls, own = CLASSES[found[CLASS]], {name: value for name, value in found.items() if name != CLASS}
-        hints = _hints(cls)
-        if own.keys() != hints.keys():
-            _refuse(place, sorted(own), f"the fields {', '.join(hints)}: train the model again")
-        arguments = {name: self.read(own[name], hint, f"{place}.{name}") for name, hint in hints.items()}
+        fields = _hints(cls)
+        if own.keys() != fields.keys():
+            _refuse(place, sorted(own), f"the fields {', '.join(fields)}: train the model again")
+        arguments = {name: self.read(own[name], hint, f"{place}.{name}") for name, hint in fields.items()}
         arguments |= {name: value for (owner, name), value in self.given.items() if owner is cls}
         check(cls, arguments, place)
         return cls(**arguments)

@@ -24,15 +24,10 @@ from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.regression import ConstantNoise
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import (
-    GaussianProcessPredictor,
-    MechanicsPredictor,
-    Predictor,
-    PriorPredictor,
-)
+from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor, Predictor, PriorPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push

@@ -12,7 +12,7 @@ from threading import Lock
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
 from push_predictor.models.push_model import defaults_in_words, mean_in_words
 from push_predictor.models.store.model_file import is_model_file
-from push_predictor.models.store.table_cache import completed, load_at_once, load_served
+from push_predictor.models.store.table_cache import completed, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 from push_predictor.types import Array
@@ -73,7 +73,7 @@ class ModelRegistry:
         then unchanged.
         """
         path = _located(path)
-        tabulated = load_at_once(path) if at_once else load_served(path)
+        tabulated = load_served(path, at_once=at_once)
         name = name or tabulated.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is already used by {self._files[name]}, give another name")
@@ -90,13 +90,10 @@ class ModelRegistry:
         for name, known in self._models.items():
             if cancelled():
                 return
-            self._replace(name, known, completed(known))
-
-    def _replace(self, name: str, known: TabulatedModel, found: TabulatedModel) -> None:
-        """Register the model in place of a known one, unless another one has taken its name."""
-        with self._lock:
-            if self._models.get(name) is known:
-                self._models = {**self._models, name: found}
+            found = completed(known)
+            with self._lock:
+                if self._models.get(name) is known:  # another one may have taken its name
+                    self._models = {**self._models, name: found}
 
     @property
     def answering(self) -> list[str]:
@@ -116,7 +113,10 @@ class ModelRegistry:
                 problems.append(f"models[{index}]: {error}")
                 continue
             for path in files:
-                problems += self._problem(path, at_once)
+                try:
+                    self.load(path, replace=False, at_once=at_once)
+                except PushPredictorError as error:
+                    problems.append(str(error))
         return problems
 
     def describe(self, name: str) -> str:
@@ -136,13 +136,6 @@ class ModelRegistry:
             "file": self._files[name],
         }
         return "; ".join(f"{key}={value}" for key, value in values.items())
-
-    def _problem(self, path: Path, at_once: bool) -> list[str]:
-        try:
-            self.load(path, replace=False, at_once=at_once)
-        except PushPredictorError as error:
-            return [str(error)]
-        return []
 
 
 def _speeds(speed: Array) -> str:

@@ -14,13 +14,13 @@ import numpy as np
 
 from push_predictor.models.effects.covariate_range import CUMULATIVE
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, generic_width
+from push_predictor.models.effects.effect import GENERIC_WIDTH, Effect
 from push_predictor.models.effects.exact import covariance_of
 from push_predictor.models.effects.traced_session import Mark, TracedSession
+from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -34,7 +34,6 @@ from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsPredictor,
-    Predictor,
     PriorPredictor,
     Scaling,
     Tails,
@@ -55,10 +54,7 @@ CLASSES: dict[str, type] = {
         *(FittedMechanics, PushMechanics, PressureDistribution, PowerSurface, ProcessNoise),
     )
 }
-CHOICES: dict[Any, tuple[type, ...]] = {
-    BasePredictor: BASES_OF_EFFECTS,
-    Predictor: (*BASES_OF_EFFECTS, ExtendedPredictor),
-}
+CHOICES: dict[Any, tuple[type, ...]] = {BasePredictor: BASES_OF_EFFECTS}
 # What follows from the rig and from the training rows.
 GIVEN = {(cls, name) for cls in REGRESSIONS for name in ("inputs", "outputs")} | {
     (GaussianProcessPredictor, "rig"),
@@ -226,7 +222,7 @@ def _basis(a: SimpleNamespace) -> None:
 def _effect(a: SimpleNamespace) -> None:
     if a.mechanism is not None and a.mechanism not in [known.name for known in (*LIBRARY, *REFINEMENTS)]:
         raise ValueError(f"mechanism {a.mechanism!r} is not in the library")
-    width = generic_width() if a.mechanism is None else len(mechanism_named(a.mechanism).parameters)
+    width = GENERIC_WIDTH if a.mechanism is None else len(mechanism_named(a.mechanism).parameters)
     size = width * columns_of(a.basis)
     if a.coefficients.shape != (size,) or a.covariance.shape != (size, size):
         raise ValueError(f"{size} coefficients and their covariance are needed")

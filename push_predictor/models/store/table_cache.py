@@ -16,8 +16,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +29,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import load_model, model_digest
-from push_predictor.models.tabulated.prediction_table import TableNodes
+from push_predictor.models.tabulated.prediction_table import table_from_nodes
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
-from push_predictor.models.tabulated.tabulated_domain import domain_from_nodes
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_domain
+from push_predictor.models.tabulated.table_nodes import TableNodes
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_table
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
@@ -41,7 +40,7 @@ FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
 ENDING = ".tables"
 FORMAT_VERSION = 6  # also to be raised when a table's values change their meaning
 CHECKED = 10  # random pushes of the domain, as many training pushes, and as many outside the domain
-PARTS: dict[str, Any] = {  # of a file: fields of TabulatedDomain, TableNodes, TableAccuracy and Probes, in their order
+PARTS: dict[str, Any] = {  # of a file: fields of PredictionTable, TableNodes, TableAccuracy and Probes, in their order
     "ends": tuple[Array, Array],
     "nodes": tuple[list[int], list[int], list[float], list[Array]],
     "error": tuple[float, float],
@@ -52,36 +51,20 @@ MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
 
 @one_blas_thread()
-def load_served(path: Path) -> TabulatedModel:
+def load_served(path: Path, *, at_once: bool = False) -> TabulatedModel:
     """The model of a file as the server predicts with it, its tables from disk where they are there.
 
-    Raises ModelFileError as `load_model` does, and if the model cannot predict.
-    """
-    with _naming(path):
-        return completed(load_at_once(path))
-
-
-@one_blas_thread()
-def load_at_once(path: Path) -> TabulatedModel:
-    """The same, but a model without tables on disk predicts by itself, and states that its table is missing.
-
-    `completed` adds the tables. Raises ModelFileError.
+    at_once: a model without tables on disk predicts by itself, and states that its table is missing; `completed` adds
+    it. Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
     model = load_model(path, check=False)
-    with _naming(path):
+    try:
         # The model of a kept table was checked before the table was computed.
         served = _read(model, path) or _without_tables(load_model(path))
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         served.predict_rows(first.inputs, first.duration, first.covariates)
-    return served
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Name the file of a model that cannot predict. Raises ModelFileError."""
-    try:
-        yield
+        return served if at_once else completed(served)
     except ModelFileError:
         raise
     except Exception as error:
@@ -90,12 +73,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 @one_blas_thread()
 def completed(served: TabulatedModel) -> TabulatedModel:
-    """A model of `load_at_once` with its tables; itself if it has them."""
+    """A model that was loaded at once, with its tables; itself if it has them."""
     if served.how != NO_TABLE_YET:
         return served
     tabulated = _computed(served.model)
     tabulated.free_matrices()
-    _return_memory()
+    gc.collect()
+    with suppress(AttributeError, OSError):  # another C library; glibc would keep 100 MB for later
+        ctypes.CDLL(None).malloc_trim(0)
     return tabulated
 
 
@@ -155,22 +140,22 @@ def read_tables(path: Path, digest: str, model: PushModel) -> TabulatedModel | N
         if (record["format_version"], record["model"]) != (FORMAT_VERSION, digest):
             return None
         found = {name: Reader(arrays).read(record[name], hint, name) for name, hint in PARTS.items()}
-        domain = domain_from_nodes(learnt, learnt.predictor, found["ends"], TableNodes(*found["nodes"]))
-        accepted = Probes(*found["probes"]).error_of(domain).accepted
+        table = table_from_nodes(TableNodes(*found["nodes"]), learnt.predictor, found["ends"])
+        accepted = Probes(*found["probes"]).error_of(table).accepted
     except (ModelFileError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None
-    return with_domain(model, domain, TableAccuracy(*found["error"])) if accepted else None
+    return with_table(model, table, TableAccuracy(*found["error"])) if accepted else None
 
 
 def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
     """Write the table of a model with this digest, if it has one. Raises OSError."""
-    domain, error = tabulated.domain, tabulated.error
-    if domain is None or error is None:
+    table, error = tabulated.table, tabulated.error
+    if table is None or error is None:
         return
-    nodes, probes = domain.table.nodes, probed(of_targets(tabulated.model.base), CHECKED)
+    probes = probed(of_targets(tabulated.model.base), CHECKED)
     parts = {
-        "ends": (domain.least, domain.most),
-        "nodes": tuple(vars(nodes).values()),
+        "ends": (table.least, table.most),
+        "nodes": tuple(vars(table.nodes).values()),
         "error": tuple(vars(error).values()),
         "probes": tuple(vars(probes).values()),
     }
@@ -180,9 +165,8 @@ def write_tables(path: Path, digest: str, tabulated: TabulatedModel) -> None:
 
 
 def _without_tables(model: PushModel) -> TabulatedModel:
-    if not isinstance(model.base.predictor, GaussianProcessPredictor):
-        return tabulate(model)
-    return TabulatedModel(model, NO_TABLE_YET)
+    learns = isinstance(model.base.predictor, GaussianProcessPredictor)
+    return TabulatedModel(model, NO_TABLE_YET) if learns else tabulate(model)
 
 
 def _computed(model: PushModel) -> TabulatedModel:
@@ -193,13 +177,6 @@ def _computed(model: PushModel) -> TabulatedModel:
             write_tables(kept, digest, served)
             _delete_oldest(kept.parent)
     return served
-
-
-def _return_memory() -> None:
-    """Give the memory of the computation back: glibc would keep 100 MB for later."""
-    gc.collect()
-    with suppress(AttributeError, OSError):  # another C library
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _kept(digest: str) -> Path | None:

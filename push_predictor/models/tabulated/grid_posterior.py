@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
+from typing import TypeAlias
 
 import numpy as np
 import scipy
@@ -22,8 +23,9 @@ import scipy
 from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.regression import ConstantNoise, Regression
 from push_predictor.models.gaussian_process.ridge import DenseKernel
-from push_predictor.models.gaussian_process.sparse.vhgp import InducedPosterior, SparseVHGP
+from push_predictor.models.gaussian_process.sparse_vhgp import InducedPosterior, SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.types import Array, IntArray
 
@@ -36,14 +38,16 @@ _EPSILON = float(np.finfo(np.float64).eps)
 class GridPosterior:
     """The posterior of a function f with a prior mean of zero.
 
-    kernel; inputs (n, D); noise_variances (n,); weights (n,), the mean is k(x, X) weights; prior_variance, of f at any
+    kernel; inputs (n, D); weights (n,), the mean is k(x, X) weights; pivots Z (r,): rows of the inputs; root (r, s)
+    makes of the correlations with Z a vector whose squared norm is the explained variance. prior_variance, of f at any
     point; least_variance, what its posterior variance cannot fall below.
     """
 
     kernel: ArdKernel
     inputs: Array
-    noise_variances: Array
     weights: Array
+    pivots: IntArray
+    root: Array
     prior_variance: float
     least_variance: float
 
@@ -54,30 +58,11 @@ class GridPosterior:
         """
         first, rest = factors[0], reduce(_all_pairs, factors[1:], np.ones((1, len(self.weights))))
         mean = (first * (self.kernel.variance * self.weights)) @ rest.T
-        pivots, root = self._explaining
-        first, rest = first[:, pivots], rest[:, pivots]
-        explained = np.array([_squared_norms((rest * row) @ root) for row in first])
+        first, rest = first[:, self.pivots], rest[:, self.pivots]
+        explained = np.array([_squared_norms((rest * row) @ self.root) for row in first])
         variance = np.maximum(self.prior_variance - explained, self.least_variance)
         shape = [len(factor) for factor in factors]
         return mean.reshape(shape), variance.reshape(shape)
-
-    @cached_property
-    def _explaining(self) -> tuple[IntArray, Array]:
-        """Rows Z (r,) of the inputs, and the matrix (r, s) that makes of the correlations with Z a vector whose squared
-        norm is the explained variance.
-        """
-        prior, smallest_noise = self.kernel.variance, float(self.noise_variances.min())
-        dropped = max(_DROPPED * smallest_noise / prior, _ROUNDING)
-        factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(
-            self.kernel.matrix(self.inputs), tol=dropped * prior, lower=1
-        )
-        basis, order = np.tril(factor[:, :rank]), pivots - 1
-        weighted = basis / np.sqrt(self.noise_variances[order])[:, None]
-        information, vectors = np.linalg.eigh(weighted.T @ weighted)
-        share = information / (1.0 + information)
-        kept = share > dropped
-        root = scipy.linalg.blas.dtrsm(prior, basis[:rank], vectors[:, kept] * np.sqrt(share[kept]), lower=1, trans_a=1)
-        return order[:rank], root
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +76,16 @@ class GridRegression:
     noise: GridPosterior | None
 
 
-def grid_regression(regression: GaussianProcess | VHGP) -> GridRegression:
-    """The posteriors of a regression, to be evaluated on grids."""
-    return _of_vhgp(regression) if isinstance(regression, VHGP) else _of_gp(regression)
+OnGrid: TypeAlias = GridRegression | ConstantNoise
+
+
+def on_grid(regression: Regression) -> OnGrid:
+    """The posteriors of any regression, to be evaluated on grids."""
+    if isinstance(regression, ConstantNoise):
+        return regression
+    if isinstance(regression, GaussianProcess):
+        return _of_gp(regression)
+    return _of_vhgp(regression) if isinstance(regression, VHGP) else _of_sparse(regression)
 
 
 def _of_gp(regression: GaussianProcess) -> GridRegression:
@@ -101,7 +93,7 @@ def _of_gp(regression: GaussianProcess) -> GridRegression:
     noises = np.full(len(regression.outputs), noise)
     ridge = DenseKernel.of(kernel, regression.inputs).regularise(1.0 / noises)
     weights, prior = ridge.residual(regression.outputs / noise), kernel.variance
-    signal = GridPosterior(kernel, regression.inputs, noises, weights, prior, _EPSILON * prior)
+    signal = _factorised(kernel, regression.inputs, noises, weights, prior, _EPSILON * prior)
     return GridRegression(signal, float(np.log(noise)), None)
 
 
@@ -111,11 +103,43 @@ def _of_vhgp(regression: VHGP) -> GridRegression:
     bound = Bound.tied(problem, regression.site_precisions)
     jitter, nugget = parameters.jitter, parameters.nugget
     of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
-    seen_through, least = nugget + 1.0 / bound.site_precisions, nugget + _EPSILON * of_noise
-    jittered = bound.noise_level + jitter
-    signal = GridPosterior(parameters.signal, inputs, jittered, bound.alpha, of_signal + jitter, jitter)
-    noise = GridPosterior(parameters.noise, inputs, seen_through, bound.mean_weights, of_noise + nugget, least)
+    seen_through, least = nugget + 1.0 / bound.sites.precisions, nugget + _EPSILON * of_noise
+    jittered = bound.signal.level + jitter
+    signal = _factorised(parameters.signal, inputs, jittered, bound.signal.likelihood.alpha, of_signal + jitter, jitter)
+    noise = _factorised(parameters.noise, inputs, seen_through, bound.mean_weights, of_noise + nugget, least)
     return GridRegression(signal, parameters.noise_mean, noise)
+
+
+def _of_sparse(regression: SparseVHGP) -> GridRegression:
+    parameters = regression.parameters
+    jitter, of_noise, nugget = parameters.jitter, parameters.noise.variance, parameters.nugget
+    signal = _induced(regression.signal, parameters.signal.variance + jitter, jitter)
+    noise = _induced(regression.noise, of_noise + nugget, nugget + _EPSILON * of_noise)
+    return GridRegression(signal, parameters.noise_mean, noise)
+
+
+def _factorised(
+    kernel: ArdKernel, inputs: Array, noises: Array, weights: Array, prior_variance: float, least_variance: float
+) -> GridPosterior:
+    """The posterior from rows that are seen through noise variances (n,)."""
+    dropped = max(_DROPPED * float(noises.min()) / kernel.variance, _ROUNDING)
+    factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(kernel.matrix(inputs), tol=dropped * kernel.variance, lower=1)
+    basis, order = np.tril(factor[:, :rank]), pivots - 1
+    weighted = basis / np.sqrt(noises[order])[:, None]
+    information, vectors = np.linalg.eigh(weighted.T @ weighted)
+    share = information / (1.0 + information)
+    kept = share > dropped
+    scaled = vectors[:, kept] * np.sqrt(share[kept])
+    root = scipy.linalg.blas.dtrsm(kernel.variance, basis[:rank], scaled, lower=1, trans_a=1)
+    return GridPosterior(kernel, inputs, weights, order[:rank], root, prior_variance, least_variance)
+
+
+def _induced(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> GridPosterior:
+    """The posterior from inducing inputs, which needs no factorisation."""
+    kernel, inputs, root = posterior.kernel, posterior.inducing, posterior.kernel.variance * posterior.root
+    return GridPosterior(
+        kernel, inputs, posterior.weights, np.arange(len(inputs)), root, prior_variance, least_variance
+    )
 
 
 def weighted_sums(factors: Sequence[Array], weights: Array) -> Array:
@@ -137,31 +161,3 @@ def _all_pairs(left: Array, right: Array) -> Array:
 
 def _squared_norms(rows: Array) -> Array:
     return np.asarray(np.einsum("ij,ij->i", rows, rows))
-
-
-_EPSILON = float(np.finfo(np.float64).eps)
-
-
-@dataclass(frozen=True, eq=False)
-class InducedGridPosterior(GridPosterior):
-    """A GridPosterior of inducing inputs; root (m, r) as in InducedPosterior, so that no factorisation is needed."""
-
-    root: Array
-
-    @cached_property
-    def _explaining(self) -> tuple[IntArray, Array]:
-        return np.arange(len(self.inputs)), self.kernel.variance * self.root
-
-
-def sparse_grid_regression(regression: SparseVHGP) -> GridRegression:
-    """See grid_posterior.grid_regression."""
-    parameters = regression.parameters
-    jitter, of_noise, nugget = parameters.jitter, parameters.noise.variance, parameters.nugget
-    signal = _on_grid(regression.signal, parameters.signal.variance + jitter, jitter)
-    noise = _on_grid(regression.noise, of_noise + nugget, nugget + _EPSILON * of_noise)
-    return GridRegression(signal, parameters.noise_mean, noise)
-
-
-def _on_grid(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> InducedGridPosterior:
-    inputs, weights, none = posterior.inducing, posterior.weights, np.empty(0)
-    return InducedGridPosterior(posterior.kernel, inputs, none, weights, prior_variance, least_variance, posterior.root)

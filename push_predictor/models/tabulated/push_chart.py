@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,96 +23,68 @@ from push_predictor.models.predictors import Scaling
 from push_predictor.types import Array, IntArray
 
 
-class Chart(Protocol):
-    """One kind of outline."""
+@dataclass(frozen=True)
+class SmoothChart:
+    """A smooth outline: the place goes once around the part that its rotational symmetry repeats.
 
-    @property
-    def boxes(self) -> int:
-        """How many edges differ."""
+    order: of the symmetry; 0 for a circle, where the place makes no difference.
+    """
+
+    order: int
+    boxes = 1
 
     @property
     def place_columns(self) -> tuple[int, ...]:
         """The columns of the features that the place becomes."""
+        return (1, 2) if self.order else ()
 
     def place(self, contact: Array) -> tuple[Array, IntArray]:
         """Places (n,) and boxes of contacts (n,) in [0, 1)."""
-
-    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
-        """The features of places (n,), column by column."""
-
-    def place_range(self, places: Array) -> tuple[float, float]:
-        """The part of its axis that a domain around places (m,) can reach."""
-
-
-def push_chart(outline: Outline) -> Chart:
-    """The chart of an outline."""
-    if outline.rotational_symmetry == 0:
-        return CircleChart()
-    return SmoothChart(outline.rotational_symmetry) if outline.semi_axes is not None else PolygonChart(outline)
-
-
-class CircleChart:
-    """A circle: the contact makes no difference."""
-
-    boxes = 1
-    place_columns: tuple[int, ...] = ()
-
-    def place(self, contact: Array) -> tuple[Array, IntArray]:
-        """See Chart."""
-        return contact, np.zeros(len(contact), dtype=np.intp)
-
-    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
-        """See Chart."""
-        return ()
-
-    def place_range(self, places: Array) -> tuple[float, float]:
-        """See Chart."""
-        return 0.0, 1.0
-
-
-@dataclass(frozen=True)
-class SmoothChart:
-    """A smooth outline of a given rotational symmetry: the place goes once around the part that repeats."""
-
-    order: int
-    boxes = 1
-    place_columns = (1, 2)
-
-    def place(self, contact: Array) -> tuple[Array, IntArray]:
-        """See Chart."""
         return self.order * contact % 1.0, np.zeros(len(contact), dtype=np.intp)
 
     def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
-        """See Chart."""
+        """The features of places (n,), column by column."""
         turn = 2.0 * np.pi * place
         return np.cos(turn), np.sin(turn)
 
     def place_range(self, places: Array) -> tuple[float, float]:
-        """See Chart: a box of cosine and sine may be in several pieces along the outline."""
+        """The part of the place's axis that a domain around places (m,) can reach.
+
+        A box of cosine and sine may be in several pieces along the outline.
+        """
         return 0.0, 1.0
 
 
 class PolygonChart:
-    """A polygon: a box for each edge of the part that its symmetry repeats."""
+    """A polygon: a box for each edge of the part that its symmetry repeats. See SmoothChart."""
 
-    place_columns = (1,)
+    place_columns: tuple[int, ...] = (1,)
 
     def __init__(self, outline: Outline) -> None:
         self.boxes = len(outline.vertices) // outline.rotational_symmetry
         self._starts, self._per_length = outline.edge_starts, 1.0 / np.diff(outline.edge_starts)
 
     def place(self, contact: Array) -> tuple[Array, IntArray]:
-        """See Chart."""
+        """See SmoothChart."""
         edge = self._starts.searchsorted(contact, side="right") - 1
         return (contact - self._starts[edge]) * self._per_length[edge], edge % self.boxes
 
     def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
-        """See Chart."""
+        """See SmoothChart."""
         return (np.asarray(EDGE_SPACING * box + place),)
 
     def place_range(self, places: Array) -> tuple[float, float]:
-        """See Chart: where edges differ, the domain contains most of them completely."""
+        """Where edges differ, the domain contains most of them completely."""
         return (float(places.min()), float(places.max())) if self.boxes == 1 else (0.0, 1.0)
+
+
+Chart: TypeAlias = SmoothChart | PolygonChart
+
+
+def push_chart(outline: Outline) -> Chart:
+    """The chart of an outline."""
+    smooth = outline.semi_axes is not None or outline.rotational_symmetry == 0
+    return SmoothChart(outline.rotational_symmetry) if smooth else PolygonChart(outline)
 
 
 _PATH = 65  # points along which lengthscales are counted

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_domain import FASTEST, TabulatedDomain
+from push_predictor.models.tabulated.prediction_table import FASTEST, PredictionTable
 from push_predictor.types import Array
 
 MEAN_TOLERANCE = 1e-3  # predicted standard deviations
@@ -34,11 +33,7 @@ class TableAccuracy:
     @property
     def accepted(self) -> bool:
         """Whether a table with these errors may be used: at half the tolerances, since not every push was compared."""
-        return self.within(0.5 * MEAN_TOLERANCE, 0.5 * COVARIANCE_TOLERANCE)
-
-    def within(self, mean: float, covariance: float) -> bool:
-        """Whether they are at most these."""
-        return self.mean <= mean and self.covariance <= covariance
+        return self.mean <= 0.5 * MEAN_TOLERANCE and self.covariance <= 0.5 * COVARIANCE_TOLERANCE
 
     def __str__(self) -> str:
         return f"means to {self.mean:.2g} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
@@ -53,30 +48,20 @@ class Probes:
     covariance: Array
     process_covariance: Array
 
-    def error_of(self, domain: TabulatedDomain) -> TableAccuracy:
+    def error_of(self, table: PredictionTable) -> TableAccuracy:
         """The largest differences of a table from the model, at the pushes that the table contains.
 
         Raises ValueError if that is none of them.
         """
-        covered = domain.covered(self.inputs)
-        known = (
-            self if covered.all() else Probes(*(getattr(self, field)[covered] for field in self.__dataclass_fields__))
-        )
-        table = domain.moments(known.inputs)
-        if table is None or not len(known.inputs):
+        known = Probes(*(values[table.covered(self.inputs)] for values in vars(self).values()))
+        found = table.moments(known.inputs)
+        if found is None or not len(known.inputs):
             raise ValueError("none of the pushes is in the table")
-        return compared_with(known, *table)
-
-
-def compared_with(
-    exact: Probes | Prediction, mean: Array, covariance: Array, process_covariance: Array
-) -> TableAccuracy:
-    """The largest differences of means (n, 3) and covariances (n, 3, 3) from exact ones."""
-    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
-    of_mean = np.max(np.abs(mean - exact.mean) / sd)
-    of_outcome = relative_error(covariance, exact.covariance)
-    of_process = relative_error(process_covariance, exact.process_covariance)
-    return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+        sd = np.sqrt(np.diagonal(known.covariance, axis1=1, axis2=2))
+        of_mean = np.max(np.abs(found.mean - known.mean) / sd)
+        of_outcome = relative_error(found.covariance, known.covariance)
+        of_process = relative_error(found.process_covariance, known.process_covariance)
+        return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
 
 
 def outside_pushes(model: PushModel, count: int) -> Array:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -22,9 +21,10 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor, Moments
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.tabulated.prediction_table import OnGrid, TooFineError, on_grid
+from push_predictor.models.tabulated.grid_posterior import OnGrid, on_grid
+from push_predictor.models.tabulated.prediction_table import PredictionTable, narrow_box, prediction_table, wide_box
 from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
-from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, narrow_box, tabulated_domain, wide_box
+from push_predictor.models.tabulated.table_nodes import TooFineError
 from push_predictor.types import Array, BoolArray
 
 COMPUTED = "computed: only what is learnt has a table"
@@ -33,20 +33,20 @@ REFINEMENTS = (0.8, 1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 @dataclass(frozen=True, eq=False)
 class TabulatedModel:
-    """A model with its table. domain, which has the table, and error are None if there is none.
+    """A model with its table; table and error are None if there is none.
 
     how: in words, how it predicts. A push gets the same prediction alone as among others. Made by `tabulate`.
     """
 
     model: PushModel
     how: str
-    domain: TabulatedDomain | None = None
+    table: PredictionTable | None = None
     error: TableAccuracy | None = None
 
     @property
     def tabulated(self) -> bool:
         """Whether pushes are predicted from a table."""
-        return self.domain is not None
+        return self.table is not None
 
     def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
         """Like PushModel.predict_rows; in its table within the tolerances of table_accuracy, elsewhere the same.
@@ -54,7 +54,7 @@ class TabulatedModel:
         Of a model with effects or with mechanics as its mean, what is learnt is tabulated, and the rest computed.
         """
         push, model = Push(inputs, duration, covariates or {}), self.model
-        if self.domain is None:
+        if self.table is None:
             return model.predict_rows(inputs, duration, covariates)
         predictor = model.predictor
         moments = predictor.base.of_outcomes(self._learnt(inputs, duration), push)
@@ -65,25 +65,20 @@ class TabulatedModel:
     def free_matrices(self) -> None:
         """Free the matrices of the model, 50 MB for a VHGP of 1000 rows, if it predicts from a table."""
         predictor = self.model.predictor.base
-        if self.domain is not None and isinstance(predictor, GaussianProcessPredictor):
+        if self.table is not None and isinstance(predictor, GaussianProcessPredictor):
             predictor.free_matrices()
 
     def exact_count(self, inputs: Array) -> int:
         """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
-        return len(inputs) if self.domain is None else int(np.sum(~self.domain.covered(inputs)))
-
-    @cached_property
-    def _residual(self) -> PushModel:
-        """The model of what is tabulated."""
-        return of_targets(self.model.base)
+        return len(inputs) if self.table is None else int(np.sum(~self.table.covered(inputs)))
 
     def _learnt(self, inputs: Array, duration: Array) -> Moments:
         """Moments of what the base has learnt, from the table where it can."""
-        assert self.domain is not None
-        if (found := self.domain.moments(inputs)) is not None:
+        assert self.table is not None
+        if (found := self.table.moments(inputs)) is not None:
             return found
-        covered = self.domain.covered(inputs)
-        beyond = self._residual.predictor.moments(Push(inputs[~covered], duration[~covered], {}))
+        covered = self.table.covered(inputs)
+        beyond = of_targets(self.model.base).predictor.moments(Push(inputs[~covered], duration[~covered], {}))
         if not covered.any():
             return beyond
         return _merged(covered, self._learnt(inputs[covered], duration[covered]), beyond)
@@ -92,42 +87,38 @@ class TabulatedModel:
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
     learnt = of_targets(model.base)
-    if not isinstance(learnt.predictor, GaussianProcessPredictor):
+    if not isinstance(predictor := learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, COMPUTED)
-    exact, posteriors = probed(learnt), [on_grid(regression) for regression in learnt.predictor.regressions]
+    exact, posteriors = probed(learnt), [on_grid(regression) for regression in predictor.regressions]
     why = ""
-    for ends in (wide_box(model), narrow_box(model)):
-        found = _accurate(learnt, learnt.predictor, posteriors, ends, exact)
+    for ends in (wide_box(model, predictor), narrow_box(model)):
+        found = _accurate(predictor, posteriors, ends, exact)
         if not isinstance(found, str):
-            return with_domain(model, *found)
+            return with_table(model, *found)
         why = found
     return TabulatedModel(model, f"computed: {why}")
 
 
 def _accurate(
-    learnt: PushModel,
-    predictor: GaussianProcessPredictor,
-    posteriors: Sequence[OnGrid],
-    ends: tuple[Array, Array],
-    exact: Probes,
-) -> tuple[TabulatedDomain, TableAccuracy] | str:
+    predictor: GaussianProcessPredictor, posteriors: Sequence[OnGrid], ends: tuple[Array, Array], exact: Probes
+) -> tuple[PredictionTable, TableAccuracy] | str:
     """The coarsest table between these ends that is accurate, and its errors; else why there is none."""
     how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(learnt, predictor, posteriors, ends, refinement)
+            table = prediction_table(predictor, posteriors, ends, refinement)
         except TooFineError as too_fine:
             return f"{how}{too_fine}"
-        error = exact.error_of(domain)
+        error = exact.error_of(table)
         if error.accepted:
-            return domain, error
+            return table, error
         how = f"a table gives {error}; "
     return f"{how}too far off"
 
 
-def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy) -> TabulatedModel:
+def with_table(model: PushModel, table: PredictionTable, error: TableAccuracy) -> TabulatedModel:
     """The model with a table that was compared with it."""
-    return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
+    return TabulatedModel(model, f"table of {table.spline.knots} knots, {error}", table, error)
 
 
 def of_targets(model: PushModel) -> PushModel:

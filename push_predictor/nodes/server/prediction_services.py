@@ -23,11 +23,17 @@ from msg_adapters.predictions import (
     residual_from_request,
 )
 from push_predictor.errors import PredictionError, TooLargeError
-from push_predictor.models.domain_remark import domain_remark
 from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.request import PushRequest, check_request, check_requests, own_window, with_own_window
+from push_predictor.models.request import (
+    PushRequest,
+    check_request,
+    check_requests,
+    domain_remark,
+    own_window,
+    with_own_window,
+)
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier

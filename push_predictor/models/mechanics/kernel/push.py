@@ -48,6 +48,30 @@ def displacements(
             _displacement(row, cython.address(pushes[n, 0]), cython.address(slider), cython.address(found[n, 0]))
 
 
+def drawn(
+    values: cython.double[:, ::1],
+    pushes: cython.double[:, ::1],
+    boundary: cython.double[::1],
+    cells: cython.double[:, :, ::1],
+    slopes: cython.double[:, :, :, ::1],
+    quantities: cython.double[:, ::1],
+    power: cython.double,
+    pusher_radius: cython.double,
+    accuracy: cython.double,
+    found: cython.double[:, :, ::1],
+) -> None:
+    """Compute displacements (n, k, 3) of each push with each of k rows of values (k, 28). The rest as above."""
+    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
+    n: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for n in range(pushes.shape[0]):
+            push: cython.p_double = cython.address(pushes[n, 0])
+            for k in range(values.shape[0]):
+                row: cython.p_double = cython.address(values[k, 0])
+                _displacement(row, push, cython.address(slider), cython.address(found[n, k, 0]))
+
+
 def shifts(
     values: cython.double[:, ::1],
     changes: cython.double[:, ::1],

@@ -126,7 +126,7 @@ class InducedRidge:
         return np.asarray(identity - scipy.linalg.cho_solve((self.factor, True), identity))
 
     def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
-        """See Ridge."""
+        """See DenseRidge."""
         induced, kernel, features = self.induced, self.induced.kernel, self.induced.features
         vectors = np.column_stack([added] if removed is None else [added, removed])
         signs = np.array([1.0, -1.0])[: vectors.shape[1]]

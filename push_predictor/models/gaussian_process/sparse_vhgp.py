@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.descent import Descent
 from push_predictor.models.gaussian_process.fit import (
     FEW_ROWS,
@@ -29,10 +29,9 @@ from push_predictor.models.gaussian_process.fit import (
     Search,
 )
 from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.parameters import VhgpParameters
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array, IntArray
 
@@ -137,10 +136,7 @@ class SparseVHGP:
         return self.signal.covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
-        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
-
-        block (n,): number of each row's block.
-        """
+        """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
         return self._solved()[0].held_out(block)
 
 
