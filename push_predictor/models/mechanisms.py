@@ -24,7 +24,7 @@ from push_predictor.types import Array
 class Parameter:
     """A physical quantity with its unit; it is zero in the base model.
 
-    largest: largest absolute value that a rig can have. A fit that needs more mimics something else.
+    largest: largest absolute value that a rig can have; fits stay within it.
     """
 
     name: str

@@ -56,6 +56,8 @@ class InputLimits(NamedTuple):
 class BasePredictor(ABC):
     """A predictor without effects, which effects can extend; what is not overridden holds for mechanics alone."""
 
+    # What extends it; the session on which that was traced; by name, the covariates that a push may omit, and of these
+    # those in which the effects only have steps, which lie in the past.
     effects: ClassVar[tuple[Effect, ...]] = ()
     cross: ClassVar[Cross] = MappingProxyType({})
     session: ClassVar[TracedSession] = TracedSession()

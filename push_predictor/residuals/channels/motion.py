@@ -21,13 +21,12 @@ from push_predictor.residuals.candidates.candidate import SPEED, Candidate, cand
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, SESSION
+from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.gate import Gate
-from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
@@ -36,6 +35,7 @@ MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged, and of training with which a constant effect is compared
+LEFT = 0.15  # of an effect's gain: mechanics that are nearly right leave so much of it
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 
@@ -81,9 +81,8 @@ class MotionFinding:
     and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
-    confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
-    not show how the outcome depends on them without a change. remaining: the strongest significant candidate after all
-    terms.
+    confounded: covariates that were not tried, because the inputs explain them. remaining: the strongest
+    significant candidate after all terms.
     """
 
     terms: tuple[MotionTerm, ...]
@@ -96,7 +95,6 @@ class MotionFinding:
     variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
-    uncompared: tuple[str, ...] = ()
 
 
 NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), ())
@@ -120,11 +118,9 @@ def motion_effects(
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
-    candidates = tuple(c for c in every if not baseline.lacks(c.covariate))
+    candidates = tuple(c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean())))
     if not candidates:
-        accepted = "one that training recorded, too" if every else "one that the inputs do not change, as they shifted"
-        raise RequestError("covariate", ", ".join(names or ()), accepted)
+        raise RequestError("covariate", ", ".join(names or ()), "one that the inputs do not change, as they shifted")
     found = search(Gate(evidence, candidates, inputs, share, seed, baseline), _rows(model, evidence, baseline, inputs))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
@@ -144,7 +140,6 @@ def motion_effects(
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
-        uncompared=tuple(dict.fromkeys(c.covariate for c in every if baseline.lacks(c.covariate))),
     )
 
 
@@ -170,11 +165,20 @@ def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseli
             explained * gain / max(sum(gains), np.finfo(float).tiny),
             inputs.absorbs and term.best.kind == "constant",
             bool(term.best.covariate == CONSTANT and own),
-            gain < MOST_UNEXPLAINED * gains[0],
+            _is_left(term, found.terms[:k]),
         )
-        for term, gain, part, own in zip(found.terms, gains, fit.parts, changed, strict=True)
+        for k, (term, gain, part, own) in enumerate(zip(found.terms, gains, fit.parts, changed, strict=True))
     ]
     return tuple(sorted(terms, key=lambda term: term.part))
+
+
+def _is_left(term: Term, larger: Sequence[Term]) -> bool:
+    """Whether a term is what the fit of a larger one leaves: small beside one with its mechanism or covariate."""
+    return any(
+        term.gain < LEFT * other.gain
+        and (term.best.mechanism == other.best.mechanism or {*term.naming.covariates} & {*other.naming.covariates})
+        for other in larger
+    )
 
 
 def _outputs(shift: Array) -> tuple[str, ...]:
@@ -219,7 +223,7 @@ def _separable(candidate: Candidate, inside: float) -> bool:
     """
     if inside == 1.0:
         return True
-    if candidate.mechanism is None or candidate.basis.is_constant or candidate.covariate in LOCAL:
+    if candidate.mechanism is None or candidate.basis.is_constant:
         return False
     return candidate.covariate != SPEED or inside >= MOSTLY
 

@@ -41,7 +41,7 @@ from push_predictor.residuals.channels.sensor_zero import zero_shift
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.forms import SIMPLEST_FIRST, step_places, step_places_near
+from push_predictor.residuals.selection.forms import step_places, step_places_near
 from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
@@ -51,7 +51,7 @@ MOST_NEAR = 12  # places of a step that are tried near the best of the first
 PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
-OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
+OWN = (*LOCAL, "contact", "angle", "edge")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
 PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
 

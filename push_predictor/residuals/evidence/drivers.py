@@ -18,12 +18,11 @@ CATEGORIES = ("edge", "recording")
 PLACE = ("slider_x", "slider_y")
 OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: outcomes of the push, not causes
 SENSOR_ZERO = ("free_force_x", "free_force_y")  # what the window finder subtracted from the force: no cause either
-# They share noise with the residual, or vary along a push: judged against their relation in the training data.
-LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
+LOCAL = ("contact_gap", "time_since_contact")  # they vary along a push, or share noise with the residual: no causes
 TIME, COUNT, DISTANCE = CUMULATIVE  # they only grow
 OF_SESSION = (*CUMULATIVE, "recording")  # counted from the start of a session
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
-NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *FOLDED)
+NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *LOCAL, *FOLDED)
 CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)

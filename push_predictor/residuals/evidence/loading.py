@@ -83,20 +83,6 @@ def with_inputs(table: PushTable) -> PushTable:
     return replace(table, covariates={**table.covariates, **inputs})
 
 
-def previous_residual(table: PushTable, z: Array) -> Array:
-    """The covariate previous_residual (n,), from standardised residuals z (n, 3).
-
-    It is the signed mean of z over the windows and outputs of the previous push; zero for a recording's first push.
-    """
-    push = push_order(table)
-    mean = np.bincount(push, z.mean(axis=1)) / np.bincount(push)
-    recording = table.covariates.get("recording", np.zeros(len(table)))
-    of_push = np.zeros(len(mean))
-    of_push[push] = recording
-    follows = np.concatenate([[False], of_push[1:] == of_push[:-1]])
-    return np.asarray(np.where(follows, np.roll(mean, 1), 0.0)[push])
-
-
 def _loaded(
     recordings: Sequence[Recording], files: Sequence[tuple[str, PushTable]], rig: Rig, options: WindowOptions
 ) -> LoadedData:

@@ -67,12 +67,6 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"Not tested: {names}. Contact point, push angle and speed predict them in these pushes. "
             f"To test them, randomise the order of the pushes."
         )
-    if motion.uncompared:
-        names = listed([covariate_phrase(name) for name in motion.uncompared])
-        notes.append(
-            f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
-            f"they lack the covariate, or have too few windows per push."
-        )
     if motion.unchanged:
         effects = listed([effect_phrase(*label) for label in motion.unchanged])
         notes.append(f"Not new, because the training pushes show it to the same degree: {effects}.")

@@ -175,6 +175,6 @@ def _remaining_sentence(trace: Trace) -> str:
     if not trace.effects:
         return "No effect was found, so nothing was subtracted."
     if trace.remaining is None:
-        return "A second search, with the effects found subtracted, found nothing more."
+        return "In what the effects leave, the search finds nothing more."
     strongest = effect_phrase(*trace.remaining)
     return f"Something remains after the effects found are subtracted. The strongest candidate is {strongest}."

@@ -48,7 +48,6 @@ COVARIATES: dict[str, str] = {
     "tangential_force": "tangential force",
     "free_force_x": "the force read in free motion along x",
     "free_force_y": "the force read in free motion along y",
-    "previous_residual": "the residual of the previous push",
     "recording": "recording",
     "travel": "length of the push",
     SESSION: "the session (since training)",

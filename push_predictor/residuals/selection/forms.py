@@ -17,8 +17,6 @@ from push_predictor.types import Array
 
 STEPS = 9  # places of a step that are tried first, at quantiles of the covariate
 MOST_PLACES = 60  # that are tried near the best of these
-SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "periodic", "periodic, twice around",
-                  "quadratic", "map")  # fmt: skip
 SOON = 0.03  # of the covariate's range: scale of an effect that grows early in it
 
 

@@ -3,9 +3,11 @@
 
 """The search for effects on the motion: a gate, then moves that add, exchange and drop terms of one joint fit.
 
-A term is a mechanism, a covariate and a form. The gate (gate.py) alone decides that there is an effect. Every move is
-judged by what the joint fit gains on blocks of pushes that it was not fitted to (candidates/joint_fit.py), and is made
-if it gains more than the standard error of that gain. An exchange undoes a choice that others made wrong.
+A term is a mechanism, a covariate and a form. Without what passes the gate (gate.py) there is no effect. Every move is
+judged by what the joint fit gains on blocks of pushes that it was not fitted to (candidates/joint_fit.py). A term is
+added, or kept, if it gains more than the standard error of that gain, and a further one also as much as a step of the
+ladder of mechanics. In its place stands the simplest of what these data do not reject, so that an exchange undoes a
+choice that later terms made wrong.
 """
 
 from __future__ import annotations
