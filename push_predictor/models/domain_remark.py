@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.request import UNITS
 from push_predictor.types import BoolArray
 
 OUT_OF_DOMAIN = "out of domain"
