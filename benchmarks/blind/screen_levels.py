@@ -28,7 +28,6 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
-from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
@@ -62,10 +61,10 @@ class _Design:
 
 
 def _design(model: PushModel, table: PushTable) -> _Design:
-    analysis = with_instrument(table).take(~held_out_rows(table))
+    analysis = table.take(~held_out_rows(table))
     evidence, inputs = evidence_of(model, analysis), inputs_basis(model, analysis)
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
-    candidates = tuple(c for c in candidates_of(evidence, None, inputs) if not baseline.lacks(c.covariate))
+    candidates = tuple(candidates_of(evidence, None, inputs))
     return _Design(evidence, inputs, baseline, candidates)
 
 

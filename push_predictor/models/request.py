@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from push_predictor.errors import CovariateError, RequestError
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.pushes import Push, Pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -25,23 +26,6 @@ if TYPE_CHECKING:
 
 Numbers: TypeAlias = "float | Array"  # one push, or a column (n,)
 
-UNITS = {
-    "elapsed_time": "s",
-    "slid_distance": "m",
-    "slider_x": "m",
-    "slider_y": "m",
-    "slider_heading": "rad",
-    "push_heading": "rad",
-    "velocity": "m/s",
-    "angle": "rad",
-    "dwell_time": "s",
-    "time_since_contact": "s",
-    "contact_gap": "m",
-    "normal_force": "N",
-    "tangential_force": "N",
-    "free_force_x": "N",
-    "free_force_y": "N",
-}  # of the covariates that every window has; the unit of a recorded topic is its publisher's
 OUT_OF_DOMAIN = "out of domain"
 FARTHEST = 1.0  # m per push; the mechanics are integrated along the path
 

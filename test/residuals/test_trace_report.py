@@ -18,8 +18,8 @@ from made_up_traces import DRIFT, GRAIN, made_up_trace, planted, slippery, witho
 
 from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import Cells, PushMap
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.models.request import UNITS
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.corrections import CORRECTIONS
 from push_predictor.residuals.outcome import Sized, Trace
@@ -161,7 +161,8 @@ def test_every_mechanism_and_covariate_has_a_phrase() -> None:
     assert {*CORRECTIONS, "surface_friction"} <= {*OTHERS}
     assert set(UNITS) <= set(COVARIATES)
     nouns = [mechanism.noun for mechanism in (*LIBRARY, *REFINEMENTS)]
-    assert all(nouns) and not any("_" in phrase for phrase in [*COVARIATES.values(), *OTHERS.values(), *nouns])
+    phrases = [*(covariate.phrase for covariate in COVARIATES.values()), *OTHERS.values(), *nouns]
+    assert all(phrases) and not any("_" in phrase for phrase in phrases)
 
 
 def test_intervals_show_the_digits_that_they_determine() -> None:

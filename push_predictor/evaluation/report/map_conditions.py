@@ -11,9 +11,8 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS, UNITS
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import UNITS
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 

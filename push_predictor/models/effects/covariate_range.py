@@ -10,10 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import CUMULATIVE as CUMULATIVE  # re-exported, as HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS as HEADINGS
 from push_predictor.types import Array, BoolArray
 
-HEADINGS = ("slider_heading", "push_heading")  # they wrap around
-CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
 WHOLE_TURN = np.radians(30.0)  # headings with no wider gap between them cover the whole turn
 MARGIN = 1e-6  # relative: a model file keeps seven digits
 TURN = 2.0 * np.pi

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import first_touches

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import GENERIC_WIDTH, Effect
 from push_predictor.models.effects.exact import covariance_of

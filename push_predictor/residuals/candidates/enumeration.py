@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.ladder import all_supports_known
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.traced_session import COUNT, DISTANCE, TIME, Mark, TracedSession, beginnings
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.table import PushTable

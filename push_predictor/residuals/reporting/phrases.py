@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate
+from push_predictor.models.effects.covariates import COVARIATES, UNITS
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.models.request import UNITS
 from push_predictor.reporting.html import NOTHING, number
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION, UNDRIVEN
 from push_predictor.residuals.outcome import Sized
@@ -29,36 +29,7 @@ OTHERS = {
     "tool_offset": "an offset of the tool point",
 }
 
-COVARIATES: dict[str, str] = {
-    "elapsed_time": "elapsed time",
-    "push_index": "push count",
-    "slid_distance": "distance slid",
-    "slider_x": "the slider's x position",
-    "slider_y": "the slider's y position",
-    "slider_heading": "the slider's heading",
-    "push_heading": "the push direction in the world",
-    "velocity": "pushing speed",
-    "contact": "contact point",
-    "angle": "push angle",
-    "edge": "side pushed",
-    "dwell_time": "dwell time before the push",
-    "time_since_contact": "time since first contact",
-    "contact_gap": "measured gap at the contact",
-    "normal_force": "normal force",
-    "tangential_force": "tangential force",
-    "free_force_x": "the force read in free motion along x",
-    "free_force_y": "the force read in free motion along y",
-    "recording": "recording",
-    "travel": "length of the push",
-    SESSION: "the session (since training)",
-    CONSTANT: "nothing (constant)",
-}
-
-SHOWN = {
-    **dict.fromkeys(("slider_heading", "push_heading", "angle"), (float(np.degrees(1.0)), "deg")),
-    "velocity": (1e3, "mm/s"),
-    "contact_gap": (1e3, "mm"),
-}
+NAMED = {SESSION: "the session (since training)", CONSTANT: "nothing (constant)"}  # what is no covariate
 SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "deg"), "s": (1e3, "ms"), "1": (1.0, "")}
 
 
@@ -78,7 +49,8 @@ def covariate_phrase(covariate: str) -> str:
     """A covariate in words; a recorded topic by its name."""
     if covariate.startswith("topic:"):
         return f"topic {covariate.removeprefix('topic:')}"
-    return COVARIATES.get(covariate, covariate.replace("_", " "))
+    known = COVARIATES.get(covariate)
+    return known.phrase if known else NAMED.get(covariate, covariate.replace("_", " "))
 
 
 def effect_phrase(mechanism: str | None, covariate: str) -> str:
@@ -134,12 +106,13 @@ def capitalised(text: str) -> str:
 
 def unit_of(covariate: str) -> str:
     """The unit of a covariate, empty if none is known."""
-    return "m" if covariate == "travel" else UNITS.get(covariate, "")
+    return UNITS.get(covariate, "")
 
 
 def shown_unit_of(covariate: str) -> tuple[float, str]:
     """The factor to, and the name of, the unit in which pictures and sentences show a covariate."""
-    return SHOWN.get(covariate, (1.0, unit_of(covariate)))
+    known = COVARIATES.get(covariate)
+    return known.shown if known and known.shown else (1.0, unit_of(covariate))
 
 
 def with_unit(covariate: str) -> str:

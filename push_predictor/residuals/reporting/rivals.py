@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting import phrases as say
 
 ANEW = "To decide, restore the rig to its state at the start of the session, and push again"
-HEADED = ("slider_heading", "push_heading", "edge")
+HEADED = (*HEADINGS, "edge")
 ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two rivals, one of each group
     (
         CUMULATIVE,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
+from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import CATEGORIES, PLACE, standard_basis, two_dimensional

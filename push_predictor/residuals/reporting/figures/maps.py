@@ -13,7 +13,7 @@ import numpy as np
 from push_predictor.evaluation.report.figures.push_maps import contact_label
 from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting import chart, html
