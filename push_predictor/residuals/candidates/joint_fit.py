@@ -265,7 +265,7 @@ def _ridge(fit: Fit, columns: Array) -> Array:
 
 
 def _normal(columns: Array, residual: Array) -> tuple[Array, Array]:
-    flat = columns.reshape(-1, columns.shape[2])
+    flat = columns.reshape(residual.size, columns.shape[2])
     return flat.T @ flat, flat.T @ residual.ravel()
 
 

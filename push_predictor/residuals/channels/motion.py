@@ -189,7 +189,7 @@ def _outputs(shift: Array) -> tuple[str, ...]:
 
 def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> list[bool]:
     """Whether each term differs from what the same fit finds in training; of a learnt base every one does."""
-    if inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
+    if not found.terms or inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
         return [inputs.learnt] * len(found.terms)
     _, before = baseline.evidence.thinned
     recorded = [k for k, term in enumerate(found.terms) if _recorded(term.best, before)]
