@@ -18,6 +18,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.predictors import Cross
@@ -130,6 +131,12 @@ class Fit:
         """Log density (b,) of each block of new pushes under coefficients fitted without it, up to a constant."""
         return _held_out(self, self.clear.columns, self.coefficients)
 
+    @cached_property
+    def bend(self) -> Array:
+        """Share (N,) of each window's weight that the curvature of Student's t has, on average over directions."""
+        distance = np.sum(self.clear.residual**2, axis=1) / self.weight
+        return np.asarray(1.0 - 2.0 / 3.0 * distance / (DEGREES + distance))
+
     def with_columns(self, columns: Array) -> Array:
         """The same for the fit with further linear columns (n, 3, q) of new windows, to first order."""
         clear = self.clear
@@ -173,16 +180,34 @@ def estimated(fit: Fit, *, of_size: bool = False) -> tuple[tuple[Effect, ...], C
     """
     clear, rows = fit.clear, fit.rows
     ridge = _ridge(fit, clear.columns)
-    covariance = _jackknife(clear, _blocks(rows, rows.block), ridge)
+    covariance = _jackknife(fit, _blocks(rows, rows.block), ridge)
     if of_size:
         for inputs in rows.evidence.table.inputs[:, 1:].T:  # contact, angle
-            covariance = _widened(covariance, _jackknife(clear, _blocks(rows, _groups(inputs)), ridge))
+            covariance = _widened(covariance, _jackknife(fit, _blocks(rows, _groups(inputs)), ridge))
     covariance *= len(rows.z) / max(len(rows.z) - clear.residualizer.q.shape[1], 1)
     parts = fit.parts
     effects = tuple(
         replace(effect, covariance=covariance[part, part]) for effect, part in zip(fit.effects, parts, strict=True)
     )
     return effects, {(i, j): covariance[parts[i], parts[j]] for i, j in combinations(range(len(parts)), 2)}
+
+
+def best_place(fit: Fit, step: Candidate) -> float:
+    """The place of a step, the last of the effects, where an effect of its size gains most: midway between two windows.
+
+    Every place is tried: a window's density with the effect less that without it counts from its covariate on.
+    """
+    rows, others = fit.rows, fit.effects[:-1]
+    always = replace(fit.effects[-1], basis=DriverBasis("constant"))
+    shifts = [_linearised(rows, effects, fit.weight, fit.scale).shift for effects in (others, (*others, always))]
+    n = len(shifts[0])
+    without, with_it = (_density((rows.z[:n] - shift) / fit.scale) for shift in shifts)
+    values = np.asarray(rows.evidence.table.covariates[step.covariate])
+    ordered, number = np.unique(values, return_inverse=True)
+    gain = np.bincount(number, rows.share[:n] * (with_it - without))
+    after = np.cumsum(gain[::-1])[::-1]  # of a step between the value before and this one
+    k = 1 + int(np.argmax(after[1:]))
+    return float(0.5 * (ordered[k - 1] + ordered[k]))
 
 
 def standard_error(gains: Array) -> float:
@@ -264,9 +289,11 @@ def _ridge(fit: Fit, columns: Array) -> Array:
     return np.asarray(RIDGE * np.sum(columns**2, axis=(0, 1)) + own + 1e-12)
 
 
-def _normal(columns: Array, residual: Array) -> tuple[Array, Array]:
+def _normal(columns: Array, residual: Array, bend: Array | None = None) -> tuple[Array, Array]:
+    """Curvature (p, p) and slope (p,) of the objective; bend (n,): see Fit, 1 if None."""
     flat = columns.reshape(residual.size, columns.shape[2])
-    return flat.T @ flat, flat.T @ residual.ravel()
+    bent = flat if bend is None else flat * np.repeat(bend, residual.shape[1])[:, None]
+    return bent.T @ flat, flat.T @ residual.ravel()
 
 
 def _shares(evidence: Evidence) -> Array:
@@ -293,8 +320,12 @@ def _held_out(fit: Fit, columns: Array, coefficients: Array) -> Array:
     left = (residual / clear.root)[:n]
     share = rows.share[:n]
     unit = np.sqrt(np.average(left**2 * (fit.weight / rows.share)[:n, None], axis=0, weights=share))
-    density = -0.5 * (DEGREES + 3.0) * np.log1p(np.sum((left / unit) ** 2, axis=1) / DEGREES)
-    return sums_by(rows.block, (share * (density - np.log(unit).sum()))[:, None])[:, 0]
+    return sums_by(rows.block, (share * (_density(left / unit) - np.log(unit).sum()))[:, None])[:, 0]
+
+
+def _density(scaled: Array) -> Array:
+    """Log density (n,) of Student's t, up to a constant, of residuals (n, 3) in units of the scale."""
+    return np.asarray(-0.5 * (DEGREES + 3.0) * np.log1p(np.sum(scaled**2, axis=1) / DEGREES))
 
 
 # --- covariance ------------------------------------------------------------------------------------------------------
@@ -323,9 +354,10 @@ def _widened(covariance: Array, other: Array) -> Array:
     return np.asarray(covariance + (axes * np.maximum(ratio - 1.0, 0.0)) @ axes.T)
 
 
-def _jackknife(clear: Cleared, block: IntArray, ridge: Array) -> Array:
-    """Covariance (p, p) of least-squares coefficients over blocks (N,); ridge (p,): added to the columns' squares."""
-    parts = [_normal(clear.columns[block == b], clear.residual[block == b]) for b in np.unique(block)]
+def _jackknife(fit: Fit, block: IntArray, ridge: Array) -> Array:
+    """Covariance (p, p) of the coefficients over blocks (N,); ridge (p,): added to the columns' squares."""
+    clear, rows = fit.clear, [block == b for b in np.unique(block)]
+    parts = [_normal(clear.columns[own], clear.residual[own], fit.bend[own]) for own in rows]
     squares, slopes = (np.stack(each) for each in zip(*parts, strict=True))
     square = squares.sum(axis=0) + np.diag(ridge)
     away = np.linalg.solve(square - squares, slopes[:, :, None])[:, :, 0]

@@ -21,7 +21,7 @@ SOON = 0.03  # of the covariate's range: scale of an effect that grows early in 
 
 
 def forms_of(covariate: str, table: PushTable) -> list[DriverBasis]:
-    """Step at an onset, growing from zero at the start, and any line or curve; of a heading periodic."""
+    """Growing from zero at the start, a step at an onset, any line or curve; of a heading periodic; simplest first."""
     if covariate in CATEGORIES:
         levels = tuple(float(level) for level in np.unique(table.covariates[covariate]))
         return [DriverBasis("category", (covariate,), levels=levels, offset=True)]
@@ -31,11 +31,14 @@ def forms_of(covariate: str, table: PushTable) -> list[DriverBasis]:
     linear, logarithmic, quadratic = (
         standard_basis(n, covariate, values) for n in ("linear", "logarithmic", "quadratic")
     )
-    forms = [DriverBasis("step", (covariate,), place=place) for place in step_places(values)]
-    forms += [replace(linear, centre=(float(values.min()),)), logarithmic, replace(linear, offset=True)]
+    forms = [replace(linear, centre=(float(values.min()),)), logarithmic]
     if covariate in CUMULATIVE:
-        return [*forms, replace(logarithmic, scale=(SOON * float(np.ptp(values)),))]
-    forms.append(replace(quadratic, offset=True))
+        forms.append(replace(logarithmic, scale=(SOON * float(np.ptp(values)),)))
+    forms += [DriverBasis("step", (covariate,), place=place) for place in step_places(values)]
+    forms.append(replace(linear, offset=True))
+    if covariate in CUMULATIVE:
+        return forms
+    forms += [linear, replace(quadratic, offset=True)]
     if covariate in PLACE and all(name in table.covariates for name in PLACE):
         forms.append(replace(two_dimensional(table), offset=True))
     return forms
@@ -58,4 +61,4 @@ def step_places_near(values: Array, place: float, most: int = MOST_PLACES) -> li
     high = min((other for other in tried if other > place), default=np.inf)
     middle = 0.5 * (ordered[1:] + ordered[:-1])
     inside = middle[(middle > low) & (middle < high)]
-    return [float(middle) for middle in inside[:: max(1, len(inside) // most)]]
+    return [float(middle) for middle in inside[:: max(1, -(-len(inside) // most))]]

@@ -50,7 +50,7 @@ class Naming:
 
 def naming_of(chosen: Trial, tried: Sequence[Trial], base: Fit) -> Naming:
     """The names of a chosen term; tried: in its place, next to the others whose fit is `base`."""
-    possible = sorted((t for t in tried if not _rejected(t.fit, chosen.fit)), key=lambda t: -t.gain)
+    possible = sorted((t for t in tried if _possible(t, chosen)), key=lambda t: -t.gain)
     covariates = dict.fromkeys([chosen.candidate.covariate, *(t.candidate.covariate for t in possible)])
     same = [t.candidate.mechanism for t in possible if t.candidate.covariate == chosen.candidate.covariate]
     mechanism = chosen.candidate.mechanism
@@ -61,11 +61,14 @@ def naming_of(chosen: Trial, tried: Sequence[Trial], base: Fit) -> Naming:
     return Naming(tuple(covariates), tuple(mechanisms), True)
 
 
-def simplest(tried: Sequence[Trial]) -> Trial:
-    """Of those that the one with the largest gain does not reject, the one with the fewest coefficients."""
+def chosen_of(tried: Sequence[Trial]) -> Trial:
+    """The one with the largest gain, or the constant effect of its mechanism where that is not rejected.
+
+    An effect that nothing was seen to change is constant.
+    """
     best = max(tried, key=lambda t: t.gain)
-    near = [t for t in tried if not _rejected(t.fit, best.fit)]
-    return min(near, key=lambda t: (len(t.fit.coefficients), -t.gain))
+    same = [t for t in tried if t.candidate.mechanism == best.candidate.mechanism and t.candidate.basis.is_constant]
+    return next((t for t in same if not _rejected(t.fit, best.fit)), best)
 
 
 def unexplained_share(chosen: Trial, base: Fit) -> float:
@@ -82,6 +85,14 @@ def unexplained_share(chosen: Trial, base: Fit) -> float:
 def surely(gains: Array, level: float) -> bool:
     """Whether a gain (b,) of blocks is larger than zero by more than chance; level: probability of such a chance."""
     return float(gains.sum()) > -float(ndtri(level)) * standard_error(gains)
+
+
+def _possible(other: Trial, chosen: Trial) -> bool:
+    """Whether these data do not reject a rival; that a constant effect changes must gain more than its error."""
+    if chosen.candidate.basis.is_constant and not other.candidate.basis.is_constant:
+        gains = other.fit.scores - chosen.fit.scores
+        return float(gains.sum()) > standard_error(gains)
+    return not _rejected(other.fit, chosen.fit)
 
 
 def _rejected(fit: Fit, best: Fit) -> bool:

@@ -6,13 +6,13 @@
 A term is a mechanism, a covariate and a form. Without what passes the gate (gate.py) there is no effect. Every move is
 judged by what the joint fit gains on blocks of pushes that it was not fitted to (candidates/joint_fit.py). A term is
 added, or kept, if it gains more than the standard error of that gain, and a further one also as much as a step of the
-ladder of mechanics. In its place stands the simplest of what these data do not reject, so that an exchange undoes a
-choice that later terms made wrong.
+ladder of mechanics. An exchange puts another in place of one where that gains more: it undoes a choice that later terms
+made wrong.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -23,17 +23,18 @@ from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.ladder import least_gain
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import constant_refinements
-from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, fitted, standard_error
-from push_predictor.residuals.selection.forms import forms_of, step_places_near
+from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, best_place, fitted, standard_error
+from push_predictor.residuals.selection.forms import forms_of
 from push_predictor.residuals.selection.gate import Gate
-from push_predictor.residuals.selection.naming import Naming, Trial, naming_of, simplest
+from push_predictor.residuals.selection.naming import Naming, Trial, chosen_of, naming_of
 from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
 MOST_TERMS = 6
-MOST_MECHANISMS = 6  # of those that the gate let pass, with the largest statistics
+MOST_MECHANISMS = 4  # of those that the gate let pass, with the largest statistics
 MOST_EXACT = 6  # labels that are fitted exactly, by their gain to first order
 CLOSE = 0.6  # of the best gain to first order: less is not fitted exactly
+MOST_MOVES = 3  # of a step's place
 MOST_ROUNDS = 6  # of moves after an addition
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 Key = tuple[str | None, str, DriverBasis]
@@ -76,12 +77,16 @@ def search(gate: Gate, rows: FitRows) -> SearchResult:
 
 @dataclass(eq=False)
 class _Search:
-    """passed: p of what the gate let pass, by label, in the order of their statistics. known: fits by their terms."""
+    """passed: p of what the gate let pass, by label, in the order of their statistics. known: fits by their terms.
+
+    unchanged: labels that training shows to the same degree.
+    """
 
     gate: Gate
     rows: FitRows
     passed: dict[Label, float] = field(default_factory=dict)
     known: dict[tuple[Key, ...], Fit] = field(default_factory=dict)
+    unchanged: set[Label] = field(default_factory=set)
 
     def found(self) -> SearchResult:
         chosen: list[Candidate] = []
@@ -128,7 +133,7 @@ class _Search:
         for k in range(len(chosen)):
             others = chosen[:k] + chosen[k + 1 :]
             now, base = Trial(chosen[k], self._fit([*others, chosen[k]], fit)), self._fit(others, fit)
-            best = simplest([now, *(t for t in self._tried(base, others) if t.candidate.mechanism is not None)])
+            best = chosen_of([now, *(t for t in self._tried(base, others) if t.candidate.mechanism is not None)])
             if not best.candidate.same_as(chosen[k]):
                 return [*others, best.candidate], best.fit
         return None
@@ -149,34 +154,39 @@ class _Search:
         """What is best added to a fit of the others; a mechanism rather than the generic polynomial."""
         tried = self._tried(base, others)
         known = [t for t in tried if t.candidate.mechanism is not None and t.gain > base.scores.sum()]
-        return simplest(known or tried) if tried else None
+        return chosen_of(known or tried) if tried else None
 
     def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
         """The labels that gain most to first order, each in its best form, fitted exactly."""
-        taken = {c.label for c in others}
+        # What an effect leaves along its covariate is a question of its name, and a constant part one of its form.
+        taken = {
+            label
+            for c in others
+            for label in (c.label, (None, c.covariate), (c.mechanism, self._constants.get(c.mechanism)))
+        }
         each = [self._in_best_form(base, *label) for label in self._proposed() if label not in taken]
         most = max((gain for gain, _ in each), default=0.0)
         near = sorted((pair for pair in each if pair[0] > CLOSE * most), key=lambda pair: -pair[0])
-        return [Trial(c, self._fit([*others, c], base)) for _, c in near[:MOST_EXACT]]
+        return [self._fitted_with(others, c, base) for _, c in near[:MOST_EXACT]]
 
     def _proposed(self) -> Iterator[Label]:
-        """Every mechanism that passed with every covariate that passed, and constant.
+        """Every mechanism that passed, constant and with every covariate: an effect that begins early looks constant.
 
         Of mechanics that were not fitted, all parameters may be off, and mimic each other.
         """
-        along = dict.fromkeys(covariate for _, covariate in self.passed)
-        for mechanism in list(dict.fromkeys(name for name, _ in self.passed))[:MOST_MECHANISMS]:
-            for covariate in along:
-                if (mechanism, covariate) in self._driven:
-                    yield mechanism, covariate
+        names = list(dict.fromkeys(name for name, _ in self.passed))[:MOST_MECHANISMS]
+        yield from (label for label in self._driven if label[0] in names and self._may_have_changed(label))
         for mechanism, covariate in self._constants.items():
             if not self.gate.inputs.learnt or any(mechanism == name for name, _ in self.passed):
                 yield mechanism, covariate
 
+    def _may_have_changed(self, label: Label) -> bool:
+        return label in self.passed or label not in self.unchanged
+
     @cached_property
-    def _driven(self) -> set[Label]:
+    def _driven(self) -> list[Label]:
         """Labels of the candidates that depend on a covariate."""
-        return {c.label for c in self.gate.candidates if not c.basis.is_constant}
+        return list(dict.fromkeys(c.label for c in self.gate.candidates if not c.basis.is_constant))
 
     @cached_property
     def _constants(self) -> dict[str | None, str]:
@@ -185,25 +195,27 @@ class _Search:
         return found if self.gate.inputs.learnt else {**found, **constant_refinements(self.rows.evidence)}
 
     def _in_best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
-        """The form that gains most to first order, and its gain; a step between the two windows where it gains most."""
-        evidence = self.rows.evidence
-        if self._constants.get(mechanism) == covariate:
-            return self._most(base, mechanism, covariate, [DriverBasis("constant")])
-        best = self._most(base, mechanism, covariate, forms_of(covariate, evidence.table))
-        basis = best[1].basis
-        if basis.name != "step":
-            return best
-        near = step_places_near(evidence.table.covariates[covariate], basis.place)
-        return self._most(base, mechanism, covariate, [basis, *(replace(basis, place=place) for place in near)])
-
-    def _most(
-        self, base: Fit, mechanism: str | None, covariate: str, forms: Iterable[DriverBasis]
-    ) -> tuple[float, Candidate]:
+        """The simplest form within a standard error of the best, and its gain, both to first order."""
+        constant = self._constants.get(mechanism) == covariate
+        forms = [DriverBasis("constant")] if constant else forms_of(covariate, self.rows.evidence.table)
         every = [candidate(self.rows.evidence, mechanism, covariate, basis) for basis in forms]
-        before = float(base.scores.sum())
-        gains = [float(base.with_columns(c.plain).sum()) - before for c in every]
-        k = int(np.argmax(gains))
-        return gains[k], every[k]
+        scores = [base.with_columns(c.plain) for c in every]
+        best = max(scores, key=lambda each: float(each.sum()))
+        near = [k for k, each in enumerate(scores) if (best - each).sum() <= standard_error(best - each)]
+        k = min(near, key=lambda k: (every[k].plain.shape[2], -scores[k].sum()))
+        return float((scores[k] - base.scores).sum()), every[k]
+
+    def _fitted_with(self, others: Sequence[Candidate], c: Candidate, base: Fit) -> Trial:
+        """The candidate fitted next to others; a step is moved to where the effect of its size gains most."""
+        trial = Trial(c, self._fit([*others, c], base))
+        for _ in range(MOST_MOVES if c.basis.name == "step" else 0):
+            place = best_place(trial.fit, trial.candidate)
+            moved = candidate(self.rows.evidence, *c.label, replace(c.basis, place=place))
+            again = Trial(moved, self._fit([*others, moved], trial.fit))
+            if again.gain <= trial.gain:
+                break
+            trial = again
+        return trial
 
     # --- fits and gate -----------------------------------------------------------------------------------------------
 
@@ -228,6 +240,7 @@ class _Search:
         """Note the labels that pass, the largest statistic first; whether there are any."""
         order = np.argsort(-screened.statistic, kind="stable").tolist()
         new = [k for k in order if screened.p_value[k] <= self.gate.alpha]
+        self.unchanged |= {self.gate.candidates[k].label for k in screened.unchanged}
         for k in new:
             c, p = self.gate.candidates[k], float(screened.p_value[k])
             self.passed[c.label] = min(p, self.passed.get(c.label, 1.0))
