@@ -13,6 +13,7 @@ import pytest
 from made_up_traces import DRIFT, pushes
 from synthetic import square_rig
 
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.train import train_model
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.joint_fit import Fit
@@ -21,13 +22,14 @@ from push_predictor.residuals.selection.naming import (
     REJECTED,
     Naming,
     Trial,
+    chosen_of,
     naming_of,
-    simplest,
     surely,
     unexplained_share,
 )
 
 BLOCKS = 100
+ALWAYS = DriverBasis("constant")
 UNEVEN = np.where(np.arange(BLOCKS) % 2, 1.0, -1.0)  # of a sum: a standard error of 10
 EVEN = np.ones(BLOCKS) / BLOCKS
 
@@ -39,12 +41,17 @@ def evidence() -> Evidence:
 
 
 def made(
-    evidence: Evidence, mechanism: str | None, covariate: str, scores: np.ndarray, *, more: Any = 0.0, size: int = 1
+    evidence: Evidence,
+    mechanism: str | None,
+    covariate: str,
+    scores: np.ndarray,
+    *,
+    more: Any = 0.0,
+    basis: DriverBasis = DRIFT,
 ) -> Trial:
-    """A trial with these scores (b,) of blocks; more: what the polynomial gains next to it; size: of its fit."""
-    rows = SimpleNamespace(evidence=evidence)
-    fit = SimpleNamespace(rows=rows, scores=scores, coefficients=np.zeros(size), with_columns=lambda _: scores + more)
-    return Trial(Candidate(mechanism, covariate, DRIFT, np.ones((1, 3, 1))), cast("Fit", fit))
+    """A trial with these scores (b,) of blocks; more: what the generic polynomial gains next to it."""
+    fit = SimpleNamespace(rows=SimpleNamespace(evidence=evidence), scores=scores, with_columns=lambda _: scores + more)
+    return Trial(Candidate(mechanism, covariate, basis, np.ones((1, 3, 1))), cast("Fit", fit))
 
 
 def base(gain: float = 0.0) -> Fit:
@@ -118,13 +125,29 @@ def test_an_unknown_effect_resembles_the_mechanism_that_comes_closest(evidence: 
     assert naming_of(chosen, [], base()).resembles is None
 
 
-def test_of_what_is_not_rejected_the_one_with_fewest_coefficients_is_the_simplest(evidence: Evidence) -> None:
-    rich = made(evidence, "body_anisotropy", "edge", 500.0 * EVEN, size=6)
-    small = made(evidence, "contact_friction", "elapsed_time", 495.0 * EVEN + UNEVEN, size=1)
-    alike = made(evidence, "contact_friction", "push_index", 490.0 * EVEN + UNEVEN, size=1)
-    worse = made(evidence, None, "model_inputs", 400.0 * EVEN + UNEVEN, size=0)
-    assert simplest([worse, alike, rich, small]) is small
-    assert simplest([rich, worse]) is rich
+@pytest.mark.parametrize(("advantage", "constant"), [(20.0, True), (25.0, False)])
+def test_an_effect_is_constant_unless_one_that_changes_is_surely_better(
+    evidence: Evidence, advantage: float, constant: bool
+) -> None:
+    changes = made(evidence, "contact_friction", "elapsed_time", 500.0 * EVEN)
+    always = made(evidence, "contact_friction", "model_inputs", (500.0 - advantage) * EVEN + UNEVEN, basis=ALWAYS)
+    other = made(evidence, "pressure_spread", "model_inputs", 499.0 * EVEN, basis=ALWAYS)
+    assert chosen_of([other, always, changes]) is (always if constant else changes)
+
+
+def test_of_effects_that_change_the_one_that_gains_most_is_chosen(evidence: Evidence) -> None:
+    one, other = (made(evidence, "contact_friction", name, gain * EVEN) for name, gain in (("x", 50.0), ("y", 51.0)))
+    assert chosen_of([one, other]) is other
+
+
+@pytest.mark.parametrize(("more", "possible"), [(15.0, True), (5.0, False)])
+def test_a_constant_effect_may_have_changed_if_that_gains_more_than_its_error(
+    evidence: Evidence, more: float, possible: bool
+) -> None:
+    """A standard error of 10 nats."""
+    always = made(evidence, "contact_friction", "model_inputs", 500.0 * EVEN, basis=ALWAYS)
+    early = made(evidence, "contact_friction", "elapsed_time", (500.0 + more) * EVEN + UNEVEN)
+    assert ("elapsed_time" in naming_of(always, [early], base()).covariates) == possible
 
 
 @pytest.mark.parametrize(("level", "sure"), [(0.05, True), (0.01, True), (0.05 / 12, False)])

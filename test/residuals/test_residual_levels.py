@@ -13,12 +13,11 @@ from made_up_traces import DRIFT, planted, pushes, slippery
 from search_bench import FEW, gate_of, in_library, search_with
 from synthetic import square_rig
 
-from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.channels.motion import motion_effects
-from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
@@ -96,42 +95,12 @@ def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it
     assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
 
 
-def with_gap(table: PushTable) -> PushTable:
-    """Pushes whose gap is the error of the tracker at the contact, which also shifts their outcomes."""
-    push = np.unique(table.push_id, return_inverse=True)[1]
-    gap = 2e-4 * np.random.default_rng(9).standard_normal(len(table.pushes))[push]
-    gap += 2e-5 * np.random.default_rng(10).standard_normal(len(table))
-    outcomes = table.outcomes + np.outer(gap, [1.5, 0.0, 0.0])
-    return replace(table, outcomes=outcomes, covariates={**table.covariates, "contact_gap": gap})
-
-
-def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """With single windows of its pushes training shows no gap without the window's own noise."""
-    training, later = with_gap(pushes(100, 1)), with_gap(pushes(100, 7))
-    model = train_model(training, square_rig(), "analytical", name="deployed")
-    single = replace(model, training=training.take(np.unique(training.push_id, return_index=True)[1]))
-    names = ["contact_gap", "elapsed_time"]
-    with monkeypatch.context() as patch:
-        in_library(patch, *FEW)
-        same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
-        unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
-    assert not same.terms and not same.uncompared
-    assert not unknown.terms and unknown.uncompared == ("contact_gap",)
-    with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
-        outside = np.zeros(len(later), dtype=np.bool_)
-        motion_effects(
-            single,
-            evidence_of(single, with_instrument(later)),
-            0.01,
-            ["contact_gap"],
-            inside=outside,
-        )
-    plain = replace(training, outcomes=pushes(100, 1).outcomes)
-    new = replace(model, training=plain)
-    (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
-    assert term.best.covariate == "contact_gap"
+def test_covariates_that_vary_along_a_push_are_not_tried(deployed: PushModel) -> None:
+    """They share the tracker's noise with the residual."""
+    table = pushes(60, 3)
+    local = dict.fromkeys(("contact_gap", "time_since_contact"), np.tile([0.0, 0.2, 0.4], 60))
+    evidence = evidence_of(deployed, replace(table, covariates={**table.covariates, **local}))
+    assert not {*local} & {c.covariate for c in candidates_of(evidence)}
 
 
 def test_one_sided_pushes_are_compared_with_training_pushes_on_this_side(deployed: PushModel) -> None:

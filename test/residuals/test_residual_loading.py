@@ -18,7 +18,7 @@ from push_predictor.recordings.streams import Recording, ScalarStream, WrenchStr
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.evidence.loading import cut_again, load_evidence, previous_residual
+from push_predictor.residuals.evidence.loading import cut_again, load_evidence
 
 OF_A_RECORDING = {
     *("elapsed_time", "push_index", "slid_distance", "slider_x", "slider_y", "slider_heading", "push_heading"),
@@ -153,9 +153,3 @@ def test_rejects_data_without_rig_or_pushes_by_name(tmp_path: Path) -> None:
     write_recording(tmp_path / "still", still)
     with pytest.raises(RecordingError, match="still"):
         load_evidence([tmp_path / "still"])
-
-
-def test_previous_residual_is_the_mean_of_the_previous_push_of_the_recording() -> None:
-    table = rows(["a", "a", "b", "c", "d"], recording=[0.0, 0.0, 0.0, 1.0, 1.0])
-    z = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 7.0], [-3.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0]])
-    assert previous_residual(table, z).tolist() == [0.0, 0.0, 3.0, 0.0, 9.0]
