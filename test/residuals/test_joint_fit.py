@@ -19,7 +19,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import concatenate
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.candidates.joint_fit import CORRELATION, RIDGE, Fit, FitRows, estimated, fitted
+from push_predictor.residuals.candidates.joint_fit import CORRELATION, RIDGE, Fit, FitRows, _blocks, estimated, fitted
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 
@@ -171,6 +171,11 @@ def test_change_since_training_is_kept(stacked: tuple[FitRows, FitRows]) -> None
     fit = fitted(rows, candidates(rows.evidence, more))
     assert fit.coefficients[0] == pytest.approx(0.2, abs=3.0 * deviations(fit)[0])
     assert deviations(fit)[0] < 0.03
+
+
+def test_pushes_of_training_are_blocks_of_their_own(stacked: tuple[FitRows, FitRows]) -> None:
+    rows = stacked[0]
+    assert len(np.unique(_blocks(rows, rows.block))) == 80 + 80
 
 
 # --- covariance ------------------------------------------------------------------------------------------------------

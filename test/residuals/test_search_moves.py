@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -18,9 +20,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.candidates.joint_fit import FitRows
+from push_predictor.residuals.candidates.joint_fit import Fit, FitRows
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.search import _Search
 
 FRICTION, SPREAD = ("contact_friction", "elapsed_time"), ("pressure_spread", "slider_x")
@@ -82,3 +85,28 @@ def test_a_term_with_a_worse_covariate_is_exchanged(deployed: PushModel) -> None
 
 def test_an_only_term_stays_as_it_was_chosen(deployed: PushModel) -> None:
     assert moved(deployed, warmed(pushes(120, 3)), FRICTION) == [FRICTION]
+
+
+@pytest.mark.parametrize(
+    ("gain", "further", "size", "enough"),
+    [
+        (8.0, False, 1, False),
+        (12.0, False, 1, True),
+        (12.0, False, 6, True),
+        (12.0, True, 1, True),
+        (12.0, True, 6, False),
+        (32.0, True, 6, True),
+    ],
+)
+def test_a_term_must_gain_its_error_and_a_further_one_five_nats_a_coefficient(
+    deployed: PushModel, gain: float, further: bool, size: int, enough: bool
+) -> None:
+    """A standard error of 10 nats over 100 blocks."""
+    rows = FitRows(evidence_of(deployed, pushes(100, 1)))
+    search = _Search(cast("Gate", None), rows)
+    uneven = np.where(np.arange(100) % 2, 1.0, -1.0)
+    before, after = (
+        cast("Fit", SimpleNamespace(scores=scores, coefficients=np.zeros(count)))
+        for scores, count in ((np.zeros(100), 0), (uneven + gain / 100.0, size))
+    )
+    assert search._worthwhile(after, before, further) == enough
