@@ -18,13 +18,14 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.predictors import Cross
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_scale
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_scale, push_order
 from push_predictor.types import Array, IntArray
 
 DEGREES = 5.0  # of freedom of Student's t: single windows that slip or hit a corner must not decide
@@ -193,9 +194,10 @@ def estimated(fit: Fit, *, of_size: bool = False) -> tuple[tuple[Effect, ...], C
 
 
 def best_place(fit: Fit, step: Candidate) -> float:
-    """The place of a step, the last of the effects, where an effect of its size gains most: midway between two windows.
+    """The place of a step, the last of the effects, where an effect of its size gains most.
 
-    Every place is tried: a window's density with the effect less that without it counts from its covariate on.
+    Every place between two windows is tried, and for what only grows every one between two pushes: a window's density
+    with the effect less that without it counts from its covariate on.
     """
     rows, others = fit.rows, fit.effects[:-1]
     always = replace(fit.effects[-1], basis=DriverBasis("constant"))
@@ -203,11 +205,12 @@ def best_place(fit: Fit, step: Candidate) -> float:
     n = len(shifts[0])
     without, with_it = (_density((rows.z[:n] - shift) / fit.scale) for shift in shifts)
     values = np.asarray(rows.evidence.table.covariates[step.covariate])
-    ordered, number = np.unique(values, return_inverse=True)
+    group = push_order(rows.evidence.table) if step.covariate in CUMULATIVE else values
+    _, number = np.unique(group, return_inverse=True)
     gain = np.bincount(number, rows.share[:n] * (with_it - without))
-    after = np.cumsum(gain[::-1])[::-1]  # of a step between the value before and this one
+    after = np.cumsum(gain[::-1])[::-1]  # of a step between the group before and this one
     k = 1 + int(np.argmax(after[1:]))
-    return float(0.5 * (ordered[k - 1] + ordered[k]))
+    return float(0.5 * (values[number < k].max() + values[number >= k].min()))
 
 
 def standard_error(gains: Array) -> float:

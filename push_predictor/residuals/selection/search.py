@@ -30,10 +30,9 @@ from push_predictor.residuals.selection.naming import Naming, Trial, chosen_of, 
 from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
-MOST_TERMS = 6
+MOST_ADDITIONS = 6
 MOST_MECHANISMS = 4  # of those that the gate let pass, with the largest statistics
 MOST_EXACT = 6  # labels that are fitted exactly, by their gain to first order
-CLOSE = 0.6  # of the best gain to first order: less is not fitted exactly
 MOST_MOVES = 3  # of a step's place
 MOST_ROUNDS = 6  # of moves after an addition
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
@@ -92,14 +91,16 @@ class _Search:
         chosen: list[Candidate] = []
         fit = self._fit(chosen)
         first = screened = self.gate.screened(self._unexplained(fit))
-        while len(chosen) < MOST_TERMS and self._let_pass(screened):
+        for _ in range(MOST_ADDITIONS):
+            if not self._let_pass(screened):
+                break
             added = self._best(fit, chosen)
             if added is None or not self._worthwhile(added.fit, fit, bool(chosen)):
                 break
             chosen, fit = self._improved([*chosen, added.candidate], added.fit)
             screened = self.gate.screened(self._unexplained(fit))
         terms = [self._named(chosen[:k] + chosen[k + 1 :], chosen[k]) for k in range(len(chosen))]
-        terms.sort(key=lambda term: -term.gain)
+        terms = list({term.best.label: term for term in sorted(terms, key=lambda term: term.gain)}.values())[::-1]
         fit = self._fit([term.best for term in terms], fit)
         return SearchResult(tuple(terms), fit, self.gate.candidates, first, screened, self._unexplained(fit))
 
@@ -154,7 +155,20 @@ class _Search:
         """What is best added to a fit of the others; a mechanism rather than the generic polynomial."""
         tried = self._tried(base, others)
         known = [t for t in tried if t.candidate.mechanism is not None and t.gain > base.scores.sum()]
-        return chosen_of(known or tried) if tried else None
+        if not tried:
+            return None
+        best = chosen_of(known or tried)
+        return max([best, *self._in_other_forms(best.candidate, base, others)], key=lambda t: t.gain)
+
+    def _in_other_forms(self, c: Candidate, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
+        """The candidate in as simple forms of other kinds, fitted exactly: to first order these may seem as good."""
+        if c.basis.is_constant:
+            return []
+        forms = {basis.name: basis for basis in forms_of(c.covariate, self.rows.evidence.table) if not basis.offset}
+        tried = [
+            candidate(self.rows.evidence, *c.label, basis) for basis in forms.values() if basis.name != c.basis.name
+        ]
+        return [self._fitted_with(others, t, base) for t in tried if t.plain.shape[2] <= c.plain.shape[2]]
 
     def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
         """The labels that gain most to first order, each in its best form, fitted exactly."""
@@ -165,9 +179,7 @@ class _Search:
             for label in (c.label, (None, c.covariate), (c.mechanism, self._constants.get(c.mechanism)))
         }
         each = [self._in_best_form(base, *label) for label in self._proposed() if label not in taken]
-        most = max((gain for gain, _ in each), default=0.0)
-        near = sorted((pair for pair in each if pair[0] > CLOSE * most), key=lambda pair: -pair[0])
-        return [self._fitted_with(others, c, base) for _, c in near[:MOST_EXACT]]
+        return [self._fitted_with(others, c, base) for c in _fitted_exactly(each)]
 
     def _proposed(self) -> Iterator[Label]:
         """Every mechanism that passed, constant and with every covariate: an effect that begins early looks constant.
@@ -249,3 +261,11 @@ class _Search:
     def _p_value(self, c: Candidate) -> float:
         own = [p for label, p in self.passed.items() if c.mechanism == label[0] or c.covariate == label[1]]
         return min(own or self.passed.values())
+
+
+def _fitted_exactly(each: Sequence[tuple[float, Candidate]]) -> list[Candidate]:
+    """Those with the largest gains to first order, and the best of every mechanism; of generic ones the best alone."""
+    ordered = [c for _, c in sorted(each, key=lambda pair: -pair[0])]
+    known = [c for c in ordered if c.mechanism is not None]
+    first = {c.mechanism: c for c in reversed(ordered)}
+    return [*known[:MOST_EXACT], *(c for c in first.values() if not any(c is one for one in known[:MOST_EXACT]))]
