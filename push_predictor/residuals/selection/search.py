@@ -220,11 +220,11 @@ class _Search:
     def _fitted_with(self, others: Sequence[Candidate], c: Candidate, base: Fit) -> Trial:
         """The candidate fitted next to others; a step is moved to where the effect of its size gains most."""
         trial = Trial(c, self._fit([*others, c], base))
-        for _ in range(MOST_MOVES if c.basis.name == "step" else 0):
+        for k in range(MOST_MOVES if c.basis.name == "step" else 0):
             place = best_place(trial.fit, trial.candidate)
             moved = candidate(self.rows.evidence, *c.label, replace(c.basis, place=place))
             again = Trial(moved, self._fit([*others, moved], trial.fit))
-            if again.gain <= trial.gain:
+            if k > 0 and again.gain <= trial.gain:  # the first place was only near
                 break
             trial = again
         return trial
