@@ -29,10 +29,10 @@ import numpy as np
 from examples import loop
 from examples.hidden import make_hidden
 from examples.live_table import LiveTable
+from examples.overview_picture import readme_picture
 from examples.processes import node
 from examples.stages import Page, Stages
 from push_predictor.evaluation.offline import report_windows, validate_recording
-from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model

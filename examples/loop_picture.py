@@ -96,7 +96,8 @@ def _comparison(path: Path, answered: list[dict[str, Any]], table: PushTable, fi
     rows = table.covariates["push_index"] >= first
     mean = np.array([window["predicted"] for window in answered])[rows]
     covariance = np.array([window["covariance"] for window in answered]).reshape(-1, 3, 3)[rows]
-    return comparison_of(load_model(path), table.take(rows), mean, covariance)
+    model = load_model(path)
+    return comparison_of(model, model.continued(table.take(rows)), mean, covariance)
 
 
 def _paint_story(axes: Axes, story: Story, change: int) -> None:

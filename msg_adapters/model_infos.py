@@ -9,8 +9,8 @@ from math import inf
 from pathlib import Path
 
 from push_predictor.models.effects.covariate_range import CovariateRange
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import UNITS
 from push_predictor_interfaces.msg import ModelInfo
 
 _UNLIMITED = CovariateRange(-inf, inf)  # of a covariate that the fitted effects do not depend on

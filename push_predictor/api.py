@@ -163,14 +163,12 @@ def trace(
     rig: Rig | AnyPath | None = None,
     seed: int = 0,
     watch: Watch | None = None,
-    experiment: AnyPath | Sequence[AnyPath] = (),
     topics: Topics = Topics(),
     strict: bool = False,
 ) -> Trace:
     """Find out why a model no longer fits new recordings: the effect it lacks, its size, and the extended model.
 
     alpha: probability of reporting any effect where there is none. covariates: those to try; all unless given.
-    experiment: recordings of the pushes that an earlier trace proposed; they are analysed and never held out.
     topics: of the recordings.
 
     The data are checked as by `push_predictor check`. A DataWarning names a probable mistake, or a domain of which
@@ -187,7 +185,6 @@ def trace(
         rig=_rig(rig),
         seed=seed,
         watch=watch or _print_stage,
-        experiment=_paths(experiment) if experiment else [],
         topics=topics,
         checks=DataChecks(strict, _warn),
     )

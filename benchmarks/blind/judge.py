@@ -71,7 +71,7 @@ def judge(truth: Json, result: Json) -> Judged:
     """Score one verdict. A mechanism that the run removed counts as outside the library."""
     failed = "failed" in result
     acting = acting_effects(truth, result.get("without"))
-    effects = [] if failed else distinct(result["effects"])
+    effects = [] if failed else distinct(_reported(truth, result))
     mechanism = effects[0]["mechanism"] if effects else None
     named = _matching(acting, mechanism) if effects else None
     driver = _first_driver(result)
@@ -153,7 +153,21 @@ def _found(truth: Json, result: Json) -> bool:
         return result["verdict"] not in ("none", "input_shift")
     if truth["channel"] == "none":
         return bool(result["effect_present"])
+    if _harmless(truth, result):
+        return True
     return bool(result["channel"] == ("motion" if truth["channel"] == "variance" else truth["channel"]))
+
+
+def _reported(truth: Json, result: Json) -> Sequence[Json]:
+    """The reported effects; a hidden error of measurement that was reported as harmless, with nothing else, counts."""
+    return result["effects"] or [{**each, "covariate": "model_inputs"} for each in _harmless(truth, result)]
+
+
+def _harmless(truth: Json, result: Json) -> list[Json]:
+    """What was reported as harmless of a hidden error of measurement, and nothing else."""
+    if truth["channel"] != "measurement" or result["effect_present"]:
+        return []
+    return [each for each in result.get("harmless", ()) if each["mechanism"] in truth["names"]]
 
 
 def _first_driver(result: Json) -> str | None:

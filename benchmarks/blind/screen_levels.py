@@ -28,12 +28,10 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
-from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.forward_selection import ForwardSelection
-from push_predictor.residuals.selection.term_choice import TermChoice
+from push_predictor.residuals.selection.gate import Gate
 from push_predictor.types import Array
 
 UNEVEN = 0.4  # standard deviation of the logarithm of a push's spread
@@ -63,23 +61,23 @@ class _Design:
 
 
 def _design(model: PushModel, table: PushTable) -> _Design:
-    analysis = with_instrument(table).take(~held_out_rows(table))
+    analysis = table.take(~held_out_rows(table))
     evidence, inputs = evidence_of(model, analysis), inputs_basis(model, analysis)
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
-    candidates = tuple(c for c in candidates_of(evidence, None, inputs) if not baseline.lacks(c.covariate))
+    candidates = tuple(candidates_of(evidence, None, inputs))
     return _Design(evidence, inputs, baseline, candidates)
 
 
 def _smallest(design: _Design, rng: np.random.Generator, draws: int) -> Iterator[float]:
     """The smallest family-wise p value of each draw of the noise."""
-    choice = TermChoice(design.evidence, design.candidates, design.inputs, 0)
     for _ in range(draws):
         before = design.baseline.evidence
         z = _noise(rng, before.table)
         residual = np.asarray(np.linalg.solve(before.whitener, z[:, :, None])[:, :, 0], dtype=np.float64)
         redrawn = replace(before, residual=residual)
-        selection = ForwardSelection(choice, max(ALPHAS), replace(design.baseline, evidence=redrawn))
-        yield float(selection.screened(_noise(rng, design.evidence.table)).p_value.min())
+        baseline = replace(design.baseline, evidence=redrawn)
+        gate = Gate(design.evidence, design.candidates, design.inputs, max(ALPHAS), 0, baseline)
+        yield float(gate.screened(_noise(rng, design.evidence.table)).p_value.min())
 
 
 def _noise(rng: np.random.Generator, table: PushTable) -> Array:

@@ -26,8 +26,8 @@ from push_predictor_paper.fits.fit import trained as trained_on_split
 from benchmarks.measured.square import SIZES, imported_square
 from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.metrics import joint_nlpd
+from push_predictor.evaluation.push_scores import by_push
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap
-from push_predictor.evaluation.validation import by_push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation, fit_correlation
 from push_predictor.models.push_model import PushModel

@@ -60,6 +60,7 @@ def run(options: argparse.Namespace) -> None:
         known = given or known_rig(options.data[0])
         checks.judged_by(options.data, table, known)
         model = on_supports(model, known, supports)
+        table = model.continued(table)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
     for path in options.data:

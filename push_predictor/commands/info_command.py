@@ -104,6 +104,8 @@ def _describe_model(path: Path) -> dict[str, object]:
         "angle_range": _range(angle),
         "covariates": list(model.training.covariates),
         "needs": list(model.needs),
+        "defaults": dict(model.defaults),
+        "elapsed_time_origin": model.predictor.session.origin,
         "covariate_ranges": {name: [known.low, known.high] for name, known in model.covariate_ranges.items()},
     }
 

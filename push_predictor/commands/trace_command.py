@@ -40,16 +40,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     add_model(parser)
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     parser.add_argument(
-        "--and",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="RECORDING",
-        dest="experiment",
-        help="recording of the pushes that an earlier trace of the same data proposed; may be repeated. They are "
-        "analysed and never held out",
-    )
-    parser.add_argument(
         "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
     )
     parser.add_argument(
@@ -86,12 +76,11 @@ def run(options: argparse.Namespace) -> None:
             covariates=names,
             rig=rig,
             seed=options.seed,
-            experiment=options.experiment,
             topics=topics_of(options),
             watch=watch,
             checks=DataChecks(options.strict, warn),
         )
-    save_topics_of(options, [*options.data, *options.experiment])
+    save_topics_of(options, options.data)
     saved = False
     try:
         saved = _write_results(options, found)
@@ -112,7 +101,7 @@ def _check(options: argparse.Namespace) -> None:
     check_output("--save-model", options.save_model, force=options.force)
     if options.report is not None:
         html.check_installed("--report")
-    check_data([*options.data, *options.experiment])
+    check_data(options.data)
 
 
 def _names(text: str) -> list[str]:
@@ -152,10 +141,12 @@ def _write_report(options: argparse.Namespace, found: Trace) -> None:
 
 def _print(found: Trace, saved: Path | None) -> None:
     """Print the verdict, and where the extended model is."""
+    from push_predictor.models.push_model import defaults_in_words
     from push_predictor.residuals.reporting.summary import summary_lines
 
     print("\n".join(summary_lines(found)))
     if saved is not None and found.extended is not None:
         needs = ", ".join(found.extended.needs) or "no further covariates"
-        print(f"extended model: {saved}; requests need {needs}")
+        defaults = f"; defaults: {defaults_in_words(found.extended)}" if found.extended.defaults else ""
+        print(f"extended model: {saved}; requests need {needs}{defaults}")
     sys.stdout.flush()  # the verdict is out before the pictures are drawn

@@ -126,7 +126,7 @@ def _matter(model: PushModel, limits: Limits, seed: int) -> Push:
 
 def _with_covariates(model: PushModel, push: Push, given: Mapping[str, float]) -> Push:
     """The same covariates for all pushes. Raises RequestError for a push that the model cannot predict."""
-    covariates = {name: np.full(len(push.inputs), given[name]) for name in model.needs if name in given}
+    covariates = {name: np.full(len(push.inputs), given[name]) for name in model.accepted if name in given}
     check_requests(model, push.inputs, push.duration, covariates)
     return Push(push.inputs, push.duration, covariates)
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PooledScores, PushScores
-from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.push_scores import PooledScores, PushScores, samples_of
 from push_predictor.types import Array
 
 Figure = Callable[[PooledScores], Array]  # returns (d,) for d bootstrap samples
@@ -24,6 +23,17 @@ class Estimate:
     value: float
     low: float
     high: float
+
+    def times(self, factor: float) -> Estimate:
+        """The statistic times a factor."""
+        low, high = (
+            (factor * self.low, factor * self.high) if factor >= 0.0 else (factor * self.high, factor * self.low)
+        )
+        return Estimate(factor * self.value, low, high)
+
+    def size(self) -> Estimate:
+        """The statistic without its sign."""
+        return self.times(-1.0) if self.value < 0.0 else self
 
     def text(self, form: str = ".2f") -> str:
         """Text for a sentence: 0.12 (0.10 to 0.14)."""
@@ -46,8 +56,8 @@ class Estimate:
 
 
 def of_draws(value: float, draws: Array) -> Estimate:
-    """An estimate from a value and its bootstrap samples (d,)."""
-    low, high = np.quantile(draws, [0.025, 0.975])
+    """An estimate from a value and its bootstrap samples (d,); without samples, low and high are NaN."""
+    low, high = np.quantile(draws, [0.025, 0.975]) if len(draws) else (np.nan, np.nan)
     return Estimate(float(value), float(low), float(high))
 
 
@@ -58,7 +68,7 @@ def by_push(scores: PushScores, figure: Figure) -> Estimate:
 
 def difference_by_push(first: PushScores, second: PushScores, figure: Figure) -> Estimate:
     """The second's statistic minus the first's, with the interval from resampling the same pushes for both."""
-    weights = push_bootstrap(first.push_id)
+    weights = samples_of(first.push_id)
     value = figure(second.totals())[0] - figure(first.totals())[0]
     return of_draws(float(value), figure(second.totals(weights)) - figure(first.totals(weights)))
 

@@ -109,6 +109,7 @@ def validate_recording(
     """Predict every window of a recording, as predict_server does; report and checks as for `recorded_windows`."""
     windows, table = recorded_windows(model, path, rig, report, topics, checks)
     model = on_supports(model, rig or recording_rig(path), {})
+    table = model.continued(table)
     check_table(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
@@ -131,9 +132,11 @@ def report_recording(
     watch("windows", 0.0)
     windows, table = recorded_windows(models[0], path, rig, report, topics, checks)
     models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
-    for model in models:
-        check_table(model, table)
-    comparisons = [compare(model, table) for model in watched(models, part_of(watch, 0.1, 0.5), "model")]
+    tables = [model.continued(table) for model in models]
+    for model, own in zip(models, tables, strict=True):
+        check_table(model, own)
+    each = watched(list(zip(models, tables, strict=True)), part_of(watch, 0.1, 0.5), "model")
+    comparisons = [compare(model, own) for model, own in each]
     alarm = recording_alarm(models[0], table, comparisons[0])
     watch("figures", 0.5)
     page = report_windows(models, windows, comparisons, out, path.name, alarm=alarm)

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.evaluation.validation import Comparison, by_push
-from push_predictor.types import Array
+from push_predictor.types import Array, TextArray
+
+if TYPE_CHECKING:
+    from push_predictor.evaluation.validation import Comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,16 @@ class PushScores:
             return np.asarray((w @ sums) / count[:, None])
 
         shares = np.stack([mean(self.covered[..., k]) for k in range(len(COVERAGE_LEVELS))], axis=-1)
-        return PooledScores((w @ self.error) / (w @ self.spread), mean(self.nlpd), mean(self.exact_nlpd), shares)
+        error, spread = w @ self.error, w @ self.spread
+        nmse = np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0)
+        return PooledScores(nmse, mean(self.nlpd), mean(self.exact_nlpd), shares)
 
     def resampled(self, seed: int = 0) -> PooledScores:
-        """Pooled scores of 1000 bootstrap samples of whole pushes, the same for all models of these pushes."""
-        return self.totals(push_bootstrap(self.push_id, seed))
+        """Pooled scores of 1000 bootstrap samples of whole pushes, the same for all models of these pushes.
+
+        Fewer than two pushes have no samples.
+        """
+        return self.totals(samples_of(self.push_id, seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +76,25 @@ def push_scores(comparison: Comparison) -> PushScores:
     covered = c.covered(COVERAGE_LEVELS)
     columns = ((c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2, nlpd, exact, covered.astype(np.float64))
     return PushScores(pushes, np.bincount(push).astype(np.float64), *(by_push(push, column) for column in columns))
+
+
+def samples_of(pushes: TextArray, seed: int = 0) -> Array:
+    """How often (draws, p) each of p pushes counts in each bootstrap sample; no draws for fewer than two pushes."""
+    return push_bootstrap(pushes, seed) if len(pushes) > 1 else np.empty((0, len(pushes)))
+
+
+def resampled_means(push_id: TextArray, rows: Array) -> Array:
+    """Means (draws, k) of rows (n, k) in bootstrap samples of whole pushes; no draws for fewer than two pushes."""
+    pushes, push = np.unique(push_id, return_inverse=True)
+    weights = samples_of(pushes)
+    return np.asarray((weights @ by_push(push, rows)) / (weights @ np.bincount(push))[:, None])
+
+
+def by_push(push: np.ndarray, rows: Array) -> Array:
+    """Sums (p, ...) of rows (n, ...) over the rows of each push; push (n,) numbers them from 0."""
+    sums = np.zeros((int(push.max(initial=-1)) + 1, *rows.shape[1:]))
+    np.add.at(sums, push, rows)
+    return sums
 
 
 def pooled(parts: Sequence[PushScores]) -> PushScores:

@@ -19,7 +19,7 @@ from push_predictor.evaluation.metrics import (
     nmse,
     standardised,
 )
-from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.models.predictors.tails import IntervalKind, Tails, half_widths, joint_radius
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -114,7 +114,7 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
         "joint_nlpd": _number(np.mean(joint_nlpd(c.mean, c.covariance, c.observed))) if count else None,
         "coverage": {str(level): _coverage(c, level) if count else None for level in COVERAGE_LEVELS},
         "joint_coverage": _joint_coverage(c),
-        "interval": _intervals(c, nlpd),
+        "interval": _intervals(c),
     }
 
 
@@ -136,31 +136,21 @@ def trained_on(model: PushModel, table: PushTable) -> list[str]:
     return sorted(same_rows | {push for push in table.pushes if _timed(push) in begun})
 
 
-def by_push(push: np.ndarray, rows: Array) -> Array:
-    """Sums (p, ...) of rows (n, ...) over the rows of each push; push (n,) numbers them from 0."""
-    sums = np.zeros((int(push.max()) + 1, *rows.shape[1:]))
-    np.add.at(sums, push, rows)
-    return sums
-
-
 def _timed(push_id: str) -> str | None:
     """The part of an id that the window finder derived from the time of first contact, None for other ids."""
     name = push_id.rpartition("/")[2]
     return name if name.startswith(TIMED_ID) else None
 
 
-def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:
-    pushes, push = np.unique(c.push_id, return_inverse=True)
-    if len(pushes) < 2:
-        return {"level": 0.95, "by": "push", "nmse": None, "nlpd": None}
-    weights = push_bootstrap(pushes)  # by push, not by row: 1000 samples of a day's windows do not fit in memory
-    error, spread = (c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2
-    nmse_draws = np.sum((weights @ by_push(push, error)) / (weights @ by_push(push, spread)), axis=1)
-    nlpd_draws = (weights @ by_push(push, nlpd.sum(axis=1))) / (weights @ np.bincount(push))
+def _intervals(c: Comparison) -> dict[str, object]:
+    draws = push_scores(c).resampled()
+    nmse_draws, nlpd_draws = draws.nmse.sum(axis=1), draws.nlpd.sum(axis=1)
     return {"level": 0.95, "by": "push", "nmse": _interval(nmse_draws), "nlpd": _interval(nlpd_draws)}
 
 
-def _interval(draws: Array) -> dict[str, float | None]:
+def _interval(draws: Array) -> dict[str, float | None] | None:
+    if not len(draws):
+        return None
     low, high = np.quantile(draws, [0.025, 0.975])
     return {"low": _number(low), "high": _number(high)}
 

@@ -24,7 +24,7 @@ from push_predictor.types import Array
 class Parameter:
     """A physical quantity with its unit; it is zero in the base model.
 
-    largest: largest absolute value that a rig can have. A fit that needs more mimics something else.
+    largest: largest absolute value that a rig can have; fits stay within it.
     """
 
     name: str
@@ -36,12 +36,15 @@ class Parameter:
 class Mechanism:
     """A mechanism that the base model lacks, or has with another value.
 
-    quantities: the parameters of mechanics/parameters.py that it changes, one for each of its own.
+    quantities: the parameters of mechanics/parameters.py that it changes, one for each of its own. noun: what it
+    changes, in prose. onset: a clause for a change at one point, if there is an apt one.
     """
 
     name: str
     quantities: tuple[str, ...]
     parameters: tuple[Parameter, ...]
+    noun: str
+    onset: str = ""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -63,6 +66,34 @@ class Mechanism:
 
 _Row: TypeAlias = tuple[str, str, str, float, str]
 
+# What changes, in prose.
+NOUNS = {
+    "contact_friction": "contact friction",
+    "contact_asymmetry": "the difference between contact friction to the left and to the right",
+    "pressure_spread": "the spread of the slider's pressure on the table",
+    "centre_of_friction": "the slider's centre of friction",
+    "pushing_height": "the pushing height",
+    "body_anisotropy": "direction-dependent friction of the slider",
+    "anisotropic_friction": "direction-dependent friction of the table",
+    "friction_gradient": "the friction gradient across the table",
+    "tilted_surface": "the tilt of the table",
+    "inertia": "the slider's inertia",
+    "pusher_radius": "the pusher's radius",
+    "pusher_travel": "the distance that the pusher travels",
+    "friction_by_angle": "the change of contact friction with the push angle",
+    "friction_by_speed": "the change of contact friction with sliding speed",
+    "friction_by_load": "the change of contact friction with the normal force",
+    "rim_pressure": "the growth of the slider's pressure towards its rim",
+    "outline_shift": "the position of the slider's outline in its tracked frame",
+    "tip_offset": "the offset of the pusher's tip",
+    "outline_rotation": "the rotation of the slider's outline in its tracked frame",
+    "push_rotation": "the rotation of the recorded push direction",
+}
+ONSETS = {
+    "body_anisotropy": "the slider's friction became direction-dependent",
+    "anisotropic_friction": "the table's friction became direction-dependent",
+}
+
 
 def _mechanisms(*rows: _Row) -> tuple[Mechanism, ...]:
     """Mechanisms from one row for each of their parameters.
@@ -73,7 +104,7 @@ def _mechanisms(*rows: _Row) -> tuple[Mechanism, ...]:
     for name in dict.fromkeys(row[0] for row in rows):
         own = [row for row in rows if row[0] == name]
         parameters = tuple(Parameter(meaning, unit, largest) for _, _, unit, largest, meaning in own)
-        found.append(Mechanism(name, tuple(row[1] for row in own), parameters))
+        found.append(Mechanism(name, tuple(row[1] for row in own), parameters, NOUNS[name], ONSETS.get(name, "")))
     return tuple(found)
 
 
@@ -98,7 +129,7 @@ LIBRARY: tuple[Mechanism, ...] = _mechanisms(
 )
 
 # Most of these mimic one of the library, so they are candidates only once that has shown that an analytical model is
-# wrong (residuals/selection/further_steps.py).
+# wrong (residuals/selection/search.py).
 REFINEMENTS: tuple[Mechanism, ...] = _mechanisms(
     ("friction_by_angle", "friction_by_angle", "1/rad", 0.5, "change of contact friction with push angle"),
     ("friction_by_speed", "friction_by_speed", "1", 0.2, "contact friction per e-fold of sliding speed"),

@@ -78,6 +78,7 @@ class PushModel:
             f"{self._training_in_words()}"
             f"  mean: {mean_in_words(self.predictor)}\n"
             f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
+            f"{self._defaults_in_words()}"
             f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
         )
 
@@ -90,6 +91,9 @@ class PushModel:
             f"  trained on {len(self.training)} windows of {self.provenance.pushes} pushes{origin}\n"
             f"  pusher speed {speeds.min():.3g} to {speeds.max():.3g} mm/s, windows of {np.median(durations):.3g} s\n"
         )
+
+    def _defaults_in_words(self) -> str:
+        return f"  defaults of covariates: {defaults_in_words(self)}\n" if self.defaults else ""
 
     def predict(self, pushes: Pushes) -> Prediction:
         """Predict the outcomes of n pushes.
@@ -118,6 +122,23 @@ class PushModel:
     def needs(self) -> tuple[str, ...]:
         """Names of the covariates that every push must bring; none unless the model is extended."""
         return self.predictor.needs
+
+    @property
+    def defaults(self) -> Mapping[str, float]:
+        """The values of covariates that a push may omit, by name: those at the end of the trace."""
+        return self.predictor.defaults
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Names of the covariates that a push may bring."""
+        return (*self.needs, *self.defaults)
+
+    def continued(self, table: PushTable) -> PushTable:
+        """The rows of a recording with the cumulative covariates that this model predicts with.
+
+        Those of an extended model go on from its trace, see TracedSession.
+        """
+        return self.predictor.session.continued(table)
 
     @cached_property
     def _has_large_matrices(self) -> bool:
@@ -184,13 +205,16 @@ class PushModel:
     def covariate_ranges(self) -> dict[str, CovariateRange]:
         """The range in the training rows of each covariate that the effects depend on.
 
-        For the model's own inputs see `in_domain`.
+        A range contains the default. A step along a covariate that only grows is past, so that it has no range. For
+        the model's own inputs see `in_domain`.
         """
         if not self.predictor.covariates:
             return {}
         rows = self.training
         known = self.predictor.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
-        return {name: range_of(name, known[name]) for name in self.predictor.covariates if name not in INPUTS}
+        names = [name for name in self.predictor.covariates if name not in (*INPUTS, *self.predictor.past)]
+        ranges = {name: range_of(name, known[name]) for name in names}
+        return {name: found.reaching(self.defaults.get(name, found.high)) for name, found in ranges.items()}
 
     @cached_property
     def training_mean(self) -> Array:
@@ -254,6 +278,11 @@ def mean_parameters(predictor: Predictor) -> dict[str, float]:
 def _is_textbook(predictor: Predictor) -> bool:
     base = predictor.base
     return isinstance(base, MechanicsPredictor) and not base.fitted.covariance.any()
+
+
+def defaults_in_words(model: PushModel) -> str:
+    """The defaults on one line, empty if there are none."""
+    return ", ".join(f"{name} {value:.4g}" for name, value in model.defaults.items())
 
 
 def mean_in_words(predictor: Predictor) -> str:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from push_predictor.errors import CovariateError, RequestError
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.pushes import Push, Pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -25,23 +26,6 @@ if TYPE_CHECKING:
 
 Numbers: TypeAlias = "float | Array"  # one push, or a column (n,)
 
-UNITS = {
-    "elapsed_time": "s",
-    "slid_distance": "m",
-    "slider_x": "m",
-    "slider_y": "m",
-    "slider_heading": "rad",
-    "push_heading": "rad",
-    "velocity": "m/s",
-    "angle": "rad",
-    "dwell_time": "s",
-    "time_since_contact": "s",
-    "contact_gap": "m",
-    "normal_force": "N",
-    "tangential_force": "N",
-    "free_force_x": "N",
-    "free_force_y": "N",
-}  # of the covariates that every window has; the unit of a recorded topic is its publisher's
 OUT_OF_DOMAIN = "out of domain"
 FARTHEST = 1.0  # m per push; the mechanics are integrated along the path
 
@@ -88,8 +72,8 @@ def check_requests(model: PushModel, inputs: Array, duration: float | Array, cov
 
 
 def check_pushes(model: PushModel, pushes: Pushes) -> None:
-    """Raise RequestError unless the model predicts these pushes; covariates that it does not need are ignored."""
-    needed = {name: column for name, column in pushes.covariates.items() if name in model.needs}
+    """Raise RequestError unless the model predicts these pushes; covariates that it does not use are ignored."""
+    needed = {name: column for name, column in pushes.covariates.items() if name in model.accepted}
     if len(pushes) > 1:
         check_requests(model, pushes.inputs, pushes.duration, needed)
     else:
@@ -99,11 +83,11 @@ def check_pushes(model: PushModel, pushes: Pushes) -> None:
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
-    """Raise RequestError unless the model predicts every row of a table; covariates that it does not need are ignored.
+    """Raise RequestError unless the model predicts every row of a table; covariates that it does not use are ignored.
 
     The index in the error is that of the row.
     """
-    needed = {name: column for name, column in table.covariates.items() if name in model.needs}
+    needed = {name: column for name, column in table.covariates.items() if name in model.accepted}
     check_requests(model, table.inputs, table.duration, needed)
 
 

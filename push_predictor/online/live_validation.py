@@ -86,7 +86,7 @@ class LiveValidation:
     def comparison(self, model: int = 0) -> Comparison:
         """Predicted and observed outcomes of the windows that a model has predicted."""
         numbers, mean, covariance, _ = self._answers[model].sorted()
-        table = windows_to_table(self.windows.take(numbers))
+        table = self.models[model].continued(windows_to_table(self.windows.take(numbers)))
         return comparison_of(self.models[model], table, mean, covariance)
 
     def residuals(self) -> Iterator[Residual]:

@@ -125,8 +125,9 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     # Imported here: the node that starts this process does not need these modules.
     from push_predictor.models.store.model_file import save_model
     from push_predictor.recordings.checks.data_checks import DataChecks
+    from push_predictor.residuals.reporting.rivals import rivals
+    from push_predictor.residuals.reporting.sentences import answer, worth
     from push_predictor.residuals.reporting.trace_json import trace_json
-    from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
     from push_predictor.residuals.trace import trace_data
 
     def watch(stage: str, share: float) -> None:
@@ -140,9 +141,9 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     write_whole(task.folder / VERDICT, f"{text}\n".encode())
     if trace.extended is not None:
         save_model(trace.extended, task.folder / EXTENDED)
-    sentences = [verdict_sentence(trace, "in the JSON"), worth_sentence(trace), *_report(task.folder / REPORT, trace)]
+    sentences = [*answer(trace)[:2], rivals(trace), worth(trace), *_report(task.folder / REPORT, trace)]
     sentences += [f"Warning: {_for_client(text, task)}" for text in warnings]
-    return Traced(text, " ".join(sentences), None if trace.extended is None else trace.extended.needs)
+    return Traced(text, " ".join(filter(None, sentences)), None if trace.extended is None else trace.extended.needs)
 
 
 def _report(path: Path, trace: Trace) -> Sequence[str]:

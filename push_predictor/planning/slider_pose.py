@@ -14,7 +14,7 @@ import numpy as np
 from push_predictor.errors import ContactError, CovariateError, RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.request import PushRequest, check_request, domain_remark

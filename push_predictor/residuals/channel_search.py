@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,9 @@ from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.question import Question
 from push_predictor.watch import Watch, no_watch
 
+# Share of the windows, or of the mean squared residual, from which an error of the force sensor does harm. The mean
+# square of a thousand residuals has a standard error of 4 %, so that no smaller change can matter to a verdict.
+HARMLESS = 0.02
 BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
 
 
@@ -40,22 +44,29 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
     watch("force", 0.6)
     known = analysis.take(question.inside)  # faster pushes need more force, and training does not show how much
     forces = wrench_effects(known, model.training, question.evidence.mechanics, question.share("wrench"), seed)
-    biased = None if motion.terms else _biased(forces, spread=bool(motion.variance))
-    return Searched(measured, motion, forces, None if biased is None else _corrected(question, biased))
+    bias = _bias_of(forces)
+    if bias is None:
+        return Searched(measured, motion, forces)
+    corrected = _corrected(question, bias)
+    if not _changes(question, corrected):
+        return Searched(measured, motion, _without_bias(forces), harmless=bias.errors)
+    first = forces.effects[0].mechanism == WRENCH_BIAS if forces.effects else not motion.variance
+    return Searched(measured, motion, forces, corrected if first and not motion.terms else None)
 
 
 @dataclass(frozen=True, eq=False)
 class Searched:
     """What was found on each channel, before anything is opened that was held out.
 
-    measured: None if the windows do not determine measurement errors. corrected: None, or the measurement error that
-    explains the residuals; nothing else was searched for then.
+    measured: None if the windows do not determine measurement errors. corrected: None, or the measurement error that is
+    the verdict. harmless: errors that change neither windows nor residuals.
     """
 
     measured: MeasurementFinding | None
     motion: MotionFinding
     forces: WrenchFinding
     corrected: Corrected | None = None
+    harmless: tuple[MeasurementFault, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +86,9 @@ def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
-    held = held_out_rows(again.table, again.chosen)
-    analysis, held_out = again.table.take(~held), again.table.take(held)
-    return Corrected(measured, replace(evidence_of(question.model, analysis), chosen=again.chosen), held_out)
+    table = question.deployed.continued(again.table)
+    held = held_out_rows(table)
+    return Corrected(measured, evidence_of(question.model, table.take(~held)), table.take(held))
 
 
 def _explains_residuals(question: Question, corrected: Corrected) -> bool:
@@ -97,17 +108,41 @@ def _excess(evidence: Evidence) -> float:
     return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
 
 
-def _biased(forces: WrenchFinding, spread: bool) -> MeasurementFinding | None:
-    """A bias of the force sensor as a measurement error, though it is found on the wrench channel.
-
-    One of the sensor's zero does no harm to the windows, so it is the answer only if neither the force in contact nor
-    the spread of the outcomes changed.
-    """
-    first = next(iter(forces.effects), None if spread else forces.zero)
-    if first is None or first.mechanism != WRENCH_BIAS:
+def _bias_of(forces: WrenchFinding) -> MeasurementFinding | None:
+    """A bias of the force sensor as a measurement error, though it is found on the wrench channel; None without one."""
+    found = [each for each in (*forces.effects, forces.zero) if each is not None and each.mechanism == WRENCH_BIAS]
+    if not found:
         return None
+    first = found[0]
     size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
     error = MeasurementFault(
         first.mechanism, first.parameters, first.p_value, first.rivals, size, first.covariate, first.basis
     )
     return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)
+
+
+def _without_bias(forces: WrenchFinding) -> WrenchFinding:
+    return replace(forces, effects=tuple(e for e in forces.effects if e.mechanism != WRENCH_BIAS), zero=None)
+
+
+def _changes(question: Question, corrected: Corrected) -> bool:
+    """Whether a correction changes more than HARMLESS of the windows, or the mean squared residual by more than that.
+
+    Without streams nothing can be corrected, so that no change is shown.
+    """
+    if corrected.evidence is None or corrected.held_out is None:
+        return False
+    before, after = (
+        _rows([question.windows, question.held_out]),
+        _rows([corrected.evidence.table, corrected.held_out]),
+    )
+    known = len(before & after)
+    if known < (1.0 - HARMLESS) * max(len(before), len(after)):
+        return True
+    squares = [float(np.mean(z**2)) for z in (evidence_of(question.model, question.windows).z, corrected.evidence.z)]
+    return abs(squares[1] - squares[0]) > HARMLESS * squares[0]
+
+
+def _rows(tables: Sequence[PushTable]) -> set[bytes]:
+    """Windows by their inputs and durations: outcomes of held-out pushes stay closed."""
+    return {row.tobytes() for t in tables for row in np.column_stack([t.inputs, t.duration])}

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import hypot
 from typing import Any, Literal
 
+import numpy as np
 from scipy.special import ndtri
 
+from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nmse
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
@@ -50,6 +54,11 @@ class Sized:
     high: float
     unit: str
 
+    @property
+    def estimate(self) -> Estimate:
+        """The value with its interval, without name and unit."""
+        return Estimate(self.value, self.low, self.high)
+
     def with_errors_of_mechanics(self) -> Sized:
         """The same with the interval widened by errors of the mechanics, which are independent of chance."""
         more = float(ndtri(0.975)) * DISCREPANCY * self.value
@@ -76,21 +85,20 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
+class Harmless:
+    """A finding that changes neither windows nor predictions: no verdict, but its size is reported."""
+
+    mechanism: str
+    parameter: Sized
+
+
+@dataclass(frozen=True)
 class Tested:
     """A candidate that was tried, with its family-wise p value."""
 
     mechanism: str | None
     covariate: str
     p_value: float
-
-
-@dataclass(frozen=True)
-class Gain:
-    """After minus the model without the effects on held-out pushes; 95 % interval by a paired bootstrap of pushes."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +124,8 @@ class Trace:
     mechanism. analysis: the windows that were searched; residual, unexplained (n, 3): their standardised residuals
     before and after. gain_over: the better of the two models without the effects, with which the gain compares.
     extended: the model with the effects, None if the motion model does not change. remaining: mechanism and covariate
-    of the strongest effect that is still significant. input_shift: inputs that differ from those of training. notes:
-    further sentences for the reader.
+    of the strongest effect that is still significant. input_shift: inputs that differ from those of training. harmless:
+    findings that change neither windows nor predictions. notes: further sentences for the reader.
     """
 
     verdict: Verdict
@@ -132,17 +140,49 @@ class Trace:
     residual: Array
     unexplained: Array
     held_out: HeldOut
-    gain_nmse: Gain
-    gain_nlpd: Gain
+    gain_nmse: Estimate
+    gain_nlpd: Estimate
     gain_over: Reference
     extended: PushModel | None
     tested: tuple[Tested, ...]
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: tuple[str | None, str] | None
-    experiment: tuple[Mapping[str, float], ...]
     alpha: float
     input_shift: tuple[ShiftedInput, ...] = ()
+    harmless: tuple[Harmless, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def relearnt(self) -> bool:
+        """Whether the refit learns every effect on the mean motion, so that nothing was added to a model."""
+        return bool(self.terms) and self.gain_nlpd.low == self.gain_nlpd.high == 0.0
+
+    @cached_property
+    def confirming_gain(self) -> Estimate:
+        """The difference on held-out pushes that confirms the effects on the mean motion; below zero is better.
+
+        It is that in NLPD by the extension. Where the refit learns every effect, it is that in NMSE by retraining: a
+        refit also learns the new noise, which improves its NLPD without any effect on the mean.
+        """
+        if not self.relearnt:
+            return self.gain_nlpd
+        return difference_by_push(push_scores(self.held_out.before), push_scores(self.held_out.refit), total_nmse)
+
+    @property
+    def weak(self) -> bool:
+        """Whether the held-out pushes do not confirm the effects on the mean motion beyond chance."""
+        confirmed = self.confirming_gain.high < 0.0 and (self.relearnt or self.extended is not None)
+        return bool(self.terms) and not confirmed
+
+    @property
+    def comparisons(self) -> list[Comparison]:
+        """Comparisons of the held-out pushes named before, refit and, if something was added, after."""
+        held = self.held_out
+        pairs = [("before", held.before), ("refit", held.refit), ("after", held.after)]
+        same = np.array_equal(held.refit.mean, held.after.mean)
+        same = same and np.array_equal(held.refit.observed, held.after.observed)
+        shown = pairs if self.terms or not same else pairs[:2]
+        return [replace(comparison, model=name) for name, comparison in shown]
 
     def __repr__(self) -> str:
         effects = [

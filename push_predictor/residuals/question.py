@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.drivers import LOCAL
 from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
 from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
-from push_predictor.residuals.evidence.instrument import GAP, with_instrument
-from push_predictor.residuals.evidence.loading import LoadedData, previous_residual
+from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.types import BoolArray
@@ -52,19 +52,16 @@ class Question:
         covariates: Sequence[str] | None = None,
         seed: int = 0,
     ) -> Question:
-        """Predict all windows, add the previous push's residual to their covariates, and split them."""
+        """Predict all windows and split them; covariates that only grow go on from the trace that extended the model.
+
+        Raises as `trace`.
+        """
+        loaded = replace(loaded, table=model.continued(loaded.table))
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model
         every = widened(evidence_of(searched, loaded.table), searched, shift)
-        every = replace(every, chosen=loaded.chosen)
-        before = previous_residual(loaded.table, every.z)
-        table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
-        held, usable = held_out_rows(table, loaded.chosen), with_instrument(table)
-        if GAP in (covariates or ()) and GAP not in usable.covariates:
-            raise RequestError(
-                "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"
-            )
+        table, held = loaded.table, held_out_rows(loaded.table)
         return cls(
             deployed=model,
             model=searched,
@@ -73,7 +70,7 @@ class Question:
             covariates=None if covariates is None else tuple(covariates),
             seed=seed,
             windows=table.take(~held),
-            evidence=replace(every.take(~held), table=usable.take(~held)),
+            evidence=every.take(~held),
             inside=~shift.outside[~held],
             held_out=table.take(held),
             shifted=shift.inputs,
@@ -92,5 +89,5 @@ def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequenc
     if len(table.pushes) < FEWEST_PUSHES:
         raise RequestError("pushes", len(table.pushes), f"at least {FEWEST_PUSHES}, preferably hundreds")
     for name in covariates or ():
-        if name not in table.covariates and name != "previous_residual":
-            raise RequestError("covariate", name, f"one of {', '.join(sorted(table.covariates))}")
+        if name not in table.covariates or name in LOCAL:
+            raise RequestError("covariate", name, f"one of {', '.join(sorted({*table.covariates} - {*LOCAL}))}")

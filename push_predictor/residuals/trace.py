@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
@@ -23,7 +24,7 @@ from push_predictor.recordings.load import no_inspection
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding
@@ -32,21 +33,21 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.by_the_clock import along, by_the_clock
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
 from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
-from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace, Verdict
+from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
-from push_predictor.residuals.selection.absolute_fit import parts_of_others
 from push_predictor.watch import Watch, no_watch
 
 if TYPE_CHECKING:
     from push_predictor.recordings.checks.data_checks import DataChecks
 
-NO_GAIN = Gain(0.0, 0.0, 0.0)
+NO_GAIN = Estimate(0.0, 0.0, 0.0)
 
 
 def trace_data(
@@ -58,23 +59,20 @@ def trace_data(
     rig: Rig | None = None,
     seed: int = 0,
     watch: Watch = no_watch,
-    experiment: Sequence[Path | str] = (),
     topics: Topics = Topics(),
     checks: DataChecks | None = None,
 ) -> Trace:
     """Judge a model, or a model file, on recordings or push tables that it was not trained on; see `trace`.
 
-    experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
-    the errors before and after are of the same pushes as in that trace. topics: of all recordings. checks: of the data
-    and of what their pushes cover.
+    topics: of all recordings. checks: of the data and of what their pushes cover.
     """
     watch("windows", 0.0)
     model = model if isinstance(model, PushModel) else load_model(Path(model))
-    data, designed = ([Path(path) for path in given] for given in (paths, experiment))
+    data = [Path(path) for path in paths]
     options, inspect = window_options(model), checks or no_inspection
-    loaded = load_evidence(data, rig, options, experiment=designed, topics=topics, inspect=inspect)
+    loaded = load_evidence(data, rig, options, topics=topics, inspect=inspect)
     if checks is not None:
-        checks.judged_by([*data, *designed], loaded.table, loaded.rig)
+        checks.judged_by(data, loaded.table, loaded.rig)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 
@@ -143,7 +141,6 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         tested=_family_wise(measured.tested, "measurement"),
         minimum_detectable={},
         remaining=None,
-        experiment=(),
         alpha=question.alpha,
         input_shift=question.shifted,
         notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(question.loaded)),
@@ -180,10 +177,14 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
         minimum_detectable=motion.minimum_detectable,
         remaining=motion.remaining,
-        experiment=motion.experiment.pushes,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=(*notes_of(question.loaded, motion, measured, forces), *notes_of_shift(question.shifted)),
+        harmless=tuple(
+            Harmless(fault.mechanism, size.with_errors_of_mechanics())
+            for fault in found.harmless
+            for size in fault.parameters
+        ),
+        notes=(*notes_of(question.loaded, found), *notes_of_shift(question.shifted)),
     )
 
 
@@ -191,12 +192,14 @@ def _extension(question: Question, motion: MotionFinding) -> _Extension:
     """The refit, extended by the effects that it cannot learn in its own inputs."""
     model, evidence = question.model, question.evidence
     refit = refit_base(model, evidence.table)
-    candidates = [term.best for term in motion.terms if not term.own]
-    after = extend(refit, evidence, candidates) if candidates else None
+    candidates = [by_the_clock(term.term, evidence.table) for term in motion.terms if not term.own]
+    session = question.deployed.predictor.session.followed_by(question.loaded.session)
+    after = extend(refit, evidence, candidates, session) if candidates else None
     added = iter(after.predictor.effects[-len(candidates) :] if after else ())
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(
-        estimated_effects(evidence, [t.best], of_size=True)[0][0] if t.own else next(added) for t in motion.terms
+        estimated(fitted(FitRows(evidence), [t.best]), of_size=True)[0][0] if t.own else along(t.best, next(added))
+        for t in motion.terms
     )
     gain = held_out_gain(model, refit, after, evidence.table, question.held_out) if after else None
     return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)
@@ -238,10 +241,10 @@ def _found_effects(
                 None if term.mechanism is None else size_of(effect, question.evidence.table),
                 _of_trace(term.p_value, "motion"),
                 term.share,
-                term.naming.resembles,
+                term.resembles,
             )
-            for term, effect, part in zip(motion.terms, effects, parts_of_others(motion.terms), strict=True)
-            if not part
+            for term, effect in zip(motion.terms, effects, strict=True)
+            if not term.part
         )
     if motion.variance and not forces.effects:
         return tuple(

@@ -18,10 +18,11 @@ from gaussian_comparisons import gaussian_comparison
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from examples.overview_picture import readme_picture
 from push_predictor.errors import PushPredictorError, TableError
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.figures.nearby import examples
 from push_predictor.evaluation.report.figures.push_maps import colour_scale
-from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     arc_length,
@@ -429,13 +430,13 @@ def test_page_escapes_text_that_is_not_a_part() -> None:
 def test_paired_difference_is_zero_to_itself_and_positive_to_a_worse_model(comparisons: list[Comparison]) -> None:
     main = comparisons[0]
     nmse, nlpd = paired_difference(main, main)
-    assert not nmse.any() and not nlpd.any()
+    assert nmse == nlpd == Estimate(0.0, 0.0, 0.0)
     shifted = main.mean + 0.2 * main.observed.std(axis=0)
     worse = Comparison("worse", 1, main.push_id, shifted, main.covariance, main.observed, None, main.training_mean)
-    for value, low, high in paired_difference(main, worse):
-        assert 0.0 < low < value < high
+    for found in paired_difference(main, worse):
+        assert 0.0 < found.low < found.value < found.high
     totals = [metrics_json(c)["nmse"]["total"] for c in (main, worse)]
-    assert paired_difference(main, worse)[0][0] == pytest.approx(totals[1] - totals[0])
+    assert paired_difference(main, worse)[0].value == pytest.approx(totals[1] - totals[0])
 
 
 def test_readme_figure_is_wide(models: list[PushModel], table: PushTable, tmp_path: Path) -> None:

@@ -149,7 +149,7 @@ def test_trend_detects_a_drift_and_none_without_one() -> None:
     assert found is not None and found.low < 0.0 < found.high
     drifting = trend(place, still + 3.0 * place / 59.0, push_id)
     assert drifting is not None and drifting.low > 0.0
-    assert drifting.change == pytest.approx(found.change + 3.0, abs=1e-9)
+    assert drifting.value == pytest.approx(found.value + 3.0, abs=1e-9)
     assert trend(place[:5], still[:5], push_id[:5]) is None
 
 

@@ -70,6 +70,16 @@ def one(record: dict[str, Any], result: dict[str, Any]) -> dict[str, Any]:
     return dict(score_of({"000": record}, {"000": result})["judged"]["000"])
 
 
+def test_hidden_bias_that_is_reported_as_harmless_is_found_and_named() -> None:
+    hidden = truth(channel="measurement", kind="wrench_bias", names=["wrench_bias"], covariates=[])
+    size = {"name": "force read too much along x", "value": 0.5, "low": 0.4, "high": 0.6, "unit": "N"}
+    noted = {**no_finding(), "harmless": [{"mechanism": "wrench_bias", "parameter": size}]}
+    assert one(hidden, noted)["found"] and one(hidden, noted)["name"] and one(hidden, noted)["driver"]
+    assert not one(hidden, no_finding())["found"]
+    drift = one(truth(), noted)
+    assert not drift["found"] and not drift["wrong"]
+
+
 def test_correct_mechanism_and_covariate_score_in_every_column() -> None:
     judged = one(truth(), verdict("contact_friction", "slid_distance"))
     assert judged["found"] and judged["name"] and judged["driver"] and judged["in_set"] and judged["set_size"] == 1

@@ -15,9 +15,9 @@ from synthetic import square_pushes
 
 from benchmarks.blind import oracle
 from benchmarks.blind.oracle import oracle_gain, true_term
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain
-from push_predictor.residuals.outcome import Gain
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +63,8 @@ def test_of_two_effects_the_oracle_has_both(table: PushTable, monkeypatch: pytes
     monkeypatch.setattr(oracle, "load_evidence", lambda paths: loaded)
     monkeypatch.setattr(oracle, "candidate", lambda evidence, mechanism, covariate, basis: (mechanism, covariate))
     monkeypatch.setattr(oracle, "extend", lambda base, evidence, candidates: given.append(candidates))
-    monkeypatch.setattr(oracle, "gain", lambda before, after, rest: (Gain(0, 0, 0), Gain(-0.3, -0.4, -0.2)))
-    better = HeldOutGain("deployed", Gain(0, 0, 0), Gain(-0.2, -0.3, -0.1))
+    monkeypatch.setattr(oracle, "gain", lambda before, after, rest: (Estimate(0, 0, 0), Estimate(-0.3, -0.4, -0.2)))
+    better = HeldOutGain("deployed", Estimate(0, 0, 0), Estimate(-0.2, -0.3, -0.1))
     monkeypatch.setattr(oracle, "held_out_gain", lambda *_: better)
     traced = {"value": -0.2, "low": -0.3, "high": -0.1}
     for truth in (record, {**record, "second": None}, {**record, "second": second}):

@@ -27,9 +27,8 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import _Problem, estimated_effects
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.selection.basis_choice import simplest_basis
 
 EXACT = [mechanism.name for mechanism in (*LIBRARY, *REFINEMENTS)]
 ALWAYS = DriverBasis("constant")
@@ -142,18 +141,6 @@ def test_designs_are_derivatives_where_the_effects_act(name: str) -> None:
         assert size_of(design[:, :, k] - difference) <= 0.15 * size_of(difference)
 
 
-def test_a_step_that_is_too_long_is_shortened_until_it_helps(deployed: PushModel) -> None:
-    evidence = evidence_of(deployed, pushes(40, 4, slippery(0.1)))
-    problem = _Problem.of(evidence, [candidate(evidence, "contact_friction", "model_inputs", ALWAYS)], None)
-    start = problem.linearised(np.zeros(1))
-    best = problem.solved().coefficients
-    found, fall = problem._shortened(start, 7.0 * best)  # a half is too far, a quarter is not
-    np.testing.assert_allclose(found.coefficients, 7.0 * best / 4.0)
-    assert fall == pytest.approx(start.objective(start.ridge) - found.objective(start.ridge), rel=1e-6)
-    same, nothing = problem._shortened(start, -best)
-    assert same is start and nothing == 0.0
-
-
 def test_a_parameter_stays_within_its_plausible_range() -> None:
     push, on = made(40), square(0.25)
     far, end = (joint_shift(on, [effect("contact_friction", size)], push) for size in (9.0, 1.0))
@@ -216,9 +203,10 @@ def deployed() -> PushModel:
     return train_model(pushes(60), square_rig(), "analytical", name="deployed")
 
 
-def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis) -> Effect:
+def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis, *, of_size: bool = True) -> Effect:
     evidence = evidence_of(deployed, table)
-    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)], of_size=True)[0][0]
+    fit = fitted(FitRows(evidence), [candidate(evidence, mechanism, "elapsed_time", basis)])
+    return estimated(fit, of_size=of_size)[0][0]
 
 
 def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
@@ -237,9 +225,9 @@ def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
     weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
     on_one_side = weak.inputs[:, differ_by] > limit
     mixed = replace(weak, outcomes=np.where(on_one_side[:, None], strong.outcomes, weak.outcomes))
-    estimate = found(deployed, mixed, "contact_friction", DRIFT)
-    assert 0.1 < estimate.coefficients[0] < 0.3
-    assert np.sqrt(estimate.covariance[0, 0]) > 0.1 * (0.3 - 0.1)
+    narrow, wide = (found(deployed, mixed, "contact_friction", DRIFT, of_size=of_size) for of_size in (False, True))
+    assert 0.1 < wide.coefficients[0] < 0.3
+    assert wide.covariance[0, 0] > 2.5**2 * narrow.covariance[0, 0]
 
 
 def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:
@@ -249,14 +237,3 @@ def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:
     left = table.outcomes - joint_shift(on, [estimate], push) - quiet.outcomes
     whole = table.outcomes - quiet.outcomes
     assert size_of(left) < 0.1 * size_of(whole)
-
-
-def test_a_step_is_placed_between_the_two_pushes_where_it_sets_in(deployed: PushModel) -> None:
-    sets_in = DriverBasis("step", ("elapsed_time",), place=337.0)
-    change = Effect("contact_friction", "elapsed_time", sets_in, np.array([0.5]), np.zeros((1, 1)), np.ones(3))
-    table = pushes(100, 6, change)
-    evidence = evidence_of(deployed, table)
-    tried = candidate(evidence, "contact_friction", "elapsed_time", replace(sets_in, place=500.0))
-    chosen = simplest_basis(tried, table, evidence.z, np.empty((len(table), 0)), evidence.block)
-    assert chosen.candidate.basis.name == "step"
-    assert abs(chosen.candidate.basis.place - 337.0) < 25.0  # two pushes and a half

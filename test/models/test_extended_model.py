@@ -43,7 +43,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import gain
@@ -180,7 +180,8 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
     # Without the errors of the mechanics, which widen the interval of a size.
     evidence = evidence_of(base, table)
     candidates = [candidate(evidence, *term) for term in terms]
-    (effects, cross), ((effect,), _) = (estimated_effects(evidence, some) for some in (candidates, candidates[:1]))
+    rows = FitRows(evidence)
+    (effects, cross), ((effect,), _) = (estimated(fitted(rows, some)) for some in (candidates, candidates[:1]))
     together = replace(both.predictor, effects=effects, cross=cross)
     uncertainty = together.shift(push)[1]
     alone, apart = (p.shift(push)[1] for p in (replace(one.predictor, effects=(effect,)), replace(together, cross={})))
@@ -311,7 +312,7 @@ def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushMod
 
 
 @pytest.fixture(scope="module")
-def estimated(bases: dict[str, PushModel]) -> ExtendedPredictor:
+def estimated_together(bases: dict[str, PushModel]) -> ExtendedPredictor:
     """Two effects that were estimated together."""
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     predictor = with_effects(bases["analytical"], pushes(6, 2, slippery(0.2)), terms).predictor
@@ -321,10 +322,11 @@ def estimated(bases: dict[str, PushModel]) -> ExtendedPredictor:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_extended_model_survives_saving(
-    bases: dict[str, PushModel], estimated: ExtendedPredictor, kind: str, tmp_path: Path
+    bases: dict[str, PushModel], estimated_together: ExtendedPredictor, kind: str, tmp_path: Path
 ) -> None:
     generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
-    effects = replace(estimated, effects=(*estimated.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
+    found = estimated_together
+    effects = replace(found, effects=(*found.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
     model = replace(bases[kind], predictor=effects.with_base(bases[kind].predictor))
     save_model(model, tmp_path / "m")
     loaded, table = load_model(tmp_path / "m"), pushes(10, 3)

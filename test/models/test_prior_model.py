@@ -300,7 +300,7 @@ def test_untrained_model_describes_itself(of_few_draws: PushModel, tmp_path: Pat
     registry = ModelRegistry()
     registry.load(tmp_path / "before.pushmodel")
     assert "kind=prior" in registry.describe("before")
-    assert "windows=0; covariates=-; duration=any" in registry.describe("before")
+    assert "windows=0; covariates=-; defaults=-; duration=any" in registry.describe("before")
 
 
 def test_untrained_model_returns_from_its_file(untrained: PushModel, tmp_path: Path) -> None:

@@ -209,7 +209,7 @@ def test_goal_without_data_uses_those_of_a_running_validator(server: Server, dri
         ended, result = server.trace(tmp_path / "elsewhere").end()
         assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
         assert names(tmp_path / "elsewhere") == sorted([EXTENDED, REPORT, VERDICT])
-        assert load_model(tmp_path / "elsewhere" / EXTENDED).needs == ("elapsed_time",)
+        assert list(load_model(tmp_path / "elsewhere" / EXTENDED).defaults) == ["elapsed_time"]
 
 
 def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:

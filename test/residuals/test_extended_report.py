@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from repository import BAGS
 
+from examples.overview_picture import readme_picture
 from push_predictor.cli import main
-from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text, map_covariates
 from push_predictor.evaluation.report.maps import fine_cells, push_map
 from push_predictor.evaluation.report.page import SECTIONS

@@ -18,7 +18,6 @@ from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import _Problem
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
@@ -192,16 +191,3 @@ def test_length_of_a_vector_is_not_negative() -> None:
     )
     sized = size_of(small, pushes(2, 0))
     assert sized is not None and sized.low >= 0.0
-
-
-def test_a_step_that_is_too_long_is_halved_until_it_is_of_use(deployed: PushModel) -> None:
-    evidence = evidence_of(deployed, pushes(60, 5, slippery(0.1)))
-    problem = _Problem.of(
-        evidence, [candidate(evidence, "contact_friction", "elapsed_time", slippery(0.0).basis)], None
-    )
-    zero = problem.linearised(np.zeros(1))
-    best = problem.solved().coefficients
-    found, fall = problem._shortened(zero, 6.0 * best)  # half of it is too long as well
-    np.testing.assert_allclose(found.coefficients, 1.5 * best)
-    assert fall == pytest.approx(zero.objective(zero.ridge) - found.objective(zero.ridge)) and fall > 0.0
-    assert problem._shortened(zero, -best) == (zero, 0.0)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a search may trust: inputs inside training, and a contact gap whose noise is not that of the outcome."""
+"""What a search may trust: inputs inside training."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
 from push_predictor.residuals.evidence.input_shift import input_shift
-from push_predictor.residuals.evidence.instrument import GAP, with_instrument
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.types import Array
 
@@ -153,37 +152,3 @@ def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_
     assert about_mechanics(analytical) is analytical
     informed = about_mechanics(learned)
     assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)
-
-
-# --- the instrument of the contact gap ---------------------------------------------------------------------------
-
-
-def gaps(values: list[float], push: list[str]) -> PushTable:
-    n = len(values)
-    return PushTable(
-        np.full((n, 3), 0.02), np.full(n, 0.2), np.zeros((n, 3)), np.array(push), {GAP: np.array(values, dtype=float)}
-    )
-
-
-def test_the_gap_is_that_of_the_pushs_other_windows_but_not_of_the_next() -> None:
-    found = with_instrument(gaps([1.0, 2.0, 4.0, 8.0], ["a"] * 4)).covariates[GAP]
-    assert found == pytest.approx([(4.0 + 8.0) / 2, (1.0 + 8.0) / 2, (1.0 + 2.0) / 2, (1.0 + 2.0 + 4.0) / 3])
-
-
-def test_pushes_do_not_mix_and_a_window_without_others_gets_the_mean() -> None:
-    found = with_instrument(gaps([1.0, 2.0, 4.0, 9.0, 5.0], ["a", "a", "a", "b", "b"])).covariates[GAP]
-    assert found == pytest.approx([4.0, 1.0, 1.5, np.mean([4.0, 1.0, 1.5, 9.0]), 9.0])
-
-
-def test_without_other_windows_the_gap_is_no_covariate() -> None:
-    assert GAP not in with_instrument(gaps([1.0, 2.0, 3.0], ["a", "b", "c"])).covariates
-
-
-def test_noise_that_gap_and_outcome_share_is_gone_from_the_instrument() -> None:
-    rng = np.random.default_rng(3)
-    sample = rng.normal(size=(400, 6))  # of the tracker, at the windows' starts and ends
-    push = np.repeat([f"{k}" for k in range(400)], 5)
-    gap, outcome = sample[:, :5].ravel(), (sample[:, 1:] - sample[:, :-1]).ravel()
-    found = with_instrument(gaps(gap.tolist(), push.tolist())).covariates[GAP]
-    assert np.corrcoef(gap, outcome)[0, 1] < -0.5
-    assert abs(np.corrcoef(found, outcome)[0, 1]) < 0.06

@@ -10,32 +10,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_up_traces import DRIFT, planted, pushes, slippery
+from search_bench import FEW, gate_of, in_library, search_with
 from synthetic import square_rig
 
-from push_predictor.errors import RequestError
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of
-from push_predictor.residuals.channels import motion
 from push_predictor.residuals.channels.motion import motion_effects
-from push_predictor.residuals.evidence.drivers import standard_basis
-from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.cross_validation import Judged
-from push_predictor.residuals.selection.forward_selection import SearchResult, search
-from push_predictor.residuals.selection.naming import Naming, surely_larger
-from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm
+from push_predictor.residuals.selection.search import SearchResult
 
 BLOCKS, ROWS = 40, 3  # a block
-FEW = ("contact_friction", "pressure_spread", "tilted_surface")
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +37,8 @@ def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
     in_library(monkeypatch, *FEW)
 
 
-def in_library(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
-    """These mechanisms alone are searched for, and steps are taken among them."""
-    library = [mechanism for mechanism in LIBRARY if mechanism.name in names]
-    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", library)
-    monkeypatch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
-    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
-
-
 def searched(model: PushModel, table: PushTable, names: list[str], alpha: float = 0.01) -> SearchResult:
-    evidence, inputs = evidence_of(model, table), inputs_basis(model, table)
-    baseline = baseline_of(model, evidence.mechanics)
-    return search(evidence, candidates_of(evidence, names, inputs), inputs, alpha, baseline=baseline)
+    return search_with(model, gate_of(model, evidence_of(model, table), names, alpha))
 
 
 def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_projected_off() -> None:
@@ -105,42 +83,6 @@ def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
     assert not searched(deployed, replace(table, covariates=covariates, outcomes=outcomes), ["topic:/odd"]).terms
 
 
-def chosen(evidence: Evidence, mechanism: str, covariate: str, *, own: bool = False) -> SelectedTerm:
-    basis = standard_basis("linear", covariate, evidence.table.covariates[covariate])
-    nothing, naming = np.zeros((len(evidence.table), 3)), Naming((covariate,), (mechanism,), True, 0.0)
-    best = candidate(evidence, mechanism, covariate, basis)
-    return SelectedTerm(best, (), 0.001, np.zeros(1), nothing, 0.5, naming, own)
-
-
-def test_an_effect_that_may_be_zero_beside_another_is_dropped_and_one_of_the_bases_inputs_stays(
-    deployed: PushModel,
-) -> None:
-    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06)))
-    acting, idle = chosen(evidence, "contact_friction", "elapsed_time"), chosen(evidence, "inertia", "slider_x")
-    own = chosen(evidence, "inertia", "slider_x", own=True)
-    assert needed_terms([idle, acting], evidence) == (acting,)
-    assert needed_terms([own, acting], evidence) == (own, acting)
-    assert needed_terms([idle], evidence) == (idle,)
-
-
-@pytest.mark.parametrize(("size", "everywhere"), [(1.0, True), (4.0, False)])
-def test_effect_that_only_some_contacts_show_is_an_error_of_the_mechanics(
-    deployed: PushModel, size: float, everywhere: bool
-) -> None:
-    """From push to push both are sure; the size of the second disagrees between contacts, so that it may be zero."""
-    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06)))
-    acting, second = (
-        chosen(evidence, "contact_friction", "elapsed_time"),
-        chosen(evidence, "pressure_spread", "slider_x"),
-    )
-    contact = evidence.table.inputs[:, 1]
-    there = np.ones(len(contact)) if everywhere else (contact < np.quantile(contact, 0.15)).astype(float)
-    unit = second.best.plain[:, :, 0] / np.sqrt(np.mean(second.best.plain**2))
-    added = np.linalg.solve(evidence.whitener, (size * there[:, None] * unit)[:, :, None])[:, :, 0]
-    found = replace(evidence, residual=evidence.residual + added)
-    assert needed_terms([acting, second], found) == ((acting, second) if everywhere else (acting,))
-
-
 @pytest.mark.usefixtures("a_library_of_three")
 @pytest.mark.parametrize("before, session", [(0.0, True), (-0.12, False)])
 def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
@@ -153,63 +95,12 @@ def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it
     assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
 
 
-def test_constant_effect_that_was_selected_twice_is_one(deployed: PushModel) -> None:
-    """Its first fit left a part of it to the drift, and fitted together both would have half of its size."""
-    rougher = planted("contact_friction", "model_inputs", DriverBasis("constant"), 0.1)
-    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06), rougher))
-    drift = chosen(evidence, "contact_friction", "elapsed_time")
-    constant = replace(drift, best=candidate(evidence, "contact_friction", "model_inputs", DriverBasis("constant")))
-    again = replace(constant, p_value=0.002)
-    assert needed_terms([constant, drift, again], evidence) == (constant, drift)
-
-
-@pytest.mark.parametrize(("level", "sure"), [(0.05, True), (0.01, True), (0.05 / 12, False)])
-def test_advantage_must_be_surer_the_more_alternatives_were_tried(
-    deployed: PushModel, level: float, sure: bool
-) -> None:
-    """An advantage of 2.5 standard errors over 100 blocks."""
-    best = chosen(evidence_of(deployed, pushes(60, 3)), "contact_friction", "elapsed_time").best
-    alternating = np.where(np.arange(100) % 2, 1.0, -1.0)
-    larger = Judged(best, alternating + 0.25)
-    assert surely_larger(larger, Judged(best, np.zeros(100)), level) == sure
-
-
-def with_gap(table: PushTable) -> PushTable:
-    """Pushes whose gap is the error of the tracker at the contact, which also shifts their outcomes."""
-    push = np.unique(table.push_id, return_inverse=True)[1]
-    gap = 2e-4 * np.random.default_rng(9).standard_normal(len(table.pushes))[push]
-    gap += 2e-5 * np.random.default_rng(10).standard_normal(len(table))
-    outcomes = table.outcomes + np.outer(gap, [1.5, 0.0, 0.0])
-    return replace(table, outcomes=outcomes, covariates={**table.covariates, "contact_gap": gap})
-
-
-def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """With single windows of its pushes training shows no gap without the window's own noise."""
-    training, later = with_gap(pushes(100, 1)), with_gap(pushes(100, 7))
-    model = train_model(training, square_rig(), "analytical", name="deployed")
-    single = replace(model, training=training.take(np.unique(training.push_id, return_index=True)[1]))
-    names = ["contact_gap", "elapsed_time"]
-    with monkeypatch.context() as patch:
-        in_library(patch, *FEW)
-        same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
-        unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
-    assert not same.terms and not same.uncompared
-    assert not unknown.terms and unknown.uncompared == ("contact_gap",)
-    with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
-        outside = np.zeros(len(later), dtype=np.bool_)
-        motion_effects(
-            single,
-            evidence_of(single, with_instrument(later)),
-            0.01,
-            ["contact_gap"],
-            inside=outside,
-        )
-    plain = replace(training, outcomes=pushes(100, 1).outcomes)
-    new = replace(model, training=plain)
-    (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
-    assert term.best.covariate == "contact_gap"
+def test_covariates_that_vary_along_a_push_are_not_tried(deployed: PushModel) -> None:
+    """They share the tracker's noise with the residual."""
+    table = pushes(60, 3)
+    local = dict.fromkeys(("contact_gap", "time_since_contact"), np.tile([0.0, 0.2, 0.4], 60))
+    evidence = evidence_of(deployed, replace(table, covariates={**table.covariates, **local}))
+    assert not {*local} & {c.covariate for c in candidates_of(evidence)}
 
 
 def test_one_sided_pushes_are_compared_with_training_pushes_on_this_side(deployed: PushModel) -> None:
@@ -227,24 +118,3 @@ def test_training_is_compared_as_a_whole_with_pushes_everywhere_and_with_pushes_
     mechanics, faster = evidence_of(deployed, later).mechanics, later.inputs * [5.0, 1.0, 1.0]
     for inputs in (later.inputs, faster):
         assert len(baseline_of(deployed, mechanics, inputs).evidence.table) == len(deployed.training)
-
-
-@pytest.mark.usefixtures("a_library_of_three")
-def test_name_of_a_mechanism_stays_if_the_ladder_explains_what_it_leaves(
-    deployed: PushModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Several parameters that are wrong at once look like one of them and an unknown rest, until all are fitted."""
-    table = pushes(60, 3)
-    evidence = evidence_of(deployed, table)
-    friction = chosen(evidence, "contact_friction", "elapsed_time")
-    friction = replace(friction, rivals=(Judged(friction.best, np.array([100.0])),))
-    unknown = replace(
-        friction, best=replace(friction.best, mechanism=None), naming=Naming(("elapsed_time",), (None,), False, 1.0)
-    )
-    before = searched(deployed, table, ["elapsed_time"])
-    monkeypatch.setattr(motion, "search", lambda *_, **__: replace(before, terms=(friction, unknown)))
-    monkeypatch.setattr(motion, "needed_terms", lambda terms, _: terms)
-    monkeypatch.setattr(motion, "climbed", lambda found, _: replace(found, terms=found.terms[:1]))
-    assert [t.mechanism for t in motion_effects(deployed, evidence, 0.01).terms] == ["contact_friction"]
-    monkeypatch.setattr(motion, "climbed", lambda found, _: found)
-    assert [t.mechanism for t in motion_effects(deployed, evidence, 0.01).terms] == [None, None]

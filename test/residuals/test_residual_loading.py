@@ -17,9 +17,8 @@ from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
-from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.evidence.loading import corrected_data, cut_again, load_evidence, previous_residual
+from push_predictor.residuals.evidence.loading import cut_again, load_evidence
 
 OF_A_RECORDING = {
     *("elapsed_time", "push_index", "slid_distance", "slider_x", "slider_y", "slider_heading", "push_heading"),
@@ -146,38 +145,6 @@ def test_cutting_corrected_streams_again_gives_the_same_columns(tmp_path: Path) 
     assert np.any(np.abs(moved.covariates["contact_gap"].mean() - again.covariates["contact_gap"].mean()) > 1e-4)
 
 
-def test_designed_experiment_continues_the_recordings_and_adds_no_recording_of_its_own(tmp_path: Path) -> None:
-    data = [saved(tmp_path, "a"), saved(tmp_path, "b", later=LATER)]
-    more = saved(tmp_path, "more", later=2 * LATER)
-    alone, loaded = load_evidence(data), load_evidence(data, experiment=[more])
-    designed = np.isin(loaded.table.push_id, sorted(loaded.chosen))
-    assert alone.chosen == frozenset() and len(loaded.chosen) == 1
-    assert loaded.table.push_id[designed].tolist() == loaded.table.push_id[-int(designed.sum()) :].tolist()
-    columns = loaded.table.take(designed).covariates
-    assert set(columns["recording"]) == {1.0} and set(columns["push_index"]) == {2.0}
-    assert columns["elapsed_time"].min() > 199.0
-    for name, column in alone.table.covariates.items():
-        assert np.array_equal(loaded.table.take(~designed).covariates[name], column)
-    assert set(load_evidence([*data, more]).table.covariates["recording"]) == {0.0, 1.0, 2.0}  # as one more DATA
-
-
-def test_designed_experiment_stays_one_after_a_correction_of_its_streams(tmp_path: Path) -> None:
-    loaded = load_evidence([saved(tmp_path, "a")], experiment=[saved(tmp_path, "more", later=LATER)])
-    assert loaded.recordings is not None
-    late = [later_by(recording, 20_000_000) for recording in loaded.recordings]  # its pushes get other names
-    again = corrected_data(loaded, late, WindowOptions())
-    assert again.chosen and again.chosen != loaded.chosen
-    assert np.isin(again.table.push_id, sorted(again.chosen)).sum() == len(again.table) / 2
-
-
-def test_table_of_a_designed_experiment_is_one_too(tmp_path: Path) -> None:
-    data, more = saved_table(tmp_path, "one", rows(["a", "b"])), saved_table(tmp_path, "two", rows(["c"]))
-    loaded = load_evidence([data], experiment=[more])
-    assert loaded.chosen == {"c"}
-    with pytest.raises(RecordingError, match=r"one\.csv"):
-        load_evidence([data], experiment=[data])
-
-
 def test_rejects_data_without_rig_or_pushes_by_name(tmp_path: Path) -> None:
     write_table(tmp_path / "bare.csv", rows(["a"]))
     with pytest.raises(RigError, match=r"bare\.csv"):
@@ -186,9 +153,3 @@ def test_rejects_data_without_rig_or_pushes_by_name(tmp_path: Path) -> None:
     write_recording(tmp_path / "still", still)
     with pytest.raises(RecordingError, match="still"):
         load_evidence([tmp_path / "still"])
-
-
-def test_previous_residual_is_the_mean_of_the_previous_push_of_the_recording() -> None:
-    table = rows(["a", "a", "b", "c", "d"], recording=[0.0, 0.0, 0.0, 1.0, 1.0])
-    z = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 7.0], [-3.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0]])
-    assert previous_residual(table, z).tolist() == [0.0, 0.0, 3.0, 0.0, 9.0]

@@ -24,38 +24,12 @@ from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of, whitened_response
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.cross_validation import FOLDS, fit, gains_of
 from push_predictor.residuals.selection.screening import AT_ONCE, Scores, screen
 
 
 @pytest.fixture(scope="module")
 def deployed() -> PushModel:
     return train_model(pushes(60, 1), square_rig(), "analytical", name="deployed")
-
-
-def fold_by_fold(residual: np.ndarray, flat: np.ndarray, block: np.ndarray) -> np.ndarray:
-    """The gain of every block by a fit to the rows of all other folds."""
-    gains = np.zeros(len(residual))
-    for fold in range(FOLDS):
-        test = block % FOLDS == fold
-        if not test.any() or test.all():
-            continue
-        after = residual - flat @ fit(flat[~test], residual[~test], block[~test])
-        old, new = (np.mean(r[~test] ** 2, axis=0) for r in (residual, after))
-        for r, variance, sign in ((after, new, 1.0), (residual, old, -1.0)):
-            gains[test] -= sign * 0.5 * np.sum(np.log(variance) + r[test] ** 2 / variance, axis=1)
-    return np.array([gains[block == b].sum() for b in np.unique(block)])
-
-
-@pytest.mark.parametrize("blocks", [1, 3, 23])  # one fold, fewer than all, uneven ones
-def test_gains_are_those_of_a_fit_without_each_fold(blocks: int) -> None:
-    rng = np.random.default_rng(blocks)
-    block = np.sort(rng.integers(blocks, size=90)) + 2
-    flat = rng.normal(size=(90, 3, 4)) * [1.0, 10.0, 0.1, 1.0]
-    residual = rng.normal(size=(90, 3)) * [1.0, 2.0, 0.5] + 0.3 * flat[:, :, 0]
-    gains = gains_of(residual, flat, block)
-    np.testing.assert_allclose(gains, fold_by_fold(residual, flat, block), atol=1e-9)
-    assert len(gains) == len(np.unique(block))
 
 
 def test_sums_by_block_follow_the_blocks_numbers_in_any_order_of_rows() -> None:
@@ -85,11 +59,12 @@ def test_nuisance_columns_are_orthonormal_and_span_the_constant_effects(deployed
     responses = {name: whitened_response(evidence, name) for name in names}
     inputs = inputs_basis(deployed, evidence.table)
     nuisance = Nuisance(evidence, inputs, names, responses.__getitem__)
-    columns = nuisance.of_growth("pusher_travel", "elapsed_time", "driven")
+    drift = standard_basis("linear", "elapsed_time", evidence.table.covariates["elapsed_time"])
+    columns = nuisance.of_change("pusher_travel", "elapsed_time", drift, "driven")
     assert columns is not None
     np.testing.assert_allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-8)
     q, _ = np.linalg.qr(inputs.columns)
-    for name in ("contact_friction", "centre_of_friction"):
+    for name in names:
         flat = responses[name].reshape(len(q), -1)
         apart = (flat - q @ (q.T @ flat)).reshape(len(columns), -1)
         left = apart - columns @ (columns.T @ apart)

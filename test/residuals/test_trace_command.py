@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 from made_up_traces import made_up_trace, pushes, slippery
+from search_bench import in_library
 from synthetic import square_rig
 
 import push_predictor.residuals.trace as trace_module
 from push_predictor.cli import main
-from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table_file import write_table
@@ -37,12 +37,9 @@ SECTION_5 = {
 
 @pytest.fixture(scope="module", autouse=True)
 def a_library_of_two() -> Iterator[None]:
-    """The search and the steps take most of the time, and the command does not depend on their mechanisms."""
-    few = [mechanism for mechanism in LIBRARY if mechanism.name in ("contact_friction", "pressure_spread")]
+    """The search takes most of the time, and the command does not depend on its mechanisms."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", few)
-        patch.setattr("push_predictor.residuals.selection.further_steps.LIBRARY", few)
-        patch.setattr("push_predictor.residuals.selection.further_steps.REFINEMENTS", [])
+        in_library(patch, "contact_friction", "pressure_spread")
         yield
 
 
@@ -110,8 +107,9 @@ def test_trace_of_a_table_writes_json_and_extended_model(traced: Traced) -> None
     result = json.loads(traced.out.read_text())
     assert set(result) >= SECTION_5 and result["pushes"] == {"analysis": 42, "held_out": 18}
     assert result["effects"][0]["covariate"] == "elapsed_time" and result["motion_model_changed"]
-    assert load_model(traced.model).needs == ("elapsed_time",)
-    assert "requests need elapsed_time" in traced.printed
+    model = load_model(traced.model)
+    assert model.needs == () and list(model.defaults) == ["elapsed_time"]
+    assert "requests need no further covariates; defaults: elapsed_time 1000" in traced.printed
 
 
 def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,31 +119,6 @@ def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsy
     assert (asked["alpha"], asked["seed"], asked["rig"]) == (0.05, 7, None)
     assert run(place, "--rig", str(place / "new.rig.yaml")) == 0
     assert asked["covariates"] is None and asked["alpha"] == 0.01 and asked["rig"].shape == "rect1"
-
-
-def test_and_takes_recordings_of_the_proposed_pushes(place: Path, found: Any, extended: Trace) -> None:
-    asked = found(extended)
-    assert run(place) == 0 and asked["experiment"] == []
-    more = [place / f"{name}.csv" for name in ("third", "fourth")]
-    for path in more:
-        path.write_bytes((place / "new.csv").read_bytes())
-    assert run(place, "--and", str(more[0]), "--and", str(more[1])) == 0
-    assert asked["paths"] == [place / "new.csv"] and asked["experiment"] == more
-
-
-@pytest.mark.slow
-def test_pushes_after_and_are_analysed_and_the_held_out_ones_stay_the_same(
-    place: Path, traced: Traced, tmp_path: Path
-) -> None:
-    write_table(tmp_path / "more.csv", pushes(20, 9, slippery(0.1)))
-    (tmp_path / "more.rig.yaml").write_text(json.dumps(square_rig().to_record()))
-    data, model, names = [place / "new.csv"], place / "deployed.pushmodel", ["elapsed_time", "slider_x"]
-    alone = traced.trace
-    both = trace_module.trace_data(data, model, covariates=names, experiment=[tmp_path / "more.csv"])
-    assert both.held_out.digest == alone.held_out.digest
-    assert len(both.analysis.pushes) == len(alone.analysis.pushes) + 20
-    assert any("20 pushes of the designed experiment" in note for note in both.notes)
-    assert not any("designed experiment" in note for note in alone.notes)
 
 
 def test_json_on_stdout_is_the_only_output(
@@ -166,7 +139,7 @@ def test_prints_verdict_worth_and_held_out_figures_without_json(
     assert run(place) == 0
     text = capsys.readouterr().out
     assert text.startswith("Contact friction changes with elapsed time.\n")
-    assert "\nContact friction changes with elapsed time: 0.0" in text
+    assert "\nContact friction changes with elapsed time. It shifts a window by 0." in text
     assert "The motion model is extended." in text and extended.held_out.digest in text
     for name in ("before", "refit", "after"):
         assert f"\n{name} " in text
@@ -194,7 +167,6 @@ def test_saved_extended_model_predicts_the_same(place: Path, tmp_path: Path, fou
         (["--covariates", "elapsed_time,,x"], ["--covariates", "commas"]),
         (["--covariates", "topic:/absent"], ["topic:/absent", "elapsed_time", "slider_x"]),
         (["--rig", "absent.yaml"], ["absent.yaml"]),
-        (["--and", "absent"], ["absent", "no such file"]),
     ],
 )
 def test_errors_are_one_line_that_names_the_field(

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from made_up_traces import (
     DRIFT,
-    EXPERIMENT,
     GRAIN,
     JUMP,
     PLACE,
@@ -28,23 +27,24 @@ from made_up_traces import (
     without_motion_effect,
 )
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.outcome import Gain, Sized, Trace, Verdict
-from push_predictor.residuals.reporting.answer import answer
+from push_predictor.residuals.outcome import Sized, Trace, Verdict
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
 from push_predictor.residuals.reporting.figures.errors import error_charts
 from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts
 from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
-from push_predictor.residuals.reporting.quantities import interval_cell
-from push_predictor.residuals.reporting.shift_size import shift_sizes
-from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
+from push_predictor.residuals.reporting.phrases import interval_cell
+from push_predictor.residuals.reporting.rivals import rivals
+from push_predictor.residuals.reporting.sentences import answer, evidence, worth
+from push_predictor.residuals.reporting.sizes import shift_sizes
+from push_predictor.residuals.reporting.summary import summary_lines
 from push_predictor.residuals.reporting.trace_json import trace_json
-from push_predictor.residuals.reporting.wording import rivals_sentence
 
 ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
@@ -68,7 +68,7 @@ TRACES: dict[str, Callable[[], Trace]] = {
     "category": lambda: made_up_trace(planted("contact_friction", "edge", SIDES, 0.1, -0.1, 0.05)),
     "map": lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
     "mechanism_only": lambda: made_up_trace(
-        slippery(0.06), verdict="mechanism_only", equivalent=("push_index",), undecided=True, experiment=EXPERIMENT
+        slippery(0.06), verdict="mechanism_only", equivalent=("push_index",), undecided=True
     ),
     "driver_only": lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
     "wrench_only": lambda: without_motion_effect("wrench_only", "surface_friction", "model_inputs", MORE),
@@ -124,12 +124,14 @@ def test_page_begins_with_three_plain_sentences(pages: Callable[[str], str], nam
     ("name", "change", "size", "action"),
     [
         ("none", r"^No change found\.$", r"change of contact friction by 0\.021 would have been found", "no action"),
-        ("effect", r"^Contact friction changed 620 s into the session\.$", r" is 0\.1\d+ \(95 % CI .* mm and .* deg\.",
+        ("effect", r"^Contact friction changed 620 s into the session\.$",
+         r"^It shifts a window by 0\.\d+ mm and 0\.\d+ deg: change per 300 s is 0\.1\d+ \(95 % CI .*\)\.$",
          r"^Use the extended model: on 50 held-out pushes its squared error is \d+ % lower than after retraining"),
         ("two effects", "with elapsed time, and 1 further change was found", r"\(95 % CI", "^Use the extended model"),
         ("mechanism_only", "^Contact friction changes with elapsed time", r"\(95 % CI",
-         r"^Use the extended model, and make the 1 push below: it decides between elapsed time and push count\.$"),
-        ("driver_only", "no known mechanism fits", r"^In 0\.2 s the slider moves off by 0\.\d+ mm and 0\.\d+ deg\.$",
+         r"^Use the extended model, and vary elapsed time and push count independently: these pushes do not"),
+        ("driver_only", "^Weak evidence: .* no known mechanism fits",
+         r"^It shifts a window by 0\.\d+ mm and 0\.\d+ deg\.$",
          "^Keep the deployed model"),
         ("wrench_only", "^The force needed to push the slider differs from training; the motion does not",
          r"^It is 20 % \(95 % CI 10 to 30\) larger than in training\.$", "^Keep the motion model"),
@@ -152,18 +154,76 @@ def test_answer_states_what_changed_how_big_it_is_and_what_to_do(
 @pytest.mark.parametrize(
     ("extended", "gain", "better", "words"),
     [
-        (False, Gain(-0.1, -0.3, 0.1), False, "Keep the deployed model: on 50 held-out pushes the effect does not"),
-        (False, Gain(-0.1, -0.3, 0.1), True, "Retrain the model on the new pushes: that lowers the errors"),
-        (False, Gain(0.0, 0.0, 0.0), True, "Retrain the model on the new pushes: that is enough"),
-        (True, Gain(-0.5, -0.6, -0.4), True, "Use the extended model: on 50 held-out pushes"),
+        (False, Estimate(-0.1, -0.3, 0.1), False, "Keep the deployed model: on 50 held-out pushes the effect does not"),
+        (False, Estimate(-0.1, -0.3, 0.1), True, "Retrain the model on the new pushes: that lowers the errors"),
+        (False, Estimate(0.0, 0.0, 0.0), True, "Retrain the model on the new pushes: that is enough"),
+        (False, Estimate(0.0, 0.0, 0.0), False, "Keep the deployed model: on 50 held-out pushes retraining does not"),
+        (True, Estimate(-0.5, -0.6, -0.4), True, "Use the extended model: on 50 held-out pushes"),
     ],
 )
-def test_action_follows_from_the_gain_and_from_retraining(extended: bool, gain: Gain, better: bool, words: str) -> None:
+def test_action_follows_from_the_gain_and_from_retraining(
+    extended: bool, gain: Estimate, better: bool, words: str
+) -> None:
     trace = trace_of("effect")
     held = trace.held_out
     held = replace(held, refit=held.after if better else held.before)
     model = trace.extended if extended else None
     assert answer(replace(trace, held_out=held, gain_nlpd=gain, extended=model))[2].startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        (Estimate(-0.1, -0.3, 0.1), "some 600 pushes would confirm it (now 150)"),  # its interval is twice as wide
+        (Estimate(-0.1, -0.2, 0.0), "some 150 pushes"),
+        (Estimate(-0.01, -0.3, 0.3), "more than 100 times as many pushes"),
+        (Estimate(0.1, -0.1, 0.3), ""),
+        (Estimate(-0.1, float("nan"), float("nan")), ""),
+    ],
+)
+def test_unconfirmed_effect_is_weak_evidence_and_the_page_states_how_many_pushes_settle_it(
+    gain: Estimate, words: str
+) -> None:
+    trace = replace(trace_of("effect"), gain_nlpd=gain, extended=None)
+    assert answer(trace)[0] == "Weak evidence: contact friction changed 620 s into the session."
+    assert [effect["weak"] for effect in trace_json(trace)["effects"]] == [True]
+    assert words in worth(trace)
+    assert bool(words) == bool(re.search("pushes would confirm|times as many pushes", worth(trace)))
+
+
+def test_confirmed_effects_and_findings_without_a_held_out_gain_are_not_weak() -> None:
+    names = ("effect", "two effects", "wrench_only", "measurement", "variance", "none")
+    assert not any(trace_of(name).weak for name in names)
+    assert [effect["weak"] for effect in trace_json(trace_of("two effects"))["effects"]] == [False, False]
+
+
+def test_effect_that_the_refit_learns_is_weak_unless_retraining_helps() -> None:
+    trace = replace(trace_of("effect"), gain_nlpd=Estimate(0.0, 0.0, 0.0), extended=None)
+    held = trace.held_out
+    assert not replace(trace, held_out=replace(held, refit=held.after)).weak
+    assert replace(trace, held_out=replace(held, refit=held.before)).weak
+
+
+def test_size_is_first_in_mm_and_deg_then_lower_or_higher() -> None:
+    trace = trace_of("constant")
+    friction = Sized("change of the contact friction", -0.21, -0.25, -0.17, "1")
+    found = replace(trace, effects=(replace(trace.effects[0], parameter=friction),))
+    sizes = shift_sizes(trace, trace.terms[0], trace.analysis)
+    mm, deg = 1e3 * np.hypot(sizes["dx"].value, sizes["dy"].value), np.degrees(sizes["dtheta"].value)
+    shift = f"It shifts a window by {mm:.2g} mm and {deg:.2g} deg: contact friction 0.21 lower"
+    assert answer(found)[1] == f"{shift} (95 % CI 0.17 to 0.25)."
+    assert f"{shift} (95 % CI 0.17 to 0.25, p = 0.001)." in evidence(found)
+
+
+def test_harmless_bias_reaches_json_and_is_no_candidate() -> None:
+    bias = Sized("force read too much along x", 0.5, 0.4, 0.6, "N")
+    nothing = trace_of("none")
+    tested = (outcome.Tested("wrench_bias", "session", 1e-9), *nothing.tested)
+    found = replace(nothing, tested=tested, harmless=(outcome.Harmless("wrench_bias", bias),))
+    result = trace_json(found)
+    assert not result["effect_present"] and trace_json(nothing)["harmless"] == []
+    assert result["harmless"] == [{"mechanism": "wrench_bias", "parameter": vars(bias)}]
+    assert "The closest candidate is contact friction" in evidence(found)
 
 
 def test_gain_names_the_model_that_it_compares_with(tmp_path: Path) -> None:
@@ -173,8 +233,8 @@ def test_gain_names_the_model_that_it_compares_with(tmp_path: Path) -> None:
 
 
 def test_many_rivals_are_counted_not_listed() -> None:
-    rivals = ("push_index", "slid_distance", "slider_x")
-    action = answer(replace(trace_of("mechanism_only"), equivalent=rivals, experiment=()))[2]
+    others = ("push_index", "slid_distance", "slider_x")
+    action = answer(replace(trace_of("mechanism_only"), equivalent=others))[2]
     assert action.startswith("Use the extended model, and vary elapsed time and 3 rivals independently")
 
 
@@ -212,7 +272,7 @@ def test_unknown_numbers_are_dashes(tmp_path: Path) -> None:
         "contact_friction": {"value": None, "unit": "1"},
         "inertia": {"value": np.float64("nan"), "unit": "1"},
     }
-    broken = replace(trace, tested=tested, minimum_detectable=detectable, gain_nlpd=Gain(np.nan, np.nan, np.nan))
+    broken = replace(trace, tested=tested, minimum_detectable=detectable, gain_nlpd=Estimate(np.nan, np.nan, np.nan))
     text = text_of(write_trace_report(tmp_path / "trace.html", broken).read_text())
     assert not re.search(RAW, text)
 
@@ -292,7 +352,7 @@ def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
         extended=None,
     )
     page = write_trace_report(tmp_path / "trace.html", changed).read_text()
-    assert sentences_of(page)[0] == "Contact friction differs from the model."
+    assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."  # nothing was extended
     key = page[page.index("<svg") : page.index("<h2")]
     assert "Elapsed time (s)" in key and key.count('class="dot push"') > 50
 
@@ -323,7 +383,7 @@ def test_late_clock_is_drawn_against_the_speed_into_the_contact(tmp_path: Path) 
 
 def test_held_out_errors_are_shown_for_each_push_before_and_after() -> None:
     trace = trace_of("effect")
-    shown = comparisons_of(trace)
+    shown = trace.comparisons
     position, heading = error_charts(trace.held_out.table, "elapsed_time", [shown[0], shown[-1]])
     for chart in (position, heading):
         before, after = (mark for mark in chart.marks if isinstance(mark, Dots))
@@ -343,11 +403,11 @@ def test_held_out_section_shows_errors_before_and_after_and_scores_with_interval
 def test_constant_effect_that_may_have_grown_early_is_said_so_in_words() -> None:
     trace = trace_of("effect")
     always = replace(trace.effects[0], covariate="session", basis="constant")
-    early = replace(trace, effects=(always,), equivalent=("elapsed_time", "push_index"), experiment=())
-    assert "It was there from the first push, or it grew early in the session" in rivals_sentence(early)
+    early = replace(trace, effects=(always,), equivalent=("elapsed_time", "push_index"))
+    assert "It was there from the first push, or it grew early in the session" in rivals(early)
     assert answer(early)[2].endswith("restore the rig to its state at the start of the session, and push again.")
     with_place = replace(early, equivalent=("elapsed_time", "slider_x"))
-    assert "fit equally well" in rivals_sentence(with_place) and "vary" in answer(with_place)[2]
+    assert "fit equally well" in rivals(with_place) and "vary" in answer(with_place)[2]
 
 
 def test_further_shifted_inputs_are_counted() -> None:
@@ -377,11 +437,11 @@ def test_terminal_begins_with_the_sentences_of_the_page(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_tables_are_folded_except_the_pushes_to_make(pages: Callable[[str], str], name: str) -> None:
+def test_tables_are_folded(pages: Callable[[str], str], name: str) -> None:
     page = pages(name)
     folded = sum(part.count("<table") for part in re.findall(r"<details.*?</details>", page, re.S))
     open_tables = page.count("<table") - folded
-    assert folded and open_tables == int("Pushes that would separate the rivals." in page)
+    assert folded and not open_tables
 
 
 def test_json_lists_the_input_shift() -> None:
@@ -439,13 +499,13 @@ def test_step_in_few_late_pushes_splits_off_those() -> None:
 
 
 def test_no_number_is_minus_zero() -> None:
-    assert interval_cell(Gain(-8.0, -13.0, -0.2)) == "−8\n[−13, 0]"
+    assert interval_cell(Estimate(-8.0, -13.0, -0.2)) == "−8\n[−13, 0]"
 
 
 def test_interval_of_a_small_shift_contains_it() -> None:
     trace = trace_of("constant")
     uncertain = replace(trace.terms[0], coefficients=np.array([1e-4]), covariance=np.array([[0.01]]))
-    for size in shift_sizes(trace, uncertain, trace.analysis):
+    for size in shift_sizes(trace, uncertain, trace.analysis).values():
         assert size.low <= size.value <= size.high
 
 

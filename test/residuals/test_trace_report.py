@@ -14,17 +14,16 @@ from typing import Any
 import made_up_traces as made_up
 import numpy as np
 import pytest
-from made_up_traces import DRIFT, EXPERIMENT, GRAIN, made_up_trace, planted, slippery, without_motion_effect
+from made_up_traces import DRIFT, GRAIN, made_up_trace, planted, slippery, without_motion_effect
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import Cells, PushMap
-from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.models.request import UNITS
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.corrections import CORRECTIONS
-from push_predictor.residuals.outcome import Gain, Sized, Trace
+from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting import page as report
-from push_predictor.residuals.reporting.advice import separating_words
 from push_predictor.residuals.reporting.figures.driver_basis import bins_of
 from push_predictor.residuals.reporting.figures.maps import halves_of, reach_of
 from push_predictor.residuals.reporting.figures.partial import (
@@ -36,14 +35,13 @@ from push_predictor.residuals.reporting.figures.partial import (
     shift_of,
     strength_of,
 )
-from push_predictor.residuals.reporting.figures.shifts import binned_means, course_of, shifts_of
 from push_predictor.residuals.reporting.page import write_trace_report
-from push_predictor.residuals.reporting.phrases import COVARIATES, MECHANISMS
-from push_predictor.residuals.reporting.quantities import estimate
-from push_predictor.residuals.reporting.shift_size import shift_sizes
-from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
-from push_predictor.residuals.reporting.tested import best_of, role_of
-from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
+from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval
+from push_predictor.residuals.reporting.rivals import separating_words
+from push_predictor.residuals.reporting.sentences import evidence, worth
+from push_predictor.residuals.reporting.sizes import shift_sizes
+from push_predictor.residuals.reporting.summary import summary_lines
+from push_predictor.residuals.reporting.tables import best_of, role_of
 
 LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
 FIFTH = Sized("change", 0.2, 0.1, 0.3, "1")
@@ -53,7 +51,7 @@ UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta o
 @pytest.fixture(scope="module")
 def drift() -> Trace:
     """Contact friction that drifts; the push count correlates with the time."""
-    rivals: dict[str, Any] = {"equivalent": ("push_index",), "undecided": True, "experiment": EXPERIMENT}
+    rivals: dict[str, Any] = {"equivalent": ("push_index",), "undecided": True}
     return made_up_trace(slippery(0.06), verdict="mechanism_only", **rivals)
 
 
@@ -76,8 +74,7 @@ def test_page_contains_hash_split_rivals_and_gain(tmp_path: Path, drift: Trace) 
     text = written(tmp_path, drift)
     assert drift.held_out.digest in text and "every third block of up to 10" in text
     assert "100 pushes, 300 windows" in text and "50 pushes, 150 windows" in text
-    assert "Elapsed time and push count fit equally well; 1 push that would decide is listed below." in text
-    assert "Pushes that would separate the rivals" in text and "Pause for about half a session" in text
+    assert "Elapsed time and push count fit equally well." in text and "Pause for about half a session" in text
     assert re.search(r"contact friction\s+push count\s+[\d.]+\s+rival", text)
     assert re.search(r"contact friction\s+elapsed time\s+[\d.]+\s+found", text)
     assert "clock offset" in text and "after minus refit" in text and "a note for the reader" in text
@@ -94,7 +91,7 @@ def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effect
     for heading in ("Residuals before and after", "What else was tested", "Before, refit, after", "Calibration"):
         assert heading in text
     assert "The effect" not in text and "after minus refit" not in text
-    assert comparisons_of(nothing)[-1].model == "refit"
+    assert nothing.comparisons[-1].model == "refit"
 
 
 def test_page_and_terminal_state_the_verdict(tmp_path: Path) -> None:
@@ -134,42 +131,44 @@ def test_page_escapes_names_from_the_data(tmp_path: Path, nothing: Trace) -> Non
 
 
 def test_verdict_starts_with_the_answer_then_size_and_interval(drift: Trace) -> None:
-    verdict = verdict_sentence(drift)
-    assert verdict.startswith("Contact friction changes with elapsed time: ") and verdict.endswith(".")
-    assert re.search(r": 0\.0\d+ \(95 % CI 0\.0\d+ to 0\.0\d+, p = 0\.001\)\. It explains 23 % of", verdict)
+    verdict = evidence(drift)
+    assert verdict.startswith("Contact friction changes with elapsed time. It shifts a window by 0.")
+    assert re.search(r" is 0\.0\d+ \(95 % CI 0\.0\d+ to 0\.0\d+, p = 0\.001\)\. It explains 23 % of", verdict)
     assert max(len(sentence.split()) for sentence in re.split(r"[.;:] ", verdict)) <= 25
 
 
 @pytest.mark.parametrize(
     ("gain", "kept", "words"),
     [
-        (Gain(-0.5, -0.6, -0.4), True, "The motion model is extended."),
-        (Gain(-0.1, -0.3, 0.1), False, "the effect does not improve the log density beyond chance"),
-        (Gain(-0.1, float("nan"), float("nan")), False, "too few pushes for an interval"),
+        (Estimate(-0.5, -0.6, -0.4), True, "The motion model is extended."),
+        (Estimate(-0.1, -0.3, 0.1), False, "the effect does not improve the log density beyond chance"),
+        (Estimate(-0.1, float("nan"), float("nan")), False, "too few pushes for an interval"),
     ],
 )
-def test_worth_sentence_separates_found_from_worth_modelling(drift: Trace, gain: Gain, kept: bool, words: str) -> None:
+def test_worth_sentence_separates_found_from_worth_modelling(
+    drift: Trace, gain: Estimate, kept: bool, words: str
+) -> None:
     trace = replace(drift, gain_nlpd=gain, extended=drift.extended if kept else None)
-    assert words in worth_sentence(trace)
+    assert words in worth(trace)
 
 
 def test_verdict_explains_a_candidate_below_alpha_that_is_not_significant(nothing: Trace) -> None:
     near = replace(nothing, tested=(outcome.Tested("inertia", "velocity", 0.008),))
-    assert "the level is divided among" in verdict_sentence(near)
+    assert "the level is divided among" in evidence(near)
 
 
 def test_every_mechanism_and_covariate_has_a_phrase() -> None:
-    assert {mechanism.name for mechanism in (*LIBRARY, *REFINEMENTS)} | set(CORRECTIONS) | {"surface_friction"} <= set(
-        MECHANISMS
-    )
+    assert {*CORRECTIONS, "surface_friction"} <= {*OTHERS}
     assert set(UNITS) <= set(COVARIATES)
-    assert not any("_" in phrase for phrase in [*COVARIATES.values(), *(m.noun for m in MECHANISMS.values())])
+    nouns = [mechanism.noun for mechanism in (*LIBRARY, *REFINEMENTS)]
+    phrases = [*(covariate.phrase for covariate in COVARIATES.values()), *OTHERS.values(), *nouns]
+    assert all(phrases) and not any("_" in phrase for phrase in phrases)
 
 
 def test_intervals_show_the_digits_that_they_determine() -> None:
-    assert estimate(Gain(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
-    assert estimate(Gain(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
-    assert estimate(Gain(0.5, float("nan"), float("nan"))) == "0.5"
+    assert interval(Estimate(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
+    assert interval(Estimate(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
+    assert interval(Estimate(0.5, float("nan"), float("nan"))) == "0.5"
 
 
 def test_advice_matches_the_rivals() -> None:
@@ -209,9 +208,8 @@ def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
     )
     jump = found.value[found.place > 650.0, 0].mean() - found.value[found.place < 600.0, 0].mean()
     assert jump == pytest.approx(0.15, abs=0.04)
-    fitted = strength.curve({"elapsed_time": np.array([0.0, 600.0])}, 2)[0][:, 0]
     early = found.value[found.place < 600.0, 0]
-    assert abs(early[-1] - early[0]) < 0.5 * (fitted[1] - fitted[0])
+    assert abs(early[-1] - early[0]) < 0.4 * 0.15
 
 
 def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
@@ -240,19 +238,6 @@ def test_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     assert strength.share == pytest.approx(1.0)
 
 
-@pytest.mark.slow
-def test_constant_effect_is_shown_against_push_angle_by_thirds_of_the_edge() -> None:
-    trace = made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08), count=200)
-    rows, effect = analysis_rows(trace), trace.terms[0]
-    course = course_of(effect, trace.model.rig.outline, rows)
-    assert len(course.groups) == 3 and "angle" in course.label
-    for _, group in course.groups:
-        means = binned_means(shifts_of(trace, effect, rows), course.x, group, 1)
-        assert np.mean((means.low <= means.fitted) & (means.fitted <= means.high)) >= 0.6
-    headed = planted(*GRAIN, 0.06, 0.03)
-    assert "Push direction" in course_of(headed, trace.model.rig.outline, rows).label
-
-
 def test_maps_are_split_at_the_median_strength_of_the_effect(drift: Trace, nothing: Trace) -> None:
     halves = halves_of(strength_of(drift.terms[0], drift.analysis), drift.analysis)
     assert halves.names == ("low elapsed time", "high elapsed time")
@@ -275,7 +260,8 @@ def reach_of_noise(size: float) -> float:
 def test_shift_intervals_contain_the_planted_size(drift: Trace) -> None:
     sizes = shift_sizes(drift, drift.terms[0], drift.analysis)
     exact = replace(drift.terms[0], coefficients=np.array([0.06]), covariance=np.zeros((1, 1)))
-    for size, truth in zip(sizes, shift_sizes(drift, exact, drift.analysis), strict=True):
+    true = shift_sizes(drift, exact, drift.analysis)
+    for size, truth in zip(sizes.values(), true.values(), strict=True):
         assert size.low <= truth.value <= size.high and truth.low == pytest.approx(truth.value)
 
 
@@ -294,7 +280,7 @@ def test_every_verdict_has_a_name() -> None:
 
 
 def test_repr_states_verdict_effects_and_the_interval_of_the_gain(drift: Trace) -> None:
-    lines = repr(replace(drift, gain_nlpd=Gain(-0.2, -0.3, -0.1))).splitlines()
+    lines = repr(replace(drift, gain_nlpd=Estimate(-0.2, -0.3, -0.1))).splitlines()
     effect = drift.effects[0]
     assert lines[0].endswith(f"verdict {drift.verdict}")
     assert f"depends on {effect.covariate}, p = {effect.p_value:.2g}" in lines[1]

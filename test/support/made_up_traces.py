@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from synthetic import square_rig
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
@@ -26,7 +27,7 @@ from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import compared, gain
 from push_predictor.residuals.extension.refit import refit_base
-from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace
+from push_predictor.residuals.outcome import FoundEffect, HeldOut, Sized, Tested, Trace
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
 DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
@@ -43,9 +44,6 @@ TESTED = tuple(
     )
 )
 DETECTABLE = {"contact_friction": {"value": 0.021, "unit": "1"}, "clock_offset": {"value": 0.004, "unit": "s"}}
-EXPERIMENT = (
-    {"velocity": 0.02, "contact": 0.06, "angle": 0.6, "elapsed_time": 50.0, "push_index": 95.0, "slider_heading": 0.5},
-)
 
 
 def physics() -> FittedMechanics:
@@ -107,7 +105,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
     candidates = [candidate(evidence, e.mechanism, e.covariate, e.basis) for e in effects]
     after = extend(refit, evidence, candidates) if effects else refit
     terms = after.predictor.effects
-    nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
+    nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Estimate(0.0, 0.0, 0.0),) * 2
     before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))
     return Trace(
         verdict="effect" if terms else "none",
@@ -129,7 +127,6 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         tested=TESTED if terms else tuple(replace(t, p_value=0.3 + 0.7 * t.p_value) for t in TESTED),
         minimum_detectable=DETECTABLE,
         remaining=None,
-        experiment=(),
         alpha=0.01,
         notes=("a note for the reader",),
     )

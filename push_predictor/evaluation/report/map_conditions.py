@@ -11,9 +11,8 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS, UNITS
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import UNITS
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -21,13 +20,14 @@ OF_SLIDER, OF_PUSH = HEADINGS
 
 
 def fixed_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
-    """The median in the table of each covariate that the model needs; empty if it needs none.
+    """The median in the table of each covariate that the model takes; empty if it takes none.
 
     For a heading it is the value nearest to the mean direction. If the slider's heading is known, it is fixed and the
-    push's heading follows from it. Raises KeyError if the table lacks a covariate.
+    push's heading follows from it. Raises KeyError if the table lacks a covariate that the model needs.
     """
-    names = [OF_SLIDER if name == OF_PUSH and OF_SLIDER in table.covariates else name for name in model.needs]
-    return {name: _middle(name, table.covariates[name]) for name in names}
+    known, given = model.continued(table).covariates, [name for name in model.defaults if name in table.covariates]
+    names = [OF_SLIDER if name == OF_PUSH and OF_SLIDER in known else name for name in (*model.needs, *given)]
+    return {name: _middle(name, known[name]) for name in names}
 
 
 def map_covariates(outline: Outline, fixed: Mapping[str, float], inputs: Array) -> dict[str, Array]:

@@ -16,7 +16,7 @@ import numpy as np
 from push_predictor.evaluation.judgement import judged
 from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.evaluation.report.figures.coverage import SYMBOLS
-from push_predictor.evaluation.report.tables import interval_of, paired_difference, row_weights
+from push_predictor.evaluation.report.tables import interval_of, paired_difference
 from push_predictor.evaluation.validation import Comparison, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
@@ -48,13 +48,14 @@ def calibration_sentence(comparison: Comparison) -> str:
     shares = ", ".join(
         f"{100.0 * share:.0f} % of {name}" for name, share in zip(SYMBOLS, inside.mean(axis=0), strict=True)
     )
-    verdicts = _verdicts(interval_of(inside.astype(np.float64), row_weights(comparison)))
+    verdicts = _verdicts(interval_of(comparison, inside.astype(np.float64)))
     return f"Its 95 % intervals contain {shares}{verdicts}."
 
 
 def comparison_sentence(main: Comparison, other: Comparison) -> str:
     """Which of two models has the better NLPD on the same windows, with the interval of the difference."""
-    value, low, high = paired_difference(main, other)[1]
+    found = paired_difference(main, other)[1]
+    value, low, high = found.value, found.low, found.high
     if not np.isfinite([low, high]).all():
         return f"{other.model}: its NLPD differs by {_rounded(value)} nats per window; one push gives no interval."
     if low <= 0.0 <= high:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd, nmse_reference
-from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.push_scores import push_scores, resampled_means
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
@@ -34,28 +35,26 @@ def metrics_tables(comparisons: Sequence[Comparison], metrics: Sequence[Metrics]
     return tables
 
 
-def paired_difference(main: Comparison, other: Comparison) -> tuple[Array, Array]:
-    """Total NMSE and total NLPD of `other` minus those of `main`, (value, low, high) each, with 95 % intervals.
+def paired_difference(main: Comparison, other: Comparison) -> tuple[Estimate, Estimate]:
+    """Total NMSE and total NLPD of `other` minus those of `main`, with 95 % intervals.
 
     Both comparisons contain the same windows, so the difficulty of a push cancels. Low and high are NaN for fewer than
     two pushes.
     """
-    every = np.ones((1, len(main.push_id)))
-    values, draws = _total_differences(main, other, every), _total_differences(main, other, row_weights(main))
-    nmse, nlpd = (np.array([values[0, k], *_ends(draws)[:, k]]) for k in range(2))
-    return nmse, nlpd
+    scores = push_scores(main), push_scores(other)
+    return difference_by_push(*scores, total_nmse), difference_by_push(*scores, total_nlpd)
 
 
-def interval_of(values: Array, weights: Array) -> Array:
-    """Ends (2, k) of the 95 % intervals of the means of values (n, k) under weights (draws, n); NaN without draws."""
-    return _ends(_mean_draws(values, weights))
+def interval_of(c: Comparison, values: Array) -> Array:
+    """Ends (2, k) of the 95 % intervals of the means of values (n, k) of its windows; NaN for fewer than two pushes."""
+    return _ends(resampled_means(c.push_id, values))
 
 
 def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
         counts = [str(m[name]) for name in ("n_train", "n_test", "n_pushes")]
-        rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c, row_weights(c)))])
+        rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c))])
     reference = nmse_reference(max(c.n_train for c, _ in pairs))
     caption = (
         f"Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than {reference}. "
@@ -70,7 +69,7 @@ def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         each = gaussian_nlpd(c.mean, c.variance, c.observed)
         scores = np.column_stack([each, each.sum(axis=1), joint_nlpd(c.mean, c.covariance, c.observed)])
         values = [*(m["nlpd"][name] for name in COLUMNS), m["joint_nlpd"]]
-        rows.append([c.model, *_cells(values, _mean_draws(scores, row_weights(c)))])
+        rows.append([c.model, *_cells(values, resampled_means(c.push_id, scores))])
     caption = (
         f"Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
         f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
@@ -82,7 +81,7 @@ def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
         each = np.zeros((0, 3)) if c.exact_log_density is None else -c.exact_log_density
-        draws = _mean_draws(np.column_stack([each, each.sum(axis=1)]), row_weights(c))
+        draws = resampled_means(c.push_id, np.column_stack([each, each.sum(axis=1)]))
         rows.append([c.model, *_cells([m["exact_nlpd"][name] for name in COLUMNS], draws)])
     caption = (
         "NLPD of the model's own predictive density: a Student t, or the exact density of a VHGP. For models without "
@@ -98,9 +97,9 @@ def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         covered = c.covered(COVERAGE_LEVELS).astype(np.float64)
         levels = [m["coverage"][str(level)] or dict.fromkeys(OUTPUTS) for level in COVERAGE_LEVELS]
         for k, name in enumerate(OUTPUTS):
-            draws = _mean_draws(covered[:, k], row_weights(c))
+            draws = resampled_means(c.push_id, covered[:, k])
             rows.append([f"{c.model}, {name}", *_cells([found[name] for found in levels], draws, digits=3)])
-        draws = _mean_draws(c.joint_covered(COVERAGE_LEVELS).astype(np.float64), row_weights(c))
+        draws = resampled_means(c.push_id, c.joint_covered(COVERAGE_LEVELS).astype(np.float64))
         rows.append([f"{c.model}, joint", *_cells(list(m["joint_coverage"].values()), draws, digits=3)])
     caption = (
         "Coverage: share of outcomes inside the predicted central interval; joint: inside the region of the three "
@@ -112,7 +111,7 @@ def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
 
 def _difference_table(comparisons: Sequence[Comparison]) -> str:
     main, *others = comparisons
-    rows = [[c.model, *(_cell(v, (low, high)) for v, low, high in paired_difference(main, c))] for c in others]
+    rows = [[c.model, *(_cell(e.value, (e.low, e.high)) for e in paired_difference(main, c))] for c in others]
     caption = (
         f"Each model minus {main.model}, on the same windows. Above zero, {main.model} is better. "
         f"An interval that contains zero shows no significant difference."
@@ -120,28 +119,9 @@ def _difference_table(comparisons: Sequence[Comparison]) -> str:
     return html.folded_table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)
 
 
-def row_weights(c: Comparison) -> Array:
-    """Weights (draws, n) of the rows in each bootstrap sample of pushes; no draws for fewer than two pushes."""
-    if len(set(c.push_id.tolist())) < 2:
-        return np.empty((0, len(c.push_id)))
-    return push_bootstrap(c.push_id)
-
-
-def _nmse_draws(c: Comparison, weights: Array) -> Array:
-    error, spread = weights @ (c.observed - c.mean) ** 2, weights @ (c.observed - c.training_mean) ** 2
-    each = np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0)
+def _nmse_draws(c: Comparison) -> Array:
+    each = push_scores(c).resampled().nmse
     return np.column_stack([each, each.sum(axis=1)])
-
-
-def _mean_draws(scores: Array, weights: Array) -> Array:
-    return np.asarray(weights @ scores / weights.sum(axis=1, keepdims=True))
-
-
-def _total_differences(main: Comparison, other: Comparison, weights: Array) -> Array:
-    """Total NMSE and NLPD of other minus those of main, (draws, 2)."""
-    nmse = _nmse_draws(other, weights)[:, -1] - _nmse_draws(main, weights)[:, -1]
-    nlpd = [gaussian_nlpd(c.mean, c.variance, c.observed).sum(axis=1) for c in (main, other)]
-    return np.column_stack([nmse, _mean_draws((nlpd[1] - nlpd[0])[:, None], weights)])
 
 
 def _ends(draws: Array) -> Array:

@@ -5,15 +5,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import CUMULATIVE as CUMULATIVE  # re-exported, as HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS as HEADINGS
 from push_predictor.types import Array, BoolArray
 
-HEADINGS = ("slider_heading", "push_heading")  # they wrap around
-CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
 WHOLE_TURN = np.radians(30.0)  # headings with no wider gap between them cover the whole turn
 MARGIN = 1e-6  # relative: a model file keeps seven digits
 TURN = 2.0 * np.pi
@@ -33,6 +33,10 @@ class CovariateRange:
         if self.heading:
             values = least + (values - least) % TURN
         return np.asarray((values >= least) & (values <= most))
+
+    def reaching(self, value: float) -> CovariateRange:
+        """The range, raised so that it contains this value."""
+        return replace(self, high=max(self.high, value))
 
     @cached_property
     def _ends(self) -> tuple[float, float]:

@@ -20,7 +20,8 @@ class DriverBasis:
     name: one of BASES. centre, scale: of the covariate. place: of a step.
 
     drivers: names of the covariates it takes: one, or two for a map; none for a constant. levels: of a category, the
-    first is the one that the others are compared with.
+    first is the one that the others are compared with. offset: whether a constant is the first column, so that the
+    effect need not be zero anywhere.
     """
 
     name: str
@@ -29,6 +30,7 @@ class DriverBasis:
     scale: tuple[float, ...] = ()
     place: float = 0.0
     levels: tuple[float, ...] = ()
+    offset: bool = False
 
     @property
     def is_constant(self) -> bool:
@@ -38,7 +40,8 @@ class DriverBasis:
     def values(self, covariates: Mapping[str, Array], n: int) -> Array:
         """The columns (n, m) of the basis at n pushes; a constant is one column of ones."""
         columns = [np.asarray(covariates[name], dtype=np.float64) for name in self.drivers]
-        return BASES[self.name](self, columns, n)
+        values = BASES[self.name](self, columns, n)
+        return np.column_stack([np.ones(n), values]) if self.offset else values
 
 
 def _scaled(basis: DriverBasis, columns: list[Array]) -> list[Array]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
+from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Shift
 from push_predictor.models.predictors.tails import Tails
@@ -30,13 +31,14 @@ class ExtendedPredictor:
 
     scale (3,): factor on the base's standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see
     Cross; pairs that it lacks are independent. Without it, two effects with correlated covariates would seem far
-    less certain than their sum is.
+    less certain than their sum is. session: the one that the effects were traced on.
     """
 
     base: BasePredictor
     effects: tuple[Effect, ...]
     scale: Array
     cross: Cross = field(default_factory=dict)
+    session: TracedSession = field(default_factory=TracedSession)
 
     @property
     def mechanics(self) -> FittedMechanics:
@@ -72,7 +74,18 @@ class ExtendedPredictor:
     @cached_property
     def needs(self) -> tuple[str, ...]:
         """See BasePredictor."""
-        return tuple(name for name in self.covariates if name not in GIVEN_BY_INPUTS)
+        return tuple(name for name in self.covariates if name not in (*GIVEN_BY_INPUTS, *self.defaults))
+
+    @cached_property
+    def defaults(self) -> dict[str, float]:
+        """See BasePredictor."""
+        return {name: self.session.now[name] for name in self.covariates if name in self.session.now}
+
+    @cached_property
+    def past(self) -> tuple[str, ...]:
+        """See BasePredictor."""
+        growing = {name for effect in self.effects if effect.basis.name != "step" for name in effect.needs}
+        return tuple(name for name in self.defaults if name not in growing)
 
     @property
     def own_limits(self) -> InputLimits | None:
@@ -81,13 +94,14 @@ class ExtendedPredictor:
 
     def completed(self, push: Push) -> Push:
         """See BasePredictor."""
-        if not self._of_inputs:
+        if not self._of_inputs and self.defaults.keys() <= push.covariates.keys():
             return push
         given = dict(zip(INPUTS, push.inputs.T, strict=True))
         if SIDE in self._of_inputs:
             given[SIDE] = self.mechanics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
         own = {name: given[name] for name in self._of_inputs}
-        return replace(push, covariates={**push.covariates, **own})
+        now = {name: np.full(len(push.inputs), value) for name, value in self.defaults.items()}
+        return replace(push, covariates={**now, **push.covariates, **own})
 
     @cached_property
     def _of_inputs(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
@@ -55,8 +56,13 @@ class InputLimits(NamedTuple):
 class BasePredictor(ABC):
     """A predictor without effects, which effects can extend; what is not overridden holds for mechanics alone."""
 
+    # What extends it; the session on which that was traced; by name, the covariates that a push may omit, and of these
+    # those in which the effects only have steps, which lie in the past.
     effects: ClassVar[tuple[Effect, ...]] = ()
     cross: ClassVar[Cross] = MappingProxyType({})
+    session: ClassVar[TracedSession] = TracedSession()
+    defaults: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    past: ClassVar[tuple[str, ...]] = ()
 
     @property
     def base(self: Self) -> Self:

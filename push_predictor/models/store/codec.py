@@ -93,7 +93,7 @@ class Reader:
         cls, own = CLASSES[found[CLASS]], {name: value for name, value in found.items() if name != CLASS}
         fields = _hints(cls)
         if own.keys() != fields.keys():
-            _refuse(place, sorted(own), f"the fields {', '.join(fields)}")
+            _refuse(place, sorted(own), f"the fields {', '.join(fields)}: train the model again")
         arguments = {name: self.read(own[name], hint, f"{place}.{name}") for name, hint in fields.items()}
         arguments |= {name: value for (owner, name), value in self.given.items() if owner is cls}
         check(cls, arguments, place)

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Lock
 
 from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
-from push_predictor.models.push_model import mean_in_words
+from push_predictor.models.push_model import defaults_in_words, mean_in_words
 from push_predictor.models.store.model_file import is_model_file
 from push_predictor.models.store.table_cache import completed, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
@@ -129,6 +129,7 @@ class ModelRegistry:
             "pushes": len(model.training.pushes),
             "windows": len(model.training),
             "covariates": ",".join(model.needs) or "-",  # that a request must contain
+            "defaults": defaults_in_words(model) or "-",  # of covariates that it may omit
             "duration": _durations(model.training.duration),
             "speeds": _speeds(model.training.inputs[:, 0]),
             "mean": mean_in_words(model.predictor),

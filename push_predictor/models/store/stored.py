@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import GENERIC_WIDTH, Effect
 from push_predictor.models.effects.exact import covariance_of
+from push_predictor.models.effects.traced_session import Mark, TracedSession
 from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
 from push_predictor.models.gaussian_process.regression import ConstantNoise, ConstantParameters
@@ -47,7 +49,7 @@ BASES_OF_EFFECTS = (GaussianProcessPredictor, MechanicsPredictor, PriorPredictor
 CLASSES: dict[str, type] = {
     cls.__name__: cls
     for cls in (
-        *(Provenance, PushTable, *BASES_OF_EFFECTS, ExtendedPredictor, Effect, DriverBasis),
+        *(Provenance, PushTable, *BASES_OF_EFFECTS, ExtendedPredictor, Effect, DriverBasis, TracedSession, Mark),
         *(Scaling, Tails, Correlation, *REGRESSIONS, GpParameters, VhgpParameters, ConstantParameters),
         *(FittedMechanics, PushMechanics, PressureDistribution, PowerSurface, ProcessNoise),
     )
@@ -68,6 +70,7 @@ SINGLE = {(PushTable, "covariates"), (Correlation, "residuals")}
 LONGEST_PUSH = 10.0  # m
 LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
 MOST_DRAWS = 10_000
+LATEST = 2**62  # ns, of a stamp
 DRIVERS = {"constant": 0, "map": 2}  # how many a basis takes; all others one
 SCALED = ("linear", "quadratic", "map", "logarithmic")
 POSITIVE, ABOVE_ONE, ABOVE_TWO = np.finfo(np.float64).tiny, np.nextafter(1.0, 2.0), np.nextafter(2.0, 3.0)
@@ -237,6 +240,16 @@ def _extended(a: SimpleNamespace) -> None:
         _check_covariance(covariance_of(a.effects, a.cross))
 
 
+def _session(a: SimpleNamespace) -> None:
+    if unknown := [name for name in a.now if name not in CUMULATIVE]:
+        raise ValueError(f"now: {unknown[0]!r} is no cumulative covariate, give {', '.join(CUMULATIVE)}")
+    if not np.all(np.isfinite(list(a.now.values()))):
+        raise ValueError("now: a number is not finite")
+    stamps = [mark.stamp for mark in a.marks]
+    if stamps != sorted(stamps) or not all(abs(stamp) < LATEST for stamp in (*stamps, a.origin or 0)):
+        raise ValueError("stamps of a session decrease, or are beyond 64 bits")
+
+
 def _check_covariance(covariance: Array) -> None:
     sd = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
     relative = covariance / np.outer(sd, sd)  # coefficients have units of their own
@@ -257,4 +270,5 @@ CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     DriverBasis: _basis,
     Effect: _effect,
     ExtendedPredictor: _extended,
+    TracedSession: _session,
 }

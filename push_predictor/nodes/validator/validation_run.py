@@ -134,10 +134,14 @@ class ValidationRun:
             number = self.validation.add(window)
             self._pushes.found(number, window)
             push = np.array([window.velocity, window.contact, window.angle])
-            known = {name: value for name, value in window.covariates.items() if isfinite(value)}
             for model, name in enumerate(self.validation.names):
-                request = query_to_request(name, push, window.duration, known)
+                request = query_to_request(name, push, window.duration, self._known(model, window))
                 self._client.ask(request, self._on_response(model, number))
+
+    def _known(self, model: int, window: PushWindow) -> dict[str, float]:
+        """The finite covariates of a window, with those that only grow counted as the model counts them."""
+        columns = self.validation.models[model].continued(windows_to_table([window])).covariates
+        return {name: float(column[0]) for name, column in columns.items() if isfinite(column[0])}
 
     def _save(self, windows: Sequence[PushWindow]) -> None:
         """Append the windows to the table. A full disk does not end the measurement."""

@@ -5,15 +5,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray, TextArray
 
 TIMED_ID = "push-"  # prefix of ids that contain the time of first touch
+_STAMP = re.compile(rf"(?:^|/){TIMED_ID}(\d+)\.(\d{{3}})$")  # s and ms; the name of a file may come before
 
 
 @dataclass(frozen=True)
@@ -73,3 +75,12 @@ def windows_to_table(windows: Sequence[PushWindow]) -> PushTable:
         np.array([w.push_id for w in windows], dtype=np.str_),
         {name: np.array([w.covariates[name] for w in windows]) for name in names},
     )
+
+
+def first_touches(push_id: TextArray) -> IntArray | None:
+    """The stamps (n,) ns, to a millisecond, of first touch in the ids (n,) of pushes; None unless all have one."""
+    names, row = np.unique(push_id, return_inverse=True)
+    found = [match for name in names.tolist() if (match := _STAMP.search(name))]
+    if len(found) < len(names):
+        return None
+    return np.array([int(m[1]) * 10**9 + int(m[2]) * 10**6 for m in found], dtype=np.int64)[row]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from push_predictor.models.effects.effect import products
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import Kind
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 SPEED = "velocity"
 
@@ -25,9 +25,8 @@ class Candidate:
     """A mechanism (None: the generic polynomial) whose strength depends on a covariate through one basis.
 
     response (n, 3, p): standardised outcome per unit of the parameters. values (n, m): the basis at the windows.
-    nuisance (3 n, q): orthonormal columns that the candidate is projected off, see nuisance.py. nuisance_growing: the
-    same without the constant effect of the candidate's own mechanism. own: whether the covariate is a function of the
-    inputs of a learnt base, as the side is where the base folds none.
+    nuisance (3 n, q): orthonormal columns that the candidate is projected off, see nuisance.py. own: whether the
+    covariate is a function of the inputs of a learnt base, as the side is where the base folds none.
     """
 
     mechanism: str | None
@@ -36,7 +35,6 @@ class Candidate:
     response: Array
     values: Array | None = None
     nuisance: Array | None = None
-    nuisance_growing: Array | None = None
     own: bool = False
 
     @cached_property
@@ -51,11 +49,6 @@ class Candidate:
             return self.response
         return products(self.response, self.values)
 
-    def take(self, rows: IntArray) -> Candidate:
-        """The candidate on the given rows, projected off nothing."""
-        values = None if self.values is None else self.values[rows]
-        return replace(self, response=self.response[rows], values=values, nuisance=None, nuisance_growing=None)
-
     @property
     def kind(self) -> Kind:
         """Whether the effect depends on another covariate, on the speed, or on the inputs alone."""
@@ -64,14 +57,13 @@ class Candidate:
         return "speed" if self.covariate == SPEED else "driven"
 
     @property
-    def grows(self) -> bool:
-        """Whether the effect starts at zero and includes the constant effect of its mechanism."""
-        return self.kind == "driven" and self.nuisance_growing is not None and self.nuisance is self.nuisance_growing
-
-    @property
     def label(self) -> tuple[str | None, str]:
         """Mechanism and covariate, whatever the basis."""
         return self.mechanism, self.covariate
+
+    def same_as(self, other: Candidate) -> bool:
+        """Whether two are the same effect in the same form."""
+        return self.label == other.label and self.basis == other.basis
 
 
 def projected(values: Array, nuisance: Array | None) -> Array:

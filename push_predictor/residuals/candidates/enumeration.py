@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.covariates import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanisms import LIBRARY, mechanism_named
+from push_predictor.models.mechanics.ladder import all_supports_known
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import CONSTANT, screening_bases
@@ -69,6 +70,17 @@ def usable(evidence: Evidence) -> list[str | None]:
     return [*(m.name for m in LIBRARY if all(need in recorded for need in m.needs)), None]
 
 
+def constant_refinements(evidence: Evidence) -> dict[str | None, str]:
+    """By mechanism that refines the library's and that these windows can show, the covariate of its constant effect."""
+    mechanics, table = evidence.mechanics.mechanics, evidence.table
+    known = mechanics.support is not None or all_supports_known(mechanics, table.covariates)
+    return {
+        m.name: HEADED if headed(m.name) else CONSTANT
+        for m in REFINEMENTS
+        if all(need in table.covariates for need in m.needs) and not (known and m.name == "rim_pressure")
+    }
+
+
 def _of_mechanism(
     evidence: Evidence, mechanism: str | None, bases: Sequence[tuple[str, DriverBasis]], inputs: InputsBasis | None
 ) -> list[Candidate]:
@@ -88,14 +100,7 @@ def _with_nuisance(found: Sequence[Candidate], evidence: Evidence, inputs: Input
     responses = {c.mechanism: c.response for c in found}
     mechanisms = [name for name in responses if name is not None]
     nuisance = Nuisance(evidence, inputs, mechanisms, responses.__getitem__)
-    return [
-        replace(
-            c,
-            nuisance=nuisance.of_change(*c.label, c.basis, c.kind),
-            nuisance_growing=nuisance.of_growth(*c.label, c.kind),
-        )
-        for c in found
-    ]
+    return [replace(c, nuisance=nuisance.of_change(*c.label, c.basis, c.kind)) for c in found]
 
 
 def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis | None) -> str:

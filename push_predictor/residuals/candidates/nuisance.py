@@ -23,7 +23,6 @@ from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
 from push_predictor.types import Array
 
-TOUCHED = ("time_since_contact", "contact_gap")  # differ between a push's first window and its later ones
 FELT = 1e-3  # of a direction's length; less than this, regressed on the inputs, is numerical noise
 Key = tuple[bool, bool, str | None, Kind]
 
@@ -43,14 +42,8 @@ class Nuisance:
 
     def of_change(self, mechanism: str | None, covariate: str, basis: DriverBasis, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) for a candidate that changes an effect which may exist anyway; None if none."""
-        return self._nuisance(mechanism if basis.is_constant else None, covariate, kind)
-
-    def of_growth(self, mechanism: str | None, covariate: str, kind: Kind) -> Array | None:
-        """The same for an effect that starts at zero: the constant effect of its own mechanism stays in."""
-        return self._nuisance(mechanism, covariate, kind)
-
-    def _nuisance(self, kept: str | None, covariate: str, kind: Kind) -> Array | None:
-        key = covariate in TOUCHED or kind != "driven", kind != "constant", kept, kind
+        own = mechanism if basis.is_constant else None
+        key = kind != "driven", kind != "constant", own, kind
         if key not in self.known:
             self.known[key] = self._columns(*key)
         return self.known[key]

@@ -10,64 +10,94 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc
 
 from push_predictor.errors import RequestError
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidate import SPEED, Candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.recordings.table import OUTPUTS, concatenate
+from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
+from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
-from push_predictor.residuals.selection.absolute_fit import with_fitting_names
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.experiment import Experiment, separating_pushes
-from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
-from push_predictor.residuals.selection.further_steps import climbed
+from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
-from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
+from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
-FEWEST_PUSHES = 12  # whose variance is judged
+FEWEST_PUSHES = 12  # whose variance is judged, and of training with which a constant effect is compared
+LEFT = 0.15  # of an effect's gain: mechanics that are nearly right leave so much of it
+FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
+CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 
-Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
+
+@dataclass(frozen=True, eq=False)
+class MotionTerm:
+    """A term of the search, judged as a part of the model.
+
+    outputs: those that it shifts. share: of the sum of squares of the standardised residual. own: whether it lies in
+    the inputs of a learnt base, so that a refit learns it. since_training: whether a constant effect is a change since
+    training. part: whether it is what the fit of a larger one leaves, rather than an effect.
+    """
+
+    term: Term
+    p_value: float
+    outputs: tuple[str, ...]
+    share: float
+    own: bool
+    since_training: bool
+    part: bool
+
+    @property
+    def best(self) -> Candidate:
+        """Mechanism, covariate and form."""
+        return self.term.best
+
+    @property
+    def mechanism(self) -> str | None:
+        """See Term."""
+        return self.term.mechanism
+
+    @property
+    def resembles(self) -> str | None:
+        """The mechanism that comes closest, where none fits."""
+        return self.term.naming.resembles
 
 
 @dataclass(frozen=True, eq=False)
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: in the order of selection, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
+    terms: the largest gain first, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
     and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
-    confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
-    not show how the outcome depends on them without a change. remaining: the strongest significant candidate after all
-    terms.
+    confounded: covariates that were not tried, because the inputs explain them. remaining: the strongest
+    significant candidate after all terms.
     """
 
-    terms: tuple[SelectedTerm, ...]
+    terms: tuple[MotionTerm, ...]
     equivalent: tuple[str, ...]
     mechanisms: tuple[str, ...]
     tested: tuple[Tested, ...]
     deviation: Array | None
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: Label | None
-    experiment: Experiment
     variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
-    uncompared: tuple[str, ...] = ()
 
 
-NO_MOTION = MotionFinding((), (), (), (), None, {}, None, Experiment(), (), (), ())
+NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), ())
 
 
 def motion_effects(
@@ -88,23 +118,18 @@ def motion_effects(
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
-    candidates = [c for c in every if not baseline.lacks(c.covariate)]
+    candidates = tuple(c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean())))
     if not candidates:
-        accepted = "one that training recorded, too" if every else "one that the inputs do not change, as they shifted"
-        raise RequestError("covariate", ", ".join(names or ()), accepted)
-    found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
-    found = replace(found, terms=needed_terms(found.terms, evidence))
-    if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
-        found = climbed(found, ForwardSelection(TermChoice(evidence, found.candidates, inputs, seed), share, baseline))
-    found = replace(found, terms=with_fitting_names(found.terms))  # last: the ladder may explain what a name leaves
+        raise RequestError("covariate", ", ".join(names or ()), "one that the inputs do not change, as they shifted")
+    found = search(Gate(evidence, candidates, inputs, share, seed, baseline), _rows(model, evidence, baseline, inputs))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
-    first = found.terms[0] if found.terms else None
+    terms = _judged(found, evidence, inputs, baseline)
+    first = terms[0].term if terms else None
     return MotionFinding(
-        terms=tuple(replace(term, p_value=_of_motion(term.p_value)) for term in found.terms),
-        equivalent=first.naming.drivers[1:] if first else spread.rivals if notable else (),
-        mechanisms=_other_mechanisms(first),
+        terms=terms,
+        equivalent=first.naming.covariates[1:] if first else spread.rivals if notable else (),
+        mechanisms=tuple(name for name in first.naming.mechanisms[1:] if name is not None) if first else (),
         tested=_tested(found),
         deviation=baseline.deviation if inputs.learnt else None,
         minimum_detectable={
@@ -112,12 +137,76 @@ def motion_effects(
             **_detectable_noise(spread),
         },
         remaining=_remaining(found, share),
-        experiment=_experiment(first, evidence, inputs, model, inside),
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
-        uncompared=tuple(dict.fromkeys(c.covariate for c in every if baseline.lacks(c.covariate))),
     )
+
+
+def _rows(model: PushModel, evidence: Evidence, baseline: Baseline, inputs: InputsBasis) -> FitRows:
+    """The windows of the fits: with those of training where a learnt base may have missed a function of its inputs."""
+    _, few = evidence.thinned
+    if not (inputs.learnt and inputs.absorbs):
+        return FitRows(few)
+    _, before = baseline.evidence.thinned
+    return FitRows(few, before, inputs_basis(model, concatenate([few.table, before.table])).columns)
+
+
+def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseline: Baseline) -> tuple[MotionTerm, ...]:
+    fit, total = found.fit, float(np.sum(evidence.z**2))
+    explained = 1.0 - float(np.sum(found.unexplained**2)) / total
+    gains = [max(term.gain, 0.0) for term in found.terms]
+    changed = _changed(found, inputs, baseline)
+    terms = [
+        MotionTerm(
+            term,
+            _of_motion(term.p_value),
+            _outputs(fit.columns[:, :, part] @ fit.coefficients[part]),
+            explained * gain / max(sum(gains), np.finfo(float).tiny),
+            inputs.absorbs and term.best.kind == "constant",
+            bool(term.best.covariate == CONSTANT and own),
+            _is_left(term, found.terms[:k]),
+        )
+        for k, (term, gain, part, own) in enumerate(zip(found.terms, gains, fit.parts, changed, strict=True))
+    ]
+    return tuple(sorted(terms, key=lambda term: term.part))
+
+
+def _is_left(term: Term, larger: Sequence[Term]) -> bool:
+    """Whether a term is what the fit of a larger one leaves: small beside one with its mechanism or covariate."""
+    return any(
+        term.gain < LEFT * other.gain
+        and (term.best.mechanism == other.best.mechanism or {*term.naming.covariates} & {*other.naming.covariates})
+        for other in larger
+    )
+
+
+def _outputs(shift: Array) -> tuple[str, ...]:
+    """Names of the outputs that a standardised shift (n, 3) changes."""
+    size = np.sqrt(np.mean(shift**2, axis=0))
+    return tuple(name for name, felt in zip(OUTPUTS, size >= FELT * size.max(), strict=True) if felt)
+
+
+def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> list[bool]:
+    """Whether each term differs from what the same fit finds in training; of a learnt base every one does."""
+    if not found.terms or inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
+        return [inputs.learnt] * len(found.terms)
+    _, before = baseline.evidence.thinned
+    recorded = [k for k, term in enumerate(found.terms) if _recorded(term.best, before)]
+    again = [candidate(before, *found.terms[k].best.label, found.terms[k].best.basis) for k in recorded]
+    now, then = estimated(found.fit)[0], dict(zip(recorded, estimated(fitted(FitRows(before), again))[0], strict=True))
+    return [k in then and _differ(effect, then[k]) for k, effect in enumerate(now)]
+
+
+def _recorded(c: Candidate, evidence: Evidence) -> bool:
+    needs = () if c.mechanism is None else mechanism_named(c.mechanism).needs
+    return {*needs, *c.basis.drivers} <= set(evidence.table.covariates)
+
+
+def _differ(one: Effect, other: Effect) -> bool:
+    change, covariance = one.coefficients - other.coefficients, one.covariance + other.covariance
+    square = float(change @ np.linalg.pinv(covariance, hermitian=True) @ change)
+    return bool(chdtrc(len(change), square) <= CHANGED)
 
 
 def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
@@ -134,7 +223,7 @@ def _separable(candidate: Candidate, inside: float) -> bool:
     """
     if inside == 1.0:
         return True
-    if candidate.mechanism is None or candidate.basis.is_constant or candidate.covariate in LOCAL:
+    if candidate.mechanism is None or candidate.basis.is_constant:
         return False
     return candidate.covariate != SPEED or inside >= MOSTLY
 
@@ -153,17 +242,11 @@ def _spread(
     return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
 
 
-def _other_mechanisms(first: SelectedTerm | None) -> tuple[str, ...]:
-    if first is None or not first.naming.known:
-        return ()
-    return tuple(name for name in first.naming.mechanisms if name is not None and name != first.mechanism)
-
-
 def _tested(found: SearchResult) -> tuple[Tested, ...]:
     """Every mechanism with every covariate once, in its best basis, smallest p first."""
     best: dict[Label, float] = {}
-    for candidate, p in zip(found.candidates, found.first.p_value.tolist(), strict=True):
-        best[candidate.label] = min(p, best.get(candidate.label, 1.0))
+    for tried, p in zip(found.candidates, found.first.p_value.tolist(), strict=True):
+        best[tried.label] = min(p, best.get(tried.label, 1.0))
     return tuple(Tested(*label, _of_motion(p)) for label, p in sorted(best.items(), key=lambda item: item[1]))
 
 
@@ -181,20 +264,4 @@ def _unchanged(found: SearchResult) -> tuple[Label, ...]:
     """The strongest candidate of each covariate that acts as it did in training."""
     ordered = sorted(found.first.unchanged, key=lambda k: -found.first.statistic[k])
     strongest = {found.candidates[k].covariate: found.candidates[k] for k in reversed(ordered)}
-    return tuple(candidate.label for candidate in reversed(strongest.values()))
-
-
-def _experiment(
-    first: SelectedTerm | None, evidence: Evidence, inputs: InputsBasis, model: PushModel, inside: BoolArray | None
-) -> Experiment:
-    """Pushes that would separate the rivals of the first term, one rival per covariate, each fitted to these data."""
-    if first is None:
-        return Experiment()
-    rivals: dict[str, Candidate] = {first.best.covariate: first.best}
-    for judged in first.rivals:
-        if first.best.basis.is_constant and judged.candidate.covariate in CUMULATIVE:
-            continue  # that a constant effect grew early shows only in a session that begins anew
-        rivals.setdefault(judged.candidate.covariate, judged.candidate)
-    controls = inputs.columns if inputs.absorbs else None
-    fitted = [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()]
-    return separating_pushes(evidence, fitted, model.training, inside)
+    return tuple(one.label for one in reversed(strongest.values()))

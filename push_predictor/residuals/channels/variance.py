@@ -18,7 +18,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.channels.contrast import MAD_TO_SD
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
+from push_predictor.residuals.evidence.drivers import CONSTANT, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -143,7 +143,7 @@ def _tested(
     baseline: Baseline | None,
 ) -> VarianceFinding:
     squares = _Squares.of(model, evidence, z)
-    trials = [t for name, basis in _bases(evidence, names) for t in _along(squares, name, basis)]
+    trials = [t for name, basis in screening_bases(evidence.table, names) for t in _along(squares, name, basis)]
     there = 0
     if baseline is not None:
         constant = _constant(model, evidence, z, baseline)
@@ -198,10 +198,6 @@ def _bounded_squares(residual: Array) -> Array:
     """Squares (n, 3) in units of each output's robust variance, at most MOST."""
     unit = MAD_TO_SD * np.median(np.abs(residual), axis=0)
     return np.asarray(np.minimum((residual / np.maximum(unit, TINY)) ** 2, MOST))
-
-
-def _bases(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, DriverBasis]]:
-    return [(name, basis) for name, basis in screening_bases(evidence.table, names) if name not in LOCAL]
 
 
 def _along(squares: _Squares, name: str, basis: DriverBasis) -> list[_Trial]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
+from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.recordings.table import PushTable
@@ -41,17 +41,18 @@ from push_predictor.residuals.channels.sensor_zero import zero_shift
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.basis_choice import SIMPLEST_FIRST, step_places, step_places_near
+from push_predictor.residuals.selection.forms import step_places, step_places_near
 from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
 LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 MOST_TERMS = 3
+SIMPLEST_FIRST = ("linear", "step", "quadratic")  # forms of a change of the friction
 MOST_NEAR = 12  # places of a step that are tried near the best of the first
 PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
-OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
+OWN = (*LOCAL, "contact", "angle", "edge")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
 PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
 

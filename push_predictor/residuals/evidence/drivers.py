@@ -9,26 +9,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from push_predictor.models.effects.covariate_range import CUMULATIVE, HEADINGS
+from push_predictor.models.effects.covariates import COVARIATES, CUMULATIVE, HEADINGS, of_kind
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-CATEGORIES = ("edge", "recording")
-PLACE = ("slider_x", "slider_y")
-OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: outcomes of the push, not causes
-SENSOR_ZERO = ("free_force_x", "free_force_y")  # what the window finder subtracted from the force: no cause either
-# They share noise with the residual, or vary along a push: judged against their relation in the training data.
-LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
+CATEGORIES, PLACE, SENSOR_ZERO = of_kind("category"), of_kind("place"), of_kind("sensor zero")
+# They vary along a push, or share noise with the residual: no causes.
+LOCAL = tuple(name for name, covariate in COVARIATES.items() if covariate.local)
 TIME, COUNT, DISTANCE = CUMULATIVE  # they only grow
 OF_SESSION = (*CUMULATIVE, "recording")  # counted from the start of a session
-FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
-NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *FOLDED)
+FOLDED = tuple(name for name, covariate in COVARIATES.items() if covariate.folded)
+NO_CAUSES = (*of_kind("force"), *SENSOR_ZERO, *LOCAL, *FOLDED)
 CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)
 MOST_LEVELS = 12
-ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported, and pushes are proposed
+ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 
 

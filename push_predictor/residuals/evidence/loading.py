@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.models.effects.covariate_range import CUMULATIVE
+from push_predictor.models.effects.covariates import CUMULATIVE
+from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection
 from push_predictor.recordings.read import read_recording
@@ -23,6 +24,7 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
+from push_predictor.residuals.evidence.session import session_of
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 
@@ -32,15 +34,14 @@ class LoadedData:
     """Windows in order of time, the recordings they were cut from, and the rig.
 
     recordings: None where a push table was given. dropped: covariates that some rows lack, each with the reason.
-    chosen: pushes of a designed experiment; the trace never holds them out. designed: the numbers of its recordings.
+    session: that these data are.
     """
 
     table: PushTable
     recordings: tuple[Recording, ...] | None
     rig: Rig
     dropped: dict[str, str] = field(default_factory=dict)
-    chosen: frozenset[str] = frozenset()
-    designed: frozenset[int] = frozenset()
+    session: TracedSession = field(default_factory=TracedSession)
 
 
 def load_evidence(
@@ -48,28 +49,18 @@ def load_evidence(
     rig: Rig | None = None,
     options: WindowOptions = WindowOptions(),
     *,
-    experiment: Sequence[Path] = (),
     topics: Topics = Topics(),
     inspect: Inspect = no_inspection,
 ) -> LoadedData:
     """Load recordings and push tables; rig and topics override theirs.
 
-    experiment: recordings of pushes that an earlier trace proposed. They continue the recordings before them, with the
-    same number, so that the experiment adds no covariate `recording` of its own. inspect: called with each path, its
-    data and the rig. Raises RecordingError (also if no file contains a window, or one is given twice), TableError or
-    RigError.
+    inspect: called with each path, its data and the rig. Raises RecordingError (also if no file contains a window),
+    TableError or RigError.
     """
-    every = [Path(path) for path in (*paths, *experiment)]
-    designed = {Path(path).resolve() for path in experiment}
-    if twice := designed & {Path(path).resolve() for path in paths}:
-        raise RecordingError(f"{min(twice)}: given as data and as experiment, give it once")
+    every = [Path(path) for path in paths]
     rig = rig or load_rig_for(every)
-    bags = [
-        (path.resolve() in designed, _recording(path, rig, topics, inspect)) for path in every if is_recording(path)
-    ]
-    bags.sort(key=lambda bag: _first_stamp(bag[1]))
-    files = [path for path in every if not is_recording(path)]
-    tables = [(path.resolve() in designed, path.name, _read(path, rig, inspect)) for path in files]
+    bags = sorted((_recording(p, rig, topics, inspect) for p in every if is_recording(p)), key=_first_stamp)
+    tables = [(path.name, _read(path, rig, inspect)) for path in every if not is_recording(path)]
     found = _loaded(bags, tables, rig, options)
     if not len(found.table):
         raise RecordingError(f"{', '.join(map(str, every))}: no push was found, give recordings of pushes")
@@ -78,13 +69,12 @@ def load_evidence(
 
 def cut_again(recordings: Sequence[Recording], rig: Rig, options: WindowOptions = WindowOptions()) -> PushTable:
     """Cut the windows of recordings, in order of time, after a correction of their streams or the rig."""
-    return _loaded([(False, recording) for recording in recordings], [], rig, options).table
+    return _loaded(recordings, [], rig, options).table
 
 
 def corrected_data(loaded: LoadedData, recordings: Sequence[Recording], options: WindowOptions) -> LoadedData:
     """The same data after a correction of their recordings' streams, in the same order."""
-    bags = [(number in loaded.designed, recording) for number, recording in enumerate(recordings)]
-    return _loaded(bags, [], loaded.rig, options)
+    return _loaded(recordings, [], loaded.rig, options)
 
 
 def with_inputs(table: PushTable) -> PushTable:
@@ -93,53 +83,28 @@ def with_inputs(table: PushTable) -> PushTable:
     return replace(table, covariates={**table.covariates, **inputs})
 
 
-def previous_residual(table: PushTable, z: Array) -> Array:
-    """The covariate previous_residual (n,), from standardised residuals z (n, 3).
-
-    It is the signed mean of z over the windows and outputs of the previous push; zero for a recording's first push.
-    """
-    push = push_order(table)
-    mean = np.bincount(push, z.mean(axis=1)) / np.bincount(push)
-    recording = table.covariates.get("recording", np.zeros(len(table)))
-    of_push = np.zeros(len(mean))
-    of_push[push] = recording
-    follows = np.concatenate([[False], of_push[1:] == of_push[:-1]])
-    return np.asarray(np.where(follows, np.roll(mean, 1), 0.0)[push])
-
-
 def _loaded(
-    bags: Sequence[tuple[bool, Recording]],
-    files: Sequence[tuple[bool, str, PushTable]],
-    rig: Rig,
-    options: WindowOptions,
+    recordings: Sequence[Recording], files: Sequence[tuple[str, PushTable]], rig: Rig, options: WindowOptions
 ) -> LoadedData:
-    """Recordings in order of time, then tables with their names; each with whether it is a designed experiment."""
-    recordings = tuple(recording for _, recording in bags)
-    designed = [*(of for of, _ in bags), *(of for of, _, _ in files)]
-    names = [*(recording.name for recording in recordings), *(name for _, name, _ in files)]
-    cut = [*_cut(recordings, rig, options), *(table for _, _, table in files)]
+    """Recordings in order of time, then tables with their names."""
+    names = [*(recording.name for recording in recordings), *(name for name, _ in files)]
+    windows = [find_windows(recording, rig, options) for recording in recordings]
+    own = [*map(_table, windows), *(table for _, table in files)]
+    cut = [*map(_table, _continued(windows)), *(table for _, table in files)]
+    kept = None if files else tuple(recordings)
     if not any(map(len, cut)):
-        return LoadedData(empty_table(), None if files else recordings, rig)
-    tables = distinct_pushes(names, cut)
-    table, dropped = _joined(tables, designed)
-    chosen = frozenset(push for of, each in zip(designed, tables, strict=True) if of for push in each.pushes)
-    return LoadedData(
-        table,
-        None if files else recordings,
-        rig,
-        dropped,
-        chosen,
-        frozenset(number for number, (of, _) in enumerate(bags) if of),
-    )
+        return LoadedData(empty_table(), kept, rig)
+    table, dropped = _joined(distinct_pushes(names, cut))
+    session = session_of([rows for rows in own if len(rows)], [rows for rows in cut if len(rows)])
+    return LoadedData(table, kept, rig, dropped, session)
 
 
 def _first_stamp(recording: Recording) -> int:
     return min((int(s.stamp[0]) for s in (recording.slider, recording.pusher) if len(s)), default=0)
 
 
-def _cut(recordings: Sequence[Recording], rig: Rig, options: WindowOptions) -> list[PushTable]:
-    windows = [find_windows(recording, rig, options) for recording in recordings]
-    return [with_inputs(windows_to_table(found)) for found in _continued(windows)]
+def _table(windows: Sequence[PushWindow]) -> PushTable:
+    return with_inputs(windows_to_table(windows))
 
 
 def _continued(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
@@ -180,13 +145,9 @@ def _read(path: Path, rig: Rig, inspect: Inspect) -> PushTable:
     return replace(table, covariates={"edge": edge, **table.covariates})
 
 
-def _joined(tables: Sequence[PushTable], designed: Sequence[bool]) -> tuple[PushTable, dict[str, str]]:
-    """One table with the number of each row's recording, and the covariates that some rows lack.
-
-    A designed experiment has the number of the recording that it continues.
-    """
-    numbers = np.maximum(np.cumsum(~np.asarray(designed)) - 1, 0).tolist()
-    numbered = [_numbered(number, table) for number, table in zip(numbers, tables, strict=True) if len(table)]
+def _joined(tables: Sequence[PushTable]) -> tuple[PushTable, dict[str, str]]:
+    """One table with the number of each row's recording, and the covariates that some rows lack."""
+    numbered = [_numbered(number, table) for number, table in enumerate(tables) if len(table)]
     table = _indexed(concatenate(numbered))
     dropped = {}
     names = dict.fromkeys(name for part in numbered for name in part.covariates if name != "push_index")

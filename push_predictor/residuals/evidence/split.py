@@ -19,18 +19,8 @@ EVERY = 3  # one block in so many is held out
 RULE = f"every third block of up to {BLOCK} successive pushes is held out"
 
 
-def held_out_rows(table: PushTable, chosen: frozenset[str] = frozenset()) -> BoolArray:
-    """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session.
-
-    chosen: pushes of a designed experiment. They are never held out, and the others are split as without them.
-    """
-    designed = np.isin(table.push_id, sorted(chosen))
-    held = np.zeros(len(table), dtype=np.bool_)
-    held[~designed] = _interleaved(table.take(~designed))
-    return held
-
-
-def _interleaved(table: PushTable) -> BoolArray:
+def held_out_rows(table: PushTable) -> BoolArray:
+    """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session."""
     order = push_order(table)
     count = int(order.max()) + 1 if len(order) else 0
     block = max(1, min(BLOCK, count // FEWEST_BLOCKS))

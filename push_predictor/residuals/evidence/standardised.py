@@ -32,7 +32,7 @@ class Evidence:
     """n windows with covariates and their residuals under one model.
 
     residual (n, 3): m, m, rad. whitener (n, 3, 3): L^-1, L L' the predicted covariance. mechanics: what effects act on.
-    effects: those that the model has already. chosen: pushes of a designed experiment.
+    effects: those that the model has already.
     """
 
     table: PushTable
@@ -40,7 +40,6 @@ class Evidence:
     whitener: Array
     mechanics: FittedMechanics
     effects: tuple[Effect, ...] = ()
-    chosen: frozenset[str] = frozenset()
 
     @property
     def z(self) -> Array:
@@ -55,7 +54,7 @@ class Evidence:
     @cached_property
     def block(self) -> IntArray:
         """Block number (n,): neighbouring pushes share one; see blocks_of."""
-        return blocks_of(self.table, self.chosen)
+        return blocks_of(self.table)
 
     @cached_property
     def responses(self) -> dict[str | None, Array]:
@@ -71,7 +70,7 @@ class Evidence:
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""
         taken = self.table.take(rows), self.residual[rows], self.whitener[rows]
-        return Evidence(*taken, self.mechanics, self.effects, self.chosen)
+        return Evidence(*taken, self.mechanics, self.effects)
 
 
 def evidence_of(model: PushModel, table: PushTable) -> Evidence:
@@ -102,19 +101,11 @@ def push_order(table: PushTable) -> IntArray:
     return np.array([index[push] for push in table.push_id.tolist()], dtype=np.int64)
 
 
-def blocks_of(table: PushTable, chosen: frozenset[str] = frozenset()) -> IntArray:
-    """Block number (n,): up to BLOCK neighbouring pushes share one; single pushes where there are few.
-
-    chosen: pushes of a designed experiment. Neighbours among them differ on purpose, and each is a block of its own:
-    sums over five blocks would not reach any level of significance.
-    """
-    designed = np.isin(table.push_id, sorted(chosen))
-    order = push_order(table.take(~designed))
+def blocks_of(table: PushTable) -> IntArray:
+    """Block number (n,): up to BLOCK neighbouring pushes share one; single pushes where there are few."""
+    order = push_order(table)
     count = int(order.max()) + 1 if len(order) else 0
-    block = np.empty(len(table), dtype=np.int64)
-    block[~designed] = order // max(1, min(BLOCK, count // FEWEST_BLOCKS))
-    block[designed] = push_order(table.take(designed)) + (block[~designed].max(initial=-1) + 1)
-    return block
+    return np.asarray(order // max(1, min(BLOCK, count // FEWEST_BLOCKS)))
 
 
 def whitener_of(covariance: Array) -> Array:

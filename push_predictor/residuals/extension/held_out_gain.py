@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
+from push_predictor.evaluation.estimate import Estimate, Figure, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of_moments
 from push_predictor.models.push_model import PushModel
@@ -18,7 +18,7 @@ from push_predictor.residuals.extension.recalibration import (
     new_windows,
     uncertainty_of_effects,
 )
-from push_predictor.residuals.outcome import Gain, Reference
+from push_predictor.residuals.outcome import Reference
 from push_predictor.types import Array
 
 
@@ -27,8 +27,8 @@ class HeldOutGain:
     """After minus the reference, which is the better of the two models without the effects."""
 
     reference: Reference
-    nmse: Gain
-    nlpd: Gain
+    nmse: Estimate
+    nlpd: Estimate
 
 
 def held_out_gain(
@@ -59,7 +59,7 @@ def held_out_gain(
 
 def gain(
     refit: PushModel, after: PushModel, held_out: PushTable, training_mean: Array | None = None
-) -> tuple[Gain, Gain]:
+) -> tuple[Estimate, Estimate]:
     """After minus refit in NMSE and in NLPD, with 95 % intervals from a paired bootstrap of pushes.
 
     training_mean (3,): the reference of the NMSE; the refit's if None.
@@ -80,5 +80,5 @@ def _moments_compared(model: PushModel, table: PushTable, training_mean: Array) 
     return replace(comparison_of_moments(model, table, seen.mean, seen.covariance), training_mean=training_mean)
 
 
-def _difference(first: Comparison, second: Comparison, figure: Figure) -> Gain:
-    return Gain(**vars(difference_by_push(push_scores(first), push_scores(second), figure)))
+def _difference(first: Comparison, second: Comparison, figure: Figure) -> Estimate:
+    return difference_by_push(push_scores(first), push_scores(second), figure)

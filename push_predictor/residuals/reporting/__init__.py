@@ -3,5 +3,5 @@
 
 """What a person or a program reads of a trace: page, tables, sentences, JSON.
 
-Import `page`, `summary`, `wording` and `trace_json`; every phrase for a mechanism or covariate comes from `phrases`.
+Import `page`, `summary`, `sentences` and `trace_json`; phrases and numbers come from `phrases`.
 """

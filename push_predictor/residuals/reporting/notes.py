@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from push_predictor.residuals.channels.measurement import MeasurementFinding
+from push_predictor.residuals.channel_search import Searched
 from push_predictor.residuals.channels.motion import MotionFinding
-from push_predictor.residuals.channels.wrench import WrenchFinding
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
+from push_predictor.residuals.outcome import Sized
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     covariate_phrase,
@@ -20,8 +20,6 @@ from push_predictor.residuals.reporting.phrases import (
     listed,
     mechanism_phrase,
 )
-from push_predictor.residuals.selection.absolute_fit import parts_of_others
-from push_predictor.residuals.selection.experiment import PUSHES
 
 CUT_AGAIN = (
     "The streams were corrected and the windows cut again. The figures after correction are of the deployed model, "
@@ -35,19 +33,15 @@ NOT_TRIED = (
 NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
-def notes_of(
-    loaded: LoadedData, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
-) -> tuple[str, ...]:
+def notes_of(loaded: LoadedData, found: Searched) -> tuple[str, ...]:
     """Notes on the data, and on what was found or not tried in addition to the verdict."""
-    return (*notes_of_data(loaded), *_of_motion(motion), *_of_other_channels(motion, measured, forces))
+    return (*notes_of_data(loaded), *_of_motion(found.motion), *_of_other_channels(found))
 
 
 def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
     """How the pushes were split, and which covariates were dropped."""
-    chosen = len(loaded.chosen)
-    experiment = (f"{chosen} pushes of the designed experiment are analysed and never held out.",) if chosen else ()
     dropped = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in loaded.dropped.items())
-    return (f"Split: {RULE}. Windows of one push stay together.", *experiment, *dropped)
+    return (f"Split: {RULE}. Windows of one push stay together.", *dropped)
 
 
 def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:
@@ -65,10 +59,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
         )
     if own := [effect_phrase(term.mechanism, term.best.covariate) for term in motion.terms if term.own]:
         notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
-    parts = parts_of_others(motion.terms)
-    if left := [
-        effect_phrase(t.mechanism, t.best.covariate) for t, part in zip(motion.terms, parts, strict=True) if part
-    ]:
+    if left := [effect_phrase(t.mechanism, t.best.covariate) for t in motion.terms if t.part]:
         notes.append(f"Fitted together with a listed effect, and not listed separately: {listed(left)}.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
@@ -76,25 +67,14 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"Not tested: {names}. Contact point, push angle and speed predict them in these pushes. "
             f"To test them, randomise the order of the pushes."
         )
-    if motion.uncompared:
-        names = listed([covariate_phrase(name) for name in motion.uncompared])
-        notes.append(
-            f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
-            f"they lack the covariate, or have too few windows per push."
-        )
-    if (rivals := motion.experiment.inseparable) and not motion.terms[0].best.basis.is_constant:
-        names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])
-        notes.append(
-            f"{PUSHES} further pushes would not separate {names}: at all values that can be set, their predictions are "
-            f"too similar. Time, push count and distance slid can only grow."
-        )
     if motion.unchanged:
         effects = listed([effect_phrase(*label) for label in motion.unchanged])
         notes.append(f"Not new, because the training pushes show it to the same degree: {effects}.")
     return notes
 
 
-def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding) -> list[str]:
+def _of_other_channels(found: Searched) -> list[str]:
+    motion, measured, forces = found.motion, found.measured, found.forces
     notes = []
     if measured is not None and measured.errors:
         errors = listed([mechanism_phrase(error.mechanism) for error in measured.errors])
@@ -103,13 +83,9 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
         )
     if measured is None:
         notes.append(NOT_JUDGED)
+    notes += [f"{_bias(fault.parameters)} The windows and predictions do not depend on it." for fault in found.harmless]
     if forces.zero is not None:
-        change = " and ".join(
-            f"{size.value:+.2g} N along {axis}" for size, axis in zip(forces.zero.parameters, "xy", strict=True)
-        )
-        notes.append(
-            f"The reading of the force sensor in free motion changed by {change}. It was subtracted from the windows."
-        )
+        notes.append(f"{_bias(forces.zero.parameters)} Zero the sensor, and record again.")
     if motion.variance and forces.effects and not motion.terms:
         covariates = listed([covariate_phrase(effect.covariate) for effect in motion.variance])
         notes.append(f"The noise of the motion changed as well; it depends on {covariates}.")
@@ -117,3 +93,8 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
         effects = listed([effect_phrase(e.mechanism, e.covariate) for e in forces.effects])
         notes.append(f"The force changed as well: {effects}.")
     return notes
+
+
+def _bias(parameters: Sequence[Sized]) -> str:
+    sizes = " and ".join(f"{size.value:+.2g} N along {axis}" for size, axis in zip(parameters, "xy", strict=True))
+    return f"The force sensor has a bias of {sizes}.".replace("-", "−")

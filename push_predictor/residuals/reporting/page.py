@@ -7,29 +7,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.advice import ANEW, grew_early, separating_words
-from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
 from push_predictor.residuals.reporting.figures.key import key_figure
-from push_predictor.residuals.reporting.figures.map_pictures import map_figures
-from push_predictor.residuals.reporting.input_shift import share_clause, shift_clause
-from push_predictor.residuals.reporting.phrases import capitalised, effect_phrase
-from push_predictor.residuals.reporting.quantities import count
+from push_predictor.residuals.reporting.figures.maps import map_figures
+from push_predictor.residuals.reporting.phrases import count, effect_phrase
+from push_predictor.residuals.reporting.rivals import advice, rivals
+from push_predictor.residuals.reporting.sentences import answer, evidence, shift_sentence, worth
 from push_predictor.residuals.reporting.tables import (
     detectable_table,
     effects_table,
-    experiment_table,
     held_out_table,
     metric_tables,
     shifts_table,
     tested_tables,
 )
-from push_predictor.residuals.reporting.wording import evidence_sentence, rivals_sentence, worth_sentence
 
 VERDICTS = {
     "none": "no change found",
@@ -41,16 +39,11 @@ VERDICTS = {
     "variance": "noise only",
     "input_shift": "inputs shifted",
 }
+WEAK = "weak evidence"
 KINDS = {"vhgp": "variational heteroscedastic GP", "gp": "standard GP", "analytical": "analytical model"}
 UNNAMED = (
     "A mechanism is named only if it explains nearly as much as a general pattern over contact point and push angle. "
     "Here no mechanism does. A tested mechanism can be significant because it resembles the pattern."
-)
-EXPERIMENT = (
-    "Make the pushes below in this order, with the covariates set as the table shows. There the predictions of the "
-    "rivals differ most. Each repeats a recorded push at other values of the covariates. Elapsed time, push count and "
-    "distance slid only grow: rest, or push, until they reach the first row. Then trace again: add --and and the new "
-    "recording to the command."
 )
 
 
@@ -69,7 +62,7 @@ def write_trace_report(path: Path, trace: Trace) -> Path:
 
 def _parts(trace: Trace) -> list[str]:
     return [
-        html.opening(answer(trace), VERDICTS[trace.verdict], html.joined(key_figure(trace))),
+        html.opening(answer(trace), WEAK if trace.weak else VERDICTS[trace.verdict], html.joined(key_figure(trace))),
         *_shifted_inputs(trace),
         *_held_out(trace),
         *_rivals(trace),
@@ -91,7 +84,7 @@ def _facts(trace: Trace) -> dict[str, str]:
     kind = KINDS.get(model.kind, model.kind)
     return {
         "model": f"{model.name}: {kind}, slider {model.rig.shape} on {model.rig.surface}, {trained}",
-        "analysis": f"{analysis}, {len(trace.analysis)} windows",
+        "analysis": f"{analysis}, {len(trace.analysis)} windows of {float(np.median(trace.analysis.duration)):.2g} s",
         "held out": f"{held_out}, {len(held.table)} windows, opened once, after every choice was made",
         "split": f"by push: {RULE}",
         "held-out SHA-256": held.digest,
@@ -103,15 +96,14 @@ def _facts(trace: Trace) -> dict[str, str]:
 def _shifted_inputs(trace: Trace) -> list[str]:
     """Inputs that differ from those of training, where they are not the verdict itself."""
     shifts = () if trace.verdict == "input_shift" else trace.input_shift
-    texts = [f"{capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in shifts]
-    return [html.paragraph(text, "warning") for text in texts]
+    return [html.paragraph(shift_sentence(shift), "warning") for shift in shifts]
 
 
 def _effects(trace: Trace) -> list[str]:
     if not trace.effects:
         return []
     heading = html.heading("The effect" if len(trace.effects) == 1 else "The effects")
-    parts = [heading, html.paragraph(evidence_sentence(trace)), effects_table(trace)]
+    parts = [heading, html.paragraph(evidence(trace)), effects_table(trace)]
     return [*parts, shifts_table(trace), *effect_figures(trace)] if trace.terms else parts
 
 
@@ -121,13 +113,7 @@ def _rivals(trace: Trace) -> list[str]:
     parts = [html.heading("Rival explanations, and pushes that would decide"), html.paragraph(_rivals_sentence(trace))]
     if trace.verdict == "driver_only":
         parts.append(html.paragraph(UNNAMED))
-    if trace.equivalent:
-        first, rivals = trace.effects[0], trace.equivalent
-        words = [ANEW] if grew_early(first, rivals) else separating_words([first.covariate, *rivals])
-        parts.append(html.bullets(words))
-    if trace.experiment:
-        parts += [html.paragraph(EXPERIMENT), experiment_table(trace)]
-    return parts
+    return [*parts, html.bullets(advice(trace))] if trace.equivalent else parts
 
 
 def _rivals_sentence(trace: Trace) -> str:
@@ -138,7 +124,7 @@ def _rivals_sentence(trace: Trace) -> str:
         if trace.undecided
         else "The first fits best, but these data do not exclude the others"
     )
-    return f"{rivals_sentence(trace).strip()} {decided}."
+    return f"{rivals(trace)} {decided}."
 
 
 def _held_out(trace: Trace) -> list[str]:
@@ -148,7 +134,7 @@ def _held_out(trace: Trace) -> list[str]:
         "covariance is estimated again."
     )
     every = [html.paragraph(method), *metric_tables(trace), *calibration_figures(trace)]
-    parts = [html.heading("Before, refit, after"), html.paragraph(worth_sentence(trace)), held_out_table(trace)]
+    parts = [html.heading("Before, refit, after"), html.paragraph(worth(trace)), held_out_table(trace)]
     return [*parts, *error_figure(trace), html.details("All metrics, and the calibration", html.joined(every))]
 
 
@@ -169,8 +155,8 @@ def _tested(trace: Trace) -> list[str]:
     parts = [html.heading("What else was tested")]
     if not trace.tested:
         return [*parts, html.paragraph("Nothing could be tested: see the notes.", "warning")]
-    evidence = [] if trace.effects else [html.paragraph(evidence_sentence(trace))]
-    return [*parts, *evidence, *tested_tables(trace)]
+    closest = [] if trace.effects else [html.paragraph(evidence(trace))]
+    return [*parts, *closest, *tested_tables(trace)]
 
 
 def _remaining(trace: Trace) -> list[str]:
@@ -189,6 +175,6 @@ def _remaining_sentence(trace: Trace) -> str:
     if not trace.effects:
         return "No effect was found, so nothing was subtracted."
     if trace.remaining is None:
-        return "A second search, with the effects found subtracted, found nothing more."
+        return "In what the effects leave, the search finds nothing more."
     strongest = effect_phrase(*trace.remaining)
     return f"Something remains after the effects found are subtracted. The strongest candidate is {strongest}."

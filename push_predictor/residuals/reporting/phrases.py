@@ -1,113 +1,56 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The plain phrase for every mechanism, covariate and unit: identifiers belong in tables and JSON, not in prose."""
+"""Words for mechanisms, covariates and numbers: identifiers belong in tables and JSON, not in prose."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.request import UNITS
-from push_predictor.reporting.html import number
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.models.effects.covariates import COVARIATES, UNITS
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
+from push_predictor.reporting.html import NOTHING, number
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION, UNDRIVEN
+from push_predictor.residuals.outcome import Sized
+
+MECHANISMS = {mechanism.name: mechanism for mechanism in (*LIBRARY, *REFINEMENTS)}
 
 
-@dataclass(frozen=True)
-class MechanismPhrase:
-    """How prose names a mechanism: `noun` is what changes; `onset` is a clause for a change at one point, if apt."""
-
-    noun: str
-    onset: str = ""
-
-
-MECHANISMS: dict[str | None, MechanismPhrase] = {
-    None: MechanismPhrase("the slider's motion"),
-    "contact_friction": MechanismPhrase("contact friction"),
-    "contact_asymmetry": MechanismPhrase("the difference between contact friction to the left and to the right"),
-    "pressure_spread": MechanismPhrase("the spread of the slider's pressure on the table"),
-    "centre_of_friction": MechanismPhrase("the slider's centre of friction"),
-    "pushing_height": MechanismPhrase("the pushing height"),
-    "body_anisotropy": MechanismPhrase(
-        "direction-dependent friction of the slider", "the slider's friction became direction-dependent"
-    ),
-    "anisotropic_friction": MechanismPhrase(
-        "direction-dependent friction of the table", "the table's friction became direction-dependent"
-    ),
-    "friction_gradient": MechanismPhrase("the friction gradient across the table"),
-    "tilted_surface": MechanismPhrase("the tilt of the table"),
-    "inertia": MechanismPhrase("the slider's inertia"),
-    "pusher_radius": MechanismPhrase("the pusher's radius"),
-    "pusher_travel": MechanismPhrase("the distance that the pusher travels"),
-    "friction_by_angle": MechanismPhrase("the change of contact friction with the push angle"),
-    "friction_by_speed": MechanismPhrase("the change of contact friction with sliding speed"),
-    "friction_by_load": MechanismPhrase("the change of contact friction with the normal force"),
-    "rim_pressure": MechanismPhrase("the growth of the slider's pressure towards its rim"),
-    "outline_shift": MechanismPhrase("the position of the slider's outline in its tracked frame"),
-    "tip_offset": MechanismPhrase("the offset of the pusher's tip"),
-    "outline_rotation": MechanismPhrase("the rotation of the slider's outline in its tracked frame"),
-    "push_rotation": MechanismPhrase("the rotation of the recorded push direction"),
-    "surface_friction": MechanismPhrase("the force needed to push the slider"),
-    "wrench_bias": MechanismPhrase("a bias of the force sensor"),
-    "clock_offset": MechanismPhrase("a clock offset between tracker and robot"),
-    "frame_rotation": MechanismPhrase("a rotation of the tracker's frame"),
-    "frame_shift": MechanismPhrase("a shift of the tracker's frame"),
-    "tool_offset": MechanismPhrase("an offset of the tool point"),
+# Of findings that are no mechanism of the motion.
+OTHERS = {
+    "surface_friction": "the force needed to push the slider",
+    "wrench_bias": "a bias of the force sensor",
+    "clock_offset": "a clock offset between tracker and robot",
+    "frame_rotation": "a rotation of the tracker's frame",
+    "frame_shift": "a shift of the tracker's frame",
+    "tool_offset": "an offset of the tool point",
 }
 
-COVARIATES: dict[str, str] = {
-    "elapsed_time": "elapsed time",
-    "push_index": "push count",
-    "slid_distance": "distance slid",
-    "slider_x": "the slider's x position",
-    "slider_y": "the slider's y position",
-    "slider_heading": "the slider's heading",
-    "push_heading": "the push direction in the world",
-    "velocity": "pushing speed",
-    "contact": "contact point",
-    "angle": "push angle",
-    "edge": "side pushed",
-    "dwell_time": "dwell time before the push",
-    "time_since_contact": "time since first contact",
-    "contact_gap": "measured gap at the contact",
-    "normal_force": "normal force",
-    "tangential_force": "tangential force",
-    "free_force_x": "the force read in free motion along x",
-    "free_force_y": "the force read in free motion along y",
-    "previous_residual": "the residual of the previous push",
-    "recording": "recording",
-    "travel": "length of the push",
-    SESSION: "the session (since training)",
-    CONSTANT: "nothing (constant)",
-}
-
-SHOWN = {
-    **dict.fromkeys(("slider_heading", "push_heading", "angle"), (float(np.degrees(1.0)), "deg")),
-    "velocity": (1e3, "mm/s"),
-    "contact_gap": (1e3, "mm"),
-}
+NAMED = {SESSION: "the session (since training)", CONSTANT: "nothing (constant)"}  # what is no covariate
+SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "deg"), "s": (1e3, "ms"), "1": (1.0, "")}
 
 
 def mechanism_phrase(mechanism: str | None) -> str:
     """A mechanism as a noun phrase; "an unknown mechanism" for None."""
     if mechanism is None:
         return "an unknown mechanism"
-    known = MECHANISMS.get(mechanism)
-    return known.noun if known else mechanism.replace("_", " ")
+    return MECHANISMS[mechanism].noun if mechanism in MECHANISMS else OTHERS.get(mechanism, mechanism.replace("_", " "))
 
 
 def moved_noun(mechanism: str | None) -> str:
     """What changes if a mechanism acts: a noun phrase to begin a sentence with."""
-    return MECHANISMS[None].noun if mechanism is None else mechanism_phrase(mechanism)
+    return "the slider's motion" if mechanism is None else mechanism_phrase(mechanism)
 
 
 def covariate_phrase(covariate: str) -> str:
     """A covariate in words; a recorded topic by its name."""
     if covariate.startswith("topic:"):
         return f"topic {covariate.removeprefix('topic:')}"
-    return COVARIATES.get(covariate, covariate.replace("_", " "))
+    known = COVARIATES.get(covariate)
+    return known.phrase if known else NAMED.get(covariate, covariate.replace("_", " "))
 
 
 def effect_phrase(mechanism: str | None, covariate: str) -> str:
@@ -163,15 +106,69 @@ def capitalised(text: str) -> str:
 
 def unit_of(covariate: str) -> str:
     """The unit of a covariate, empty if none is known."""
-    return "m" if covariate == "travel" else UNITS.get(covariate, "")
+    return UNITS.get(covariate, "")
 
 
 def shown_unit_of(covariate: str) -> tuple[float, str]:
     """The factor to, and the name of, the unit in which pictures and sentences show a covariate."""
-    return SHOWN.get(covariate, (1.0, unit_of(covariate)))
+    known = COVARIATES.get(covariate)
+    return known.shown if known and known.shown else (1.0, unit_of(covariate))
 
 
 def with_unit(covariate: str) -> str:
     """A covariate with its unit, for the axis of a picture or the head of a table."""
     unit, phrase = unit_of(covariate), label(covariate_phrase(covariate))
     return f"{phrase} ({unit})" if unit else phrase
+
+
+# --- numbers with unit, 95 % interval and a minus sign ----------------------------------------------------------------
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """The factor to, and the name of, the unit in which a size is shown."""
+    return SHOWN_UNITS.get(unit, (1.0, unit))
+
+
+def in_shown_unit(size: Sized) -> tuple[Estimate, str]:
+    """A size with its interval in the unit in which it is shown."""
+    factor, unit = shown_unit(size.unit)
+    return size.estimate.times(factor), unit
+
+
+def interval(value: Estimate, unit: str = "", p_value: float | None = None, word: str = "") -> str:
+    """A number with its 95 % interval and p value: 0.76 (95 % CI 0.73 to 0.80, p = 0.001); word: after the unit."""
+    known = bool(np.isfinite([value.low, value.high]).all())
+    parts = [f"95 % CI {_shown(value.low, value)} to {_shown(value.high, value)}"] if known else []
+    parts += [] if p_value is None else [f"p = {p_text(p_value)}"]
+    text = " ".join(filter(None, [_shown(value.value, value), unit, word]))
+    return f"{text} ({', '.join(parts)})" if parts else text
+
+
+def interval_cell(value: Estimate, unit: str = "") -> str:
+    """A number with its unit over its 95 % interval, for the cell of a table."""
+    text = f"{_shown(value.value, value)} {unit}".strip()
+    known = bool(np.isfinite([value.low, value.high]).all())
+    return f"{text}\n[{_shown(value.low, value)}, {_shown(value.high, value)}]" if known else text
+
+
+def p_text(p_value: float) -> str:
+    """A p value with two significant digits."""
+    return number(p_value, 2)
+
+
+def count(n: int, one: str, many: str) -> str:
+    """A number of things."""
+    return f"{n} {one if n == 1 else many}"
+
+
+def _shown(value: float, ends: Estimate) -> str:
+    """A number with as many decimals as its interval determines."""
+    if not np.isfinite(value):
+        return NOTHING
+    width = ends.high - ends.low
+    if not np.isfinite(width) or width <= 0.0:
+        return number(value, 3)
+    power = int(np.floor(np.log10(width)))
+    decimals = -power + (width / 10.0**power <= 3.0)  # one digit of the width, two if it begins with 1 to 3
+    shown = round(value, max(0, decimals)) + 0.0  # no minus zero
+    return f"{shown:.{max(0, decimals)}f}".replace("-", "−")

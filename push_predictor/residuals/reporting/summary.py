@@ -5,54 +5,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.reporting.html import NOTHING
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.answer import answer
-from push_predictor.residuals.reporting.phrases import effect_phrase, with_unit
-from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
+from push_predictor.residuals.reporting.phrases import effect_phrase
+from push_predictor.residuals.reporting.rivals import advice, rivals
+from push_predictor.residuals.reporting.sentences import answer, evidence, worth
 
 
 def summary_lines(trace: Trace) -> list[str]:
-    """The page's answer, its evidence, the pushes that would decide, held-out figures and notes; plain ASCII."""
-    evidence = [verdict_sentence(trace), worth_sentence(trace), *_experiment(trace)]
-    lines = [*answer(trace), "", *evidence, "", *_held_out(trace)]
+    """The page's answer, its evidence, held-out figures and notes; plain ASCII."""
+    details = filter(None, (evidence(trace), rivals(trace), *advice(trace), worth(trace)))
+    lines = [*answer(trace), "", *details, "", *_held_out(trace)]
     if trace.remaining is not None:
         lines.append(f"Still significant after these effects: {effect_phrase(*trace.remaining)}.")
     lines += [f"Note: {note}" for note in trace.notes]
     return [line.replace("−", "-").replace(NOTHING, "-") for line in lines]
 
 
-def comparisons_of(trace: Trace) -> list[Comparison]:
-    """Comparisons named before, refit and, if something was added, after."""
-    held = trace.held_out
-    pairs = [("before", held.before), ("refit", held.refit), ("after", held.after)]
-    shown = pairs if trace.terms or not _same(held.refit, held.after) else pairs[:2]
-    return [replace(comparison, model=name) for name, comparison in shown]
-
-
-def _same(one: Comparison, other: Comparison) -> bool:
-    return np.array_equal(one.mean, other.mean) and np.array_equal(one.observed, other.observed)
-
-
-def _experiment(trace: Trace) -> list[str]:
-    return [f"  push {k + 1}: {_push(push)}" for k, push in enumerate(trace.experiment)]
-
-
-def _push(push: Mapping[str, float]) -> str:
-    return ", ".join(f"{with_unit(name).lower()} {value:.3g}" for name, value in push.items())
-
-
 def _held_out(trace: Trace) -> list[str]:
     head = f"Held out: {len(trace.held_out.table.pushes)} pushes, SHA-256 {trace.held_out.digest}"
     titles = f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact NLPD':>12s}{'90 % coverage, dx dy dtheta':>30s}"
-    return [head, titles, *map(_line, comparisons_of(trace))]
+    return [head, titles, *map(_line, trace.comparisons)]
 
 
 def _line(comparison: Comparison) -> str:

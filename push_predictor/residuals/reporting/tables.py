@@ -10,21 +10,27 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.evaluation.report.tables import metrics_tables
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
-from push_predictor.residuals.outcome import FoundEffect, Gain, Tested, Trace
-from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, effect_phrase, mechanism_phrase, unit_of
-from push_predictor.residuals.reporting.quantities import count, in_shown_unit, interval_cell, p_text, shown_unit
-from push_predictor.residuals.reporting.shift_size import shift_sizes
-from push_predictor.residuals.reporting.summary import comparisons_of
-from push_predictor.residuals.reporting.tested import best_of, role_of
+from push_predictor.residuals.outcome import FoundEffect, Tested, Trace
+from push_predictor.residuals.reporting.phrases import (
+    bare,
+    count,
+    covariate_phrase,
+    effect_phrase,
+    in_shown_unit,
+    interval_cell,
+    mechanism_phrase,
+    p_text,
+    shown_unit,
+)
+from push_predictor.residuals.reporting.sizes import SHOWN, shift_sizes
 
 AT_ONCE = 15  # candidates shown before the reader opens the rest
-COUNTS = ("push_index", "edge", "recording")
-ANGLES = ("angle", "slider_heading", "push_heading")
 
 
 def effects_table(trace: Trace) -> str:
@@ -45,7 +51,7 @@ def shifts_table(trace: Trace) -> str:
     rows = []
     for effect, term in zip(trace.effects, trace.terms, strict=False):
         sizes = shift_sizes(trace, term, trace.analysis)
-        cells = (interval_cell(in_shown_unit(size)[0]) for size in sizes)
+        cells = (interval_cell(sizes[name].times(SHOWN[name][0])) for name in OUTPUTS)
         rows.append([bare(effect_phrase(effect.mechanism, effect.covariate)), *cells])
     head = ("effect", "dx (mm)", "dy (mm)", "dtheta (deg)")
     caption = (
@@ -77,7 +83,7 @@ def tested_tables(trace: Trace) -> list[str]:
 def held_out_table(trace: Trace) -> str:
     """Squared error, log density and coverage before, after the refit and with the effects."""
     head = ("model", "squared error (NMSE)", "NLPD (nats per window)", *(f"90 % coverage of {o}" for o in OUTPUTS))
-    shown = comparisons_of(trace)
+    shown = trace.comparisons
     caption = (
         f"Held-out pushes. Squared error: 0 is perfect, 1 is no better than {nmse_reference(shown[0].n_train)}; summed "
         "over dx, dy and "
@@ -89,7 +95,7 @@ def held_out_table(trace: Trace) -> str:
 
 def metric_tables(trace: Trace) -> list[str]:
     """The gain, and all metrics for each output before, after the refit and with the effects."""
-    shown = comparisons_of(trace)
+    shown = trace.comparisons
     metrics = [metrics_json(comparison) for comparison in shown]
     alike = len({comparison.push_id.tobytes() for comparison in shown}) == 1
     tables = (
@@ -130,15 +136,6 @@ def detectable_table(trace: Trace) -> str:
     return html.folded_table(caption, ("mechanism", "constant", "along a covariate", "covariate"), rows)
 
 
-def experiment_table(trace: Trace) -> str:
-    """Pushes that would separate the rivals."""
-    keys = list(dict.fromkeys(key for push in trace.experiment for key in push))
-    rows = [
-        [str(k + 1), *(_cell(_shown(key, push.get(key))) for key in keys)] for k, push in enumerate(trace.experiment)
-    ]
-    return html.table("Pushes that would separate the rivals.", ("push", *map(_column, keys)), rows)
-
-
 def _effect_row(effect: FoundEffect, noise: bool) -> list[str]:
     size, share = effect.parameter, effect.share_of_residual
     basis = "" if effect.basis == "constant" else f" ({effect.basis})"
@@ -166,7 +163,7 @@ def _with_interval(metrics: Mapping[str, Any], name: str) -> str:
     value, ends = metrics[name]["total"], metrics["interval"][name]
     if value is None or ends is None:
         return html.number(value, 3)
-    return interval_cell(Gain(value, ends["low"], ends["high"]))
+    return interval_cell(Estimate(value, ends["low"], ends["high"]))
 
 
 def _at_once(trace: Trace, best: Sequence[Tested]) -> list[Tested]:
@@ -199,12 +196,21 @@ def _cell(value: float | None) -> str:
     return html.number(value, 3) if value is not None and np.isfinite(value) else html.NOTHING
 
 
-def _column(key: str) -> str:
-    unit, name = "deg" if key in ANGLES else unit_of(key), bare(covariate_phrase(key))
-    return f"{name} ({unit})" if unit else name
+def best_of(tested: Sequence[Tested]) -> list[Tested]:
+    """One candidate for each mechanism and covariate, that with the smallest p; the smallest first."""
+    best: dict[tuple[str | None, str], Tested] = {}
+    for each in sorted(tested, key=lambda t: t.p_value):
+        best.setdefault((each.mechanism, each.covariate), each)
+    return list(best.values())
 
 
-def _shown(key: str, value: float | None) -> float | None:
-    if value is not None and key in COUNTS:
-        return float(np.round(value))
-    return float(np.degrees(value)) if value is not None and key in ANGLES else value
+def role_of(trace: Trace, tested: Tested) -> str:
+    """The role of a candidate: "found", "rival" (of the first effect) or ""."""
+    if any((tested.mechanism, tested.covariate) == (e.mechanism, e.covariate) for e in trace.effects):
+        return "found"
+    if not trace.effects:
+        return ""
+    first = trace.effects[0]
+    covariate = tested.covariate in (first.covariate, *trace.equivalent)
+    mechanism = tested.mechanism in (first.mechanism, *trace.mechanisms)
+    return "rival" if covariate and mechanism else ""

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 from push_predictor.evaluation.validation import metrics_json
-from push_predictor.residuals.outcome import CHANNELS, FoundEffect, Gain, Trace
-from push_predictor.residuals.reporting.input_shift import input_shift_json
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
+from push_predictor.residuals.outcome import CHANNELS, FoundEffect, Trace
 
 
 def trace_json(trace: Trace) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def trace_json(trace: Trace) -> dict[str, Any]:
     held_out = trace.held_out
     return {
         "verdict": trace.verdict,
-        "input_shift": input_shift_json(trace),
+        "input_shift": [_shift(shift) for shift in trace.input_shift],
         "effect_present": trace.verdict != "none",
         "channel": CHANNELS[trace.verdict],
         "kind": trace.kind,
@@ -25,15 +25,16 @@ def trace_json(trace: Trace) -> dict[str, Any]:
         "equivalent": list(trace.equivalent),
         "undecided": trace.undecided,
         "motion_model_changed": trace.extended is not None,
-        "effects": [_effect(effect) for effect in trace.effects],
+        "effects": [_effect(effect, trace.weak) for effect in trace.effects],
+        "harmless": [{"mechanism": each.mechanism, "parameter": vars(each.parameter)} for each in trace.harmless],
         "before": metrics_json(held_out.before),
         "refit": metrics_json(held_out.refit),
         "after": metrics_json(held_out.after),
-        "gain": {"nmse": _gain(trace.gain_nmse), "nlpd": _gain(trace.gain_nlpd)},
+        "gain": {"nmse": trace.gain_nmse.json(), "nlpd": trace.gain_nlpd.json()},
         "gain_over": trace.gain_over,
         "minimum_detectable": {name: dict(size) for name, size in trace.minimum_detectable.items()},
         "remaining": {"effect_present": trace.remaining is not None, "strongest": _strongest(trace)},
-        "experiment": [dict(push) for push in trace.experiment],
+        "experiment": [],  # of the contract; advice on further pushes is in words, on the page
         "tested": [vars(tested) for tested in trace.tested],
         "pushes": {"analysis": len(trace.analysis.pushes), "held_out": len(held_out.table.pushes)},
         "held_out_sha256": held_out.digest,
@@ -44,7 +45,7 @@ def trace_json(trace: Trace) -> dict[str, Any]:
     }
 
 
-def _effect(effect: FoundEffect) -> dict[str, Any]:
+def _effect(effect: FoundEffect, weak: bool) -> dict[str, Any]:
     return {
         "mechanism": effect.mechanism,
         "covariate": effect.covariate,
@@ -54,6 +55,7 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
         "p_value": effect.p_value,
         "share_of_residual": effect.share_of_residual,
         "resembles": effect.resembles,
+        "weak": weak,
     }
 
 
@@ -64,5 +66,11 @@ def _strongest(trace: Trace) -> str | None:
     return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
 
 
-def _gain(gain: Gain) -> dict[str, float | None]:
-    return {name: (value if value == value else None) for name, value in vars(gain).items()}
+def _shift(shift: ShiftedInput) -> dict[str, Any]:
+    return {
+        "covariate": shift.covariate,
+        "training": [float(end) for end in shift.training],
+        "now": [float(end) for end in shift.now],
+        "share_outside": float(shift.share_outside),
+        "share_unvisited": float(shift.share_unvisited),
+    }

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Steps 6 to 8: screening, forward selection, rivals, names, and the smallest detectable effect.
+"""Steps 6 to 8: the gate, the search, names, and the smallest detectable effect.
 
-Import `forward_selection`, `power` and `baseline`; only `evidence` and `candidates` are imported here.
+Import `gate`, `search`, `power` and `baseline`; only `evidence` and `candidates` are imported here.
 """

@@ -4,8 +4,7 @@
 """Cross-validated residuals of a base model on its training data: the reference for effects in its own inputs.
 
 A learnt base saw few pushes, so its error is a function of its inputs even where nothing changed. An effect in these
-inputs therefore counts only as the relation in the new data minus the relation in training, uncertain in both. The same
-is true of covariates that share the tracker's noise with the residual.
+inputs therefore counts only as the relation in the new data minus the relation in training, uncertain in both.
 """
 
 from __future__ import annotations
@@ -23,11 +22,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
-from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
+from push_predictor.residuals.evidence.drivers import OF_SESSION
 from push_predictor.residuals.evidence.input_shift import among
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
-from push_predictor.residuals.evidence.instrument import with_instrument
-from push_predictor.residuals.evidence.loading import previous_residual, with_inputs
+from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
 from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, Screened, raw_scores, screen
@@ -49,15 +47,11 @@ class Baseline:
         return np.asarray(self.evidence.z.std(axis=0))
 
     def judges(self, candidate: Candidate) -> bool:
-        """Whether a candidate is always judged against training: it lies in the base's inputs or is local to a push."""
+        """Whether a candidate is always judged against training: it lies in the inputs of a learnt base."""
         if not self._records(candidate.basis):
             return False
         own = candidate.kind == "constant" or (candidate.kind == "speed" and self.inputs.knows_speed)
-        return (own and self.inputs.learnt) or candidate.covariate in LOCAL
-
-    def lacks(self, covariate: str) -> bool:
-        """Whether a covariate is local to a push, and training does not show its relation with the residual."""
-        return covariate in LOCAL and covariate not in self.evidence.table.covariates
+        return own and self.inputs.learnt
 
     def compares(self, candidate: Candidate) -> bool:
         """Whether a candidate may have acted in training too, because its covariate has a value there.
@@ -120,11 +114,9 @@ def baseline_of(model: PushModel, mechanics: FittedMechanics, inputs: Array | No
     inputs (n, 3): of the new windows. If these leave out a part of training's inputs, this part is not compared, as
     long as enough is left: the error of a learnt base depends on the inputs, and the sides of a slider differ.
     """
-    table, predictor = with_instrument(with_inputs(model.training)), model.predictor.with_independent_outputs()
+    table, predictor = with_inputs(model.training), model.predictor.with_independent_outputs()
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
-    before = {"previous_residual": previous_residual(table, evidence.z)}
-    evidence = replace(evidence, table=replace(table, covariates={**table.covariates, **before}))
     rows = np.ones(len(table), dtype=np.bool_) if inputs is None else among(table.inputs, inputs)
     if len(np.unique(table.push_id[rows])) < FEWEST_COMPARED:
         rows[:] = True

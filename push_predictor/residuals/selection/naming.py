@@ -3,125 +3,97 @@
 
 """The name of an effect: which covariates and which mechanisms remain possible, and whether any mechanism fits.
 
-A rival is rejected if the best candidate still explains something after the rival has been regressed out. A mechanism
-is named only if the generic polynomial along the same covariate explains little in addition to it.
+What was tried in place of a term remains possible unless its gain is smaller by more than chance from block to block. A
+mechanism is named only if the generic polynomial along the same covariate gains little in addition to it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
 from scipy.special import ndtri
 
-from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
-from push_predictor.residuals.selection.cross_validation import Judged, fit, gains_of
-from push_predictor.residuals.selection.screening import raw_scores, screen, unit_scores
-from push_predictor.types import Array, IntArray
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.candidates.joint_fit import Fit, standard_error
+from push_predictor.types import Array
 
-REJECTED = 0.01  # p below which a rival is rejected
-UNEXPLAINED = 0.05  # p below which a mechanism fails to explain something along its covariate
+REJECTED = 0.01  # probability that a rival which is rejected is the right one
 MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain
 
 
 @dataclass(frozen=True, eq=False)
+class Trial:
+    """A term tried next to others: the joint fit of all, in which it comes last."""
+
+    candidate: Candidate
+    fit: Fit
+
+    @property
+    def gain(self) -> float:
+        """Log density of blocks that it was not fitted to, up to a constant that all trials share."""
+        return float(self.fit.scores.sum())
+
+
+@dataclass(frozen=True)
 class Naming:
     """Possible covariates and mechanisms of an effect, the best first; known: whether a mechanism of the library fits.
 
-    unexplained: share of the gain along the covariate that only the generic polynomial achieves. resembles: where no
-    mechanism fits, the one that comes closest.
+    resembles: where no mechanism fits, the one that comes closest.
     """
 
-    drivers: tuple[str, ...]
+    covariates: tuple[str, ...]
     mechanisms: tuple[str | None, ...]
     known: bool
-    unexplained: float
     resembles: str | None = None
 
-    @property
-    def undecided(self) -> bool:
-        """Whether several covariates remain possible."""
-        return len(self.drivers) > 1
+
+def naming_of(chosen: Trial, tried: Sequence[Trial], base: Fit) -> Naming:
+    """The names of a chosen term; tried: in its place, next to the others whose fit is `base`."""
+    possible = sorted((t for t in tried if _possible(t, chosen)), key=lambda t: -t.gain)
+    covariates = dict.fromkeys([chosen.candidate.covariate, *(t.candidate.covariate for t in possible)])
+    same = [t.candidate.mechanism for t in possible if t.candidate.covariate == chosen.candidate.covariate]
+    mechanism = chosen.candidate.mechanism
+    if mechanism is None or unexplained_share(chosen, base) > MOST_UNEXPLAINED:
+        closest = [t.candidate.mechanism for t in sorted(tried, key=lambda t: -t.gain) if t.candidate.mechanism]
+        return Naming(tuple(covariates), (None,), False, mechanism or next(iter(closest), None))
+    mechanisms = dict.fromkeys([mechanism, *(name for name in same if name is not None)])
+    return Naming(tuple(covariates), tuple(mechanisms), True)
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
-    """Residuals z (n, 3), the controls (n, m) to regress out, and the block (n,) of every window."""
+def chosen_of(tried: Sequence[Trial]) -> Trial:
+    """The one with the largest gain, or the constant effect of its mechanism where that is not rejected.
 
-    z: Array
-    controls: Array
-    block: IntArray
-
-
-def open_rivals(best: Judged, others: Sequence[Judged], case: Case, seed: int = 0) -> list[Judged]:
-    """The best, and those of the others that these data do not reject."""
-    return [best, *(other for other in others if not _rejected(best, other, case, seed))]
-
-
-def plausible(judged: Judged, case: Case) -> bool:
-    """Whether the fitted size is one that a rig can have; with a larger one a mechanism only mimics another."""
-    candidate, case = judged.candidate, _seen_by(judged, case)
-    if candidate.mechanism is None:
-        return True
-    residualizer = Residualizer(case.controls)
-    coefficients = fit(residualizer(candidate.columns), residualizer(case.z))
-    values = np.ones((len(case.z), 1)) if candidate.values is None else candidate.values
-    values = values - (values.mean(axis=0) if candidate.kind == "driven" and candidate.basis.drivers else 0.0)
-    strength = values @ coefficients.reshape(candidate.response.shape[2], -1).T
-    return mechanism_named(candidate.mechanism).plausible(np.quantile(np.abs(strength), 0.9, axis=0)[None])
-
-
-def surely_larger(one: Judged, other: Judged, level: float = REJECTED) -> bool:
-    """Whether a gain is larger by more than chance from block to block; level: probability of such a chance."""
-    more = Judged(one.candidate, one.gains - other.gains)
-    return more.gain > -float(ndtri(level)) * more.error
-
-
-def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:
-    """Share of the gain along the covariate that only the generic polynomial achieves; 0 if that may be chance."""
-    case = _seen_by(mechanism, case)
-    blocks, columns = _given(mechanism.candidate, generic, case)
-    if _p_value(blocks, columns, seed) > UNEXPLAINED:
-        return 0.0
-    more = max(float(gains_of(blocks.residual, columns, case.block).sum()), 0.0)
-    return more / (more + max(mechanism.gain, np.finfo(float).tiny))
-
-
-def _rejected(best: Judged, other: Judged, case: Case, seed: int) -> bool:
-    """Whether the best still explains something once the other is regressed out.
-
-    Of exact fits, whether the best one's gain is larger by more than chance from block to block.
+    An effect that nothing was seen to change is constant.
     """
-    if best.exact and other.exact:
-        return surely_larger(best, other)
-    blocks, columns = _given(other.candidate, best.candidate, _seen_by(other, case))
-    return _p_value(blocks, columns, seed) <= REJECTED and best.gain > other.gain
+    best = max(tried, key=lambda t: t.gain)
+    same = [t for t in tried if t.candidate.mechanism == best.candidate.mechanism and t.candidate.basis.is_constant]
+    return next((t for t in same if not _rejected(t.fit, best.fit)), best)
 
 
-def _seen_by(judged: Judged, case: Case) -> Case:
-    """The case with the target of an exact fit in place of the residuals."""
-    return case if judged.exact is None else replace(case, z=judged.exact.target)
+def unexplained_share(chosen: Trial, base: Fit) -> float:
+    """Share of the gain along its covariate that only the generic polynomial achieves; 0 if that may be chance."""
+    c, fit = chosen.candidate, chosen.fit
+    generic = candidate(fit.rows.evidence, None, c.covariate, c.basis)
+    more = fit.with_columns(generic.plain) - fit.scores
+    if not surely(more, REJECTED):
+        return 0.0
+    gain = float((fit.scores - base.scores).sum())
+    return float(more.sum()) / (float(more.sum()) + max(gain, 0.0))
 
 
-def _given(first: Candidate, second: Candidate, case: Case) -> tuple[ResidualBlocks, Array]:
-    """The residuals, and the columns (n, 3, p) of the second candidate, with controls and the first regressed out."""
-    residualizer = Residualizer(case.controls)
-    taken = _orthonormal(residualizer(first.columns))
-    columns = residualizer(second.columns)
-    flat = columns.reshape(len(taken), -1)
-    apart = (flat - taken @ (taken.T @ flat)).reshape(columns.shape)
-    return residualizer.blocks(case.z, case.block).orthogonal_to(taken), np.asarray(apart)
+def surely(gains: Array, level: float) -> bool:
+    """Whether a gain (b,) of blocks is larger than zero by more than chance; level: probability of such a chance."""
+    return float(gains.sum()) > -float(ndtri(level)) * standard_error(gains)
 
 
-def _p_value(blocks: ResidualBlocks, columns: Array, seed: int) -> float:
-    scores = unit_scores(*raw_scores(blocks, columns))
-    return float(screen([scores], seed).p_value[0]) if scores.rows.shape[1] else 1.0
+def _possible(other: Trial, chosen: Trial) -> bool:
+    """Whether these data do not reject a rival; that a constant effect changes must gain more than its error."""
+    if chosen.candidate.basis.is_constant and not other.candidate.basis.is_constant:
+        gains = other.fit.scores - chosen.fit.scores
+        return float(gains.sum()) > standard_error(gains)
+    return not _rejected(other.fit, chosen.fit)
 
 
-def _orthonormal(columns: Array) -> Array:
-    """Orthonormal columns (3 n, k) that span columns (n, 3, p)."""
-    left, values, _ = np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False)
-    return np.asarray(left[:, values > 1e-6 * max(values[0], np.finfo(float).tiny)])
+def _rejected(fit: Fit, best: Fit) -> bool:
+    return fit is not best and surely(best.scores - fit.scores, REJECTED)

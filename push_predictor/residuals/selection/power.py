@@ -18,8 +18,8 @@ from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls
 from push_predictor.residuals.evidence.residualizer import sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference
-from push_predictor.residuals.selection.forward_selection import SearchResult
 from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, moments, raw_scores, unit_scores
+from push_predictor.residuals.selection.search import SearchResult
 from push_predictor.types import Array, IntArray
 
 QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %

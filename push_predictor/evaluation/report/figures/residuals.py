@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.predictors.tails import half_widths
@@ -33,15 +34,6 @@ class TimeAxis:
     label: str
 
 
-@dataclass(frozen=True)
-class Trend:
-    """Change of the standardised residual over the whole time, with its 95 % interval from resampling pushes."""
-
-    change: float
-    low: float
-    high: float
-
-
 def time_axis(comparison: Comparison, windows: Sequence[PushWindow] | None) -> TimeAxis:
     """Minutes since the first window if the windows are known, else the number of the push."""
     if windows:
@@ -51,14 +43,17 @@ def time_axis(comparison: Comparison, windows: Sequence[PushWindow] | None) -> T
     return TimeAxis(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "push count")
 
 
-def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
-    """Fit a line to residuals (n,); None for fewer than three pushes or if all have the same time."""
+def trend(place: Array, residual: Array, push_id: np.ndarray) -> Estimate | None:
+    """Change of residuals (n,) over the whole time by a fitted line, with its interval from resampling pushes.
+
+    None for fewer than three pushes or if all have the same time.
+    """
     if len(set(push_id.tolist())) < 3 or not np.ptp(place) > 0.0:
         return None
     change = _change(np.ones((1, len(place))), place, residual)[0]
     draws = _change(push_bootstrap(push_id), place, residual)
     low, high = np.nanquantile(draws, [0.025, 0.975])
-    return Trend(float(change), float(low), float(high))
+    return Estimate(float(change), float(low), float(high))
 
 
 def paint_residuals(figure: Figure, comparison: Comparison, axis: TimeAxis) -> None:
@@ -100,10 +95,10 @@ def _paint_over_time(ax: Axes, axis: TimeAxis, residual: Array, push_id: np.ndar
     ax.set_ylim(-1.05 * reach, 1.05 * reach)
 
 
-def _title(found: Trend | None) -> str:
+def _title(found: Estimate | None) -> str:
     if found is None:
         return "too few pushes for a trend"
-    return f"trend {found.change:+.2f} sd (95 % CI {found.low:+.2f} to {found.high:+.2f})".replace("-", "−")
+    return f"trend {found.value:+.2f} sd (95 % CI {found.low:+.2f} to {found.high:+.2f})".replace("-", "−")
 
 
 def _per_push(place: Array, residual: Array, push_id: np.ndarray) -> tuple[Array, Array]:

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.channels.measurement import gap_responses
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SETTLED
-from push_predictor.residuals.outcome import Gain, Trace
+from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.pushes import (
     Axis,
     Means,
@@ -25,7 +26,7 @@ from push_predictor.residuals.reporting.figures.pushes import (
     recorded_axis,
     titles,
 )
-from push_predictor.residuals.reporting.quantities import estimate
+from push_predictor.residuals.reporting.phrases import interval
 from push_predictor.types import Array, TextArray
 
 NORMAL = "Direction of the contact normal in the world (deg)"
@@ -156,5 +157,5 @@ def _training(before: Values, x: tuple[float, float]) -> tuple[Mark, ...]:
 
 def _bars(kind: str, bins: Means, unit: str, name: str) -> Bars:
     ends = zip(bins.y, bins.low, bins.high, strict=True)
-    shown = [estimate(Gain(float(value), float(low), float(high)), unit) for value, low, high in ends]
+    shown = [interval(Estimate(float(value), float(low), float(high)), unit) for value, low, high in ends]
     return Bars(kind, bins.x, bins.y, bins.low, bins.high, shown, name=name)

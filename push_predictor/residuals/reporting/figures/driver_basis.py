@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.chart import HALF, WIDE, Band, Bars, Cells, Chart, Dots, Line, Mark, limits_of
 from push_predictor.reporting.html import number
-from push_predictor.residuals.outcome import Gain, Trace
+from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import Binned, Rows, Strength, binned, per_push, responses
 from push_predictor.residuals.reporting.figures.pushes import Axis, axis_of, bins_along, push_means, titles
-from push_predictor.residuals.reporting.phrases import capitalised, with_unit
-from push_predictor.residuals.reporting.quantities import estimate, shown_unit
+from push_predictor.residuals.reporting.phrases import capitalised, interval, shown_unit, with_unit
 from push_predictor.types import Array, BoolArray, IntArray
 
 GRID = 400
@@ -128,7 +128,7 @@ def determined(width: Array) -> BoolArray:
 def _bars(kind: str, name: str, bins: Binned, q: int, factor: float, unit: str, aside: float) -> Bars:
     kept = determined(bins.high[:, q] - bins.low[:, q])
     value, low, high = (factor * each[kept, q] for each in (bins.value, bins.low, bins.high))
-    each = [estimate(Gain(*map(float, ends)), unit) for ends in zip(value, low, high, strict=True)]
+    each = [interval(Estimate(*map(float, ends)), unit) for ends in zip(value, low, high, strict=True)]
     return Bars(kind, bins.place[kept] + aside, value, low, high, each, name=name)
 
 

@@ -5,31 +5,34 @@
 
 from __future__ import annotations
 
-from push_predictor.models.effects.effect import Effect
 from push_predictor.reporting import html
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts
 from push_predictor.residuals.reporting.figures.errors import coverage_charts, error_charts
 from push_predictor.residuals.reporting.figures.partial import Rows, Strength, analysis_rows, held_out_rows, strength_of
-from push_predictor.residuals.reporting.figures.shifts import Shifts, course_charts, course_of, shift_charts, shifts_of
-from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, effect_phrase, listed, moved_noun
-from push_predictor.residuals.reporting.quantities import count
-from push_predictor.residuals.reporting.summary import comparisons_of
+from push_predictor.residuals.reporting.phrases import (
+    capitalised,
+    count,
+    covariate_phrase,
+    listed,
+    moved_noun,
+)
 
 BARS = "Bars: 95 % intervals from a bootstrap of pushes."
 
 
 def effect_figures(trace: Trace) -> list[str]:
-    """Each effect against its covariate (against the push angle if it is constant), and its shifts."""
-    if not trace.terms:
+    """Each effect that depends on a covariate, against that."""
+    driven = [effect for effect in trace.terms if effect.basis.drivers]
+    if not driven:
         return []
     analysis, held_out = analysis_rows(trace), _held_out_rows(trace)
-    return [figure for effect in trace.terms for figure in _of_effect(trace, effect, analysis, held_out)]
+    return [_basis_figure(trace, strength_of(effect, trace.analysis), analysis, held_out) for effect in driven]
 
 
 def error_figure(trace: Trace) -> list[str]:
     """The error of each held-out push before and after, along the first effect's covariate or the time."""
-    table, shown = trace.held_out.table, comparisons_of(trace)
+    table, shown = trace.held_out.table, trace.comparisons
     if not len(table):
         return []
     shown = [shown[0], shown[-1]]
@@ -41,7 +44,7 @@ def error_figure(trace: Trace) -> list[str]:
 
 def calibration_figures(trace: Trace) -> list[str]:
     """Coverage and PIT before, after the refit and with the effects."""
-    shown = [comparison for comparison in comparisons_of(trace) if len(comparison.observed)]
+    shown = [comparison for comparison in trace.comparisons if len(comparison.observed)]
     if not shown:
         return []
     caption = (
@@ -52,24 +55,6 @@ def calibration_figures(trace: Trace) -> list[str]:
         "bars of a calibrated model, where windows of a push resemble each other."
     )
     return [html.charts([chart for one in shown for chart in coverage_charts(one)], caption, 4)]
-
-
-def _of_effect(trace: Trace, effect: Effect, analysis: Rows, held_out: Rows | None) -> list[str]:
-    """One effect, and its shifts as fitted and as found."""
-    strength = strength_of(effect, trace.analysis)
-    shifts = shifts_of(trace, effect, analysis)
-    later = None if held_out is None else shifts_of(trace, effect, held_out)
-    first = (
-        _basis_figure(trace, strength, analysis, held_out)
-        if effect.basis.drivers
-        else _course_figure(trace, effect, shifts)
-    )
-    caption = (
-        "Does the effect appear where the fit predicts it? Each point is the mean shift observed in windows of similar "
-        "fitted shift, beyond the model and the other effects. Points on the line confirm the fit. Points on a "
-        f"horizontal line would mean no effect. {BARS} {_data_words(trace)}"
-    )
-    return [first, html.charts(shift_charts(shifts, later), caption)]
 
 
 def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> str:
@@ -90,17 +75,6 @@ def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Ro
     )
     caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}{pattern}"
     return html.charts(basis_charts(trace, strength, analysis, held_out), caption)
-
-
-def _course_figure(trace: Trace, effect: Effect, shifts: Shifts) -> str:
-    course = course_of(effect, trace.model.rig.outline, shifts.rows)
-    axis = f"{course.label[:1].lower()}{course.label[1:]}"
-    groups = " Colours: thirds of the edge or sector, counter-clockwise." if len(course.groups) > 1 else ""
-    caption = (
-        f"Shift by {effect_phrase(effect.mechanism, effect.covariate)}, against {axis}, at the most common speed and "
-        f"duration.{groups} Lines: fitted, with 95 % bands. Points: observed. {BARS} {_data_words(trace)}"
-    )
-    return html.charts(course_charts(shifts, course), caption)
 
 
 def _held_out_rows(trace: Trace) -> Rows | None:

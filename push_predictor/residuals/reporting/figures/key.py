@@ -22,7 +22,7 @@ from push_predictor.residuals.reporting.figures.channels import (
 )
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts
 from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
-from push_predictor.residuals.reporting.quantities import count
+from push_predictor.residuals.reporting.phrases import count
 
 EFFECT = "Each grey dot is one push: the size of the effect that this push alone shows."
 MAP = "The background is the fitted map. Each dot is one push, in the colour of the effect that this push alone shows."

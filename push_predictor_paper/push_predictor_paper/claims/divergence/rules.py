@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.divergence import gaussian_kl, kl_of_mean, printed_kl
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.section import Verdict
+from push_predictor_paper.statistics.divergence import gaussian_kl, kl_of_mean, printed_kl
 from push_predictor_paper.statistics.grid_maps import Statistic, block_weights, mean_of, median_of
 
 TOO_WIDE, TOO_NARROW = 0.95, 2.42  # KL of three outputs with exact means and sds twice, or half, the true ones

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.evaluation.divergence import expected_kl, gaussian_kl
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor_paper.claims.divergence.models import Found, Training, all_divergences, slow_windows
 from push_predictor_paper.claims.divergence.rules import (
@@ -28,6 +27,7 @@ from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.figures.divergence import NAMES, paint_divergence
 from push_predictor_paper.fits.fit import KINDS
 from push_predictor_paper.section import Finding, Section
+from push_predictor_paper.statistics.divergence import expected_kl, gaussian_kl
 from push_predictor_paper.statistics.grid_maps import BLOCK, block_weights, in_degrees, mean_of, median_of
 from push_predictor_paper.study import Study
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from push_predictor_paper.statistics.divergence import expected_kl, gaussian_kl, kl_of_mean, printed_kl
 from scipy.integrate import quad
-
-from push_predictor.evaluation.divergence import expected_kl, gaussian_kl, kl_of_mean, printed_kl
 
 ZERO, ONE = np.zeros(1), np.ones(1)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The figure of the README: predicted sd, recorded sd, and ellipses with outcomes."""
+"""The overview figure of the demo: predicted sd, recorded sd, and ellipses with outcomes."""
 
 from __future__ import annotations
 

@@ -1,0 +1,79 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The gate: whether anything in the residuals is more than chance, judged over all candidates at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import get_args
+
+from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.baseline import Baseline, difference, raised
+from push_predictor.residuals.selection.screening import Scores, Screened, raw_scores, screen, unit_scores
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Gate:
+    """Screens candidates on residuals of these windows.
+
+    inputs: the model's inputs, which are regressed out. baseline: cross-validated training residuals, against which
+    effects in a learnt base's own inputs are judged; without it they are judged against zero.
+    """
+
+    evidence: Evidence
+    candidates: tuple[Candidate, ...]
+    inputs: InputsBasis
+    alpha: float
+    seed: int = 0
+    baseline: Baseline | None = None
+
+    def screened(self, z: Array) -> Screened:
+        """Statistic and family-wise p of all candidates on residuals z (n, 3).
+
+        An effect that a fixed property of the rig may have caused in training, too, has the p of its difference.
+        """
+        blocks = {kind: out.blocks(z, self.evidence.block) for kind, out in self._residualizers.items()}
+        # Many candidates share one array of nuisance columns: each is projected off only once.
+        groups = {(c.kind, id(c.nuisance)): c for c in self.candidates}
+        apart = {key: blocks[c.kind].orthogonal_to(c.nuisance) for key, c in groups.items()}
+        each = [apart[c.kind, id(c.nuisance)] for c in self.candidates]
+        scores = [self._scores(c, own) for c, own in zip(self.candidates, each, strict=True)]
+        return self._against_training(screen(scores, self.seed), each)
+
+    @cached_property
+    def _residualizers(self) -> dict[Kind, Residualizer]:
+        return {kind: Residualizer(controls_for(kind, self.inputs)) for kind in get_args(Kind)}
+
+    @cached_property
+    def _training(self) -> dict[int, tuple[Scores, Array]]:
+        """Scores in training, by id of the candidates that are judged against it."""
+        if self.baseline is None:
+            return {}
+        return {id(c): self.baseline.scores(c) for c in self.candidates if self.baseline.judges(c)}
+
+    def _against_training(self, screened: Screened, blocks: Sequence[ResidualBlocks]) -> Screened:
+        """Raise p of effects of fixed rig properties to that of their difference from training, all at once."""
+        baseline, candidates = self.baseline, self.candidates
+        if baseline is None:
+            return screened
+        found = [k for k, c in enumerate(candidates) if screened.p_value[k] <= self.alpha and baseline.compares(c)]
+        changes = {k: difference(self._raw(candidates[k], blocks[k]), baseline.scores(candidates[k])) for k in found}
+        compared = raised(screened, changes, self.seed)
+        return replace(compared, unchanged=tuple(k for k in found if compared.p_value[k] > self.alpha))
+
+    def _scores(self, candidate: Candidate, blocks: ResidualBlocks) -> Scores:
+        """Scores of these blocks, then of those in training (zero if the candidate is not judged against it)."""
+        raw = self._raw(candidate, blocks)
+        if id(candidate) in self._training:
+            return difference(raw, self._training[id(candidate)])
+        return unit_scores(*raw).padded(next((len(scores.rows) for scores, _ in self._training.values()), 0))
+
+    def _raw(self, candidate: Candidate, blocks: ResidualBlocks) -> tuple[Scores, Array]:
+        return raw_scores(blocks, self._residualizers[candidate.kind](candidate.columns))

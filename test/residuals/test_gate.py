@@ -1,0 +1,106 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The gate lets a change since training pass, and neither chance nor a fixed property of the rig."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from search_bench import gate_of, in_library
+from square_session import COUNT, DRIVERS, EXACT, FOUR, RIG, baseline, learnt, linear, pushes, seen, with_effect
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.selection.gate import Gate
+
+ALPHA = 0.01
+OWN_SIDES = DriverBasis("constant"), 0.003, -0.002  # a centre of friction off the middle
+Label = tuple[str | None, str]
+
+
+@pytest.fixture(autouse=True)
+def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computing responses takes most of the time."""
+    in_library(monkeypatch, *FOUR)
+
+
+def gate(model: PushModel, table: PushTable) -> Gate:
+    return gate_of(model, seen(model, table), DRIVERS, ALPHA, baseline=baseline(model))
+
+
+def p_values(gate: Gate) -> dict[Label, float]:
+    """The smallest p value of each label."""
+    found: dict[Label, float] = {}
+    screened = gate.screened(gate.evidence.z)
+    for candidate, p in zip(gate.candidates, screened.p_value.tolist(), strict=True):
+        found[candidate.label] = min(p, found.get(candidate.label, 1.0))
+    return found
+
+
+@pytest.mark.parametrize("seed", [500, 501])
+def test_nothing_passes_without_an_effect(seed: int) -> None:
+    for model in (learnt(), EXACT):
+        assert min(p_values(gate(model, pushes(COUNT, seed))).values()) > ALPHA
+
+
+def test_an_effect_passes_with_its_covariate_and_those_of_others_do_not() -> None:
+    plain = pushes(COUNT, 502)
+    table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.1)
+    passed = {label for label, p in p_values(gate(learnt(), table)).items() if p <= ALPHA}
+    assert ("contact_friction", "slider_x") in passed
+    assert {covariate for _, covariate in passed} == {"slider_x"}
+
+
+def test_nothing_passes_on_what_an_effect_leaves() -> None:
+    plain = pushes(COUNT, 502)
+    changed = gate(learnt(), with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.1))
+    left = changed.screened(seen(learnt(), plain).z)
+    assert left.p_value.min() > ALPHA
+
+
+@pytest.fixture(scope="module")
+def one_sided() -> PushModel:
+    """A model that folds the sides of a slider whose sides differ."""
+    table, options = with_effect(pushes(COUNT, 2), "centre_of_friction", *OWN_SIDES), TrainingOptions(mean="zero")
+    return train_model(table, RIG, "gp", name="folds", options=options)
+
+
+def test_a_property_that_the_rig_had_in_training_too_does_not_pass(one_sided: PushModel) -> None:
+    again = gate(one_sided, with_effect(pushes(COUNT, 3), "centre_of_friction", *OWN_SIDES))
+    screened = again.screened(again.evidence.z)
+    assert screened.p_value.min() > ALPHA
+    unchanged = {again.candidates[k].label for k in screened.unchanged}
+    assert ("centre_of_friction", "edge") in unchanged
+    alone = replace(again, baseline=None).screened(again.evidence.z)
+    assert alone.p_value.min() <= ALPHA and not alone.unchanged
+
+
+def test_the_opposite_of_that_property_passes(one_sided: PushModel) -> None:
+    basis, x, y = OWN_SIDES
+    other = with_effect(pushes(COUNT, 3), "centre_of_friction", basis, -x, -y)
+    assert p_values(gate(one_sided, other))["centre_of_friction", "edge"] <= ALPHA
+
+
+def test_an_error_in_a_learnt_models_own_inputs_is_judged_against_training() -> None:
+    """Few pushes teach a model its inputs only so well; a new session shows the same error."""
+    few = train_model(pushes(25, 4), RIG, "gp", name="few", options=TrainingOptions(mean="zero"))
+    found = gate(few, pushes(COUNT, 5))
+    own = [k for k, c in enumerate(found.candidates) if c.kind == "constant"]
+    assert own and found.screened(found.evidence.z).p_value[own].min() > ALPHA
+
+
+def test_a_constant_change_of_a_learnt_model_passes() -> None:
+    table = with_effect(pushes(COUNT, 503), "contact_friction", DriverBasis("constant"), 0.12)
+    assert p_values(gate(learnt(), table))["contact_friction", "model_inputs"] <= ALPHA
+
+
+def test_p_values_of_one_seed_are_the_same_again() -> None:
+    made = gate(EXACT, pushes(COUNT, 504))
+    z = made.evidence.z
+    np.testing.assert_array_equal(made.screened(z).p_value, made.screened(z).p_value)
+    assert not np.array_equal(made.screened(z).p_value, replace(made, seed=1).screened(z).p_value)

@@ -1,0 +1,65 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects on the variance: found as such, and not as effects on the mean."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from search_bench import in_library
+from square_session import COUNT, FOUR, MECHANICS, NOISE, RIG, baseline, learnt, pushes, searched, seen
+
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.channels.variance import variance_effects
+
+
+@pytest.fixture(autouse=True)
+def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computing responses takes most of the time."""
+    in_library(monkeypatch, *FOUR)
+
+
+def louder_to_the_right(n: int, seed: int) -> PushTable:
+    """Pushes whose noise grows with the place along x."""
+    table = pushes(n, seed)
+    clean = MECHANICS.displacement(table.inputs, table.duration)
+    factor = np.exp(0.5 * table.covariates["slider_x"] / 0.03)
+    return replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
+
+
+class TestVariance:
+    @pytest.mark.slow
+    def test_variance_that_grows_with_a_covariate_is_not_a_mean_effect(self) -> None:
+        louder = louder_to_the_right(COUNT, 400)
+        found = searched(learnt(), louder)
+        evidence = seen(learnt(), louder)
+        noise = variance_effects(learnt(), evidence, found.unexplained, 0.01, baseline=baseline(learnt()))
+        assert not found.terms
+        assert noise.found[0].covariate == "slider_x"
+        assert noise.found[0].ratio > 2.0
+
+    @pytest.mark.slow
+    def test_variance_that_grew_with_the_covariate_in_training_too_is_not_reported(self) -> None:
+        model = train_model(
+            louder_to_the_right(COUNT, 403), RIG, "gp", name="uneven", options=TrainingOptions(mean="zero")
+        )
+        evidence = seen(model, louder_to_the_right(COUNT, 404))
+        assert not variance_effects(model, evidence, evidence.z, 0.01, baseline=baseline(model)).found
+        alone = variance_effects(model, evidence, evidence.z, 0.01).found
+        assert [effect.covariate for effect in alone] == ["slider_x"]
+
+    def test_variance_as_in_training_is_not_reported(self) -> None:
+        table = pushes(COUNT, 401)
+        evidence = seen(learnt(), table)
+        assert not variance_effects(learnt(), evidence, evidence.z, 0.01, baseline=baseline(learnt())).found
+
+    def test_larger_variance_than_in_training_is_reported_as_constant(self) -> None:
+        table = pushes(COUNT, 402, noise=2.0 * NOISE)
+        evidence = seen(learnt(), table)
+        noise = variance_effects(learnt(), evidence, evidence.z, 0.01, baseline=baseline(learnt())).found
+        assert noise[0].covariate == "model_inputs"
+        assert noise[0].ratio == pytest.approx(2.0, rel=0.25)
