@@ -28,7 +28,7 @@ from push_predictor.models.mechanics.fit import fit_jointly, held_out_residuals
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import mechanics_on
 from push_predictor.models.mechanics.ladder import candidates
-from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.parameters import BY_NAME, QUASI_STATIC
 from push_predictor.models.predictors import GaussianProcessPredictor, Scaling
 from push_predictor.models.predictors.correlation import MOST_BLOCKS, fit_correlation
 from push_predictor.models.predictors.tails import fit_tails
@@ -45,7 +45,6 @@ CONSTANT = 1e-9  # a feature whose range is below this fraction of its size coun
 # Lengthscale of a residual's mean, in standard deviations of the inputs. Windows of one push are close to each other
 # and deviate together: with shorter ones a regression learns the push.
 SHORTEST_OF_RESIDUAL = 0.7
-QUASI_STATIC = 0.06  # m/s: below, inertia moves a slider by less than 2 % of its path, and costs two thirds of the time
 ONE_SPEED = 1.2  # ratio of speeds up to which they count as one
 EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by less
 

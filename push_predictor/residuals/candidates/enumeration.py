@@ -13,6 +13,7 @@ import numpy as np
 from push_predictor.models.effects.covariates import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.ladder import all_supports_known
+from push_predictor.models.mechanics.parameters import QUASI_STATIC
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.nuisance import Nuisance
@@ -65,9 +66,11 @@ def confounded(evidence: Evidence, names: Sequence[str] | None, inputs: InputsBa
 
 
 def usable(evidence: Evidence) -> list[str | None]:
-    """The mechanisms whose needs are recorded, and None for the generic polynomial."""
+    """The mechanisms whose needs are recorded and that can act at these speeds, and None for the generic polynomial."""
     recorded = evidence.table.covariates
-    return [*(m.name for m in LIBRARY if all(need in recorded for need in m.needs)), None]
+    slow = float(evidence.table.inputs[:, 0].max()) < QUASI_STATIC
+    found = (m.name for m in LIBRARY if all(need in recorded for need in m.needs))
+    return [*(name for name in found if not (slow and name == "inertia")), None]
 
 
 def constant_refinements(evidence: Evidence) -> dict[str | None, str]:

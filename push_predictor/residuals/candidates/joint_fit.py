@@ -203,14 +203,23 @@ def best_place(fit: Fit, step: Candidate) -> float:
     always = replace(fit.effects[-1], basis=DriverBasis("constant"))
     shifts = [_linearised(rows, effects, fit.weight, fit.scale).shift for effects in (others, (*others, always))]
     n = len(shifts[0])
-    without, with_it = (_density((rows.z[:n] - shift) / fit.scale) for shift in shifts)
+    target = (fit.clear.residual / fit.clear.root)[:n] + fit.shift  # without what the controls express
+    without, with_it = (_density((target - shift) / fit.scale) for shift in shifts)
     values = np.asarray(rows.evidence.table.covariates[step.covariate])
-    group = push_order(rows.evidence.table) if step.covariate in CUMULATIVE else values
+    group = _first_of_push(rows.evidence, values) if step.covariate in CUMULATIVE else values
     _, number = np.unique(group, return_inverse=True)
     gain = np.bincount(number, rows.share[:n] * (with_it - without))
     after = np.cumsum(gain[::-1])[::-1]  # of a step between the group before and this one
     k = 1 + int(np.argmax(after[1:]))
     return float(0.5 * (values[number < k].max() + values[number >= k].min()))
+
+
+def _first_of_push(evidence: Evidence, values: Array) -> Array:
+    """The smallest of the values (n,) of each window's push."""
+    push = push_order(evidence.table)
+    first = np.full(push.max() + 1, np.inf)
+    np.minimum.at(first, push, values)
+    return np.asarray(first[push])
 
 
 def standard_error(gains: Array) -> float:

@@ -154,7 +154,7 @@ def _rows(model: PushModel, evidence: Evidence, baseline: Baseline, inputs: Inpu
 
 def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseline: Baseline) -> tuple[MotionTerm, ...]:
     fit, total = found.fit, float(np.sum(evidence.z**2))
-    explained = 1.0 - float(np.sum(found.unexplained**2)) / total
+    explained = max(1.0 - float(np.sum(found.unexplained**2)) / total, 0.0)
     gains = [max(term.gain, 0.0) for term in found.terms]
     changed = _changed(found, inputs, baseline)
     terms = [
@@ -192,7 +192,7 @@ def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> li
     if not found.terms or inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
         return [inputs.learnt] * len(found.terms)
     _, before = baseline.evidence.thinned
-    recorded = [k for k, term in enumerate(found.terms) if _recorded(term.best, before)]
+    recorded = [k for k, t in enumerate(found.terms) if _recorded(t.best, before) and baseline.comparable(t.best.basis)]
     again = [candidate(before, *found.terms[k].best.label, found.terms[k].best.basis) for k in recorded]
     now, then = estimated(found.fit)[0], dict(zip(recorded, estimated(fitted(FitRows(before), again))[0], strict=True))
     return [k in then and _differ(effect, then[k]) for k, effect in enumerate(now)]

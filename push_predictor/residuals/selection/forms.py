@@ -22,6 +22,8 @@ SOON = 0.03  # of the covariate's range: scale of an effect that grows early in 
 
 def forms_of(covariate: str, table: PushTable) -> list[DriverBasis]:
     """Growing from zero at the start, a step at an onset, any line or curve; of a heading periodic; simplest first."""
+    if float(np.ptp(table.covariates[covariate])) == 0.0:  # in the windows of a fit, though not in all
+        return [DriverBasis("constant")]
     if covariate in CATEGORIES:
         levels = tuple(float(level) for level in np.unique(table.covariates[covariate]))
         return [DriverBasis("category", (covariate,), levels=levels, offset=True)]

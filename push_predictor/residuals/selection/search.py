@@ -12,12 +12,13 @@ made wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.ladder import least_gain
@@ -30,9 +31,10 @@ from push_predictor.residuals.selection.naming import Naming, Trial, chosen_of, 
 from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
-MOST_ADDITIONS = 6
+MOST_ADDITIONS = 4
 MOST_MECHANISMS = 4  # of those that the gate let pass, with the largest statistics
-MOST_EXACT = 6  # labels that are fitted exactly, by their gain to first order
+MOST_EXACT = 7  # labels that are fitted exactly, by their gain to first order
+CLOSE = 0.4  # of the best gain to first order: less is not fitted exactly
 MOST_MOVES = 3  # of a step's place
 MOST_ROUNDS = 6  # of moves after an addition
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
@@ -100,7 +102,10 @@ class _Search:
             chosen, fit = self._improved([*chosen, added.candidate], added.fit)
             screened = self.gate.screened(self._unexplained(fit))
         terms = [self._named(chosen[:k] + chosen[k + 1 :], chosen[k]) for k in range(len(chosen))]
-        terms = list({term.best.label: term for term in sorted(terms, key=lambda term: term.gain)}.values())[::-1]
+        largest: dict[Label, Term] = {}
+        for term in sorted(terms, key=lambda term: -term.gain):
+            largest.setdefault(term.best.label, term)
+        terms = list(largest.values())
         fit = self._fit([term.best for term in terms], fit)
         return SearchResult(tuple(terms), fit, self.gate.candidates, first, screened, self._unexplained(fit))
 
@@ -143,9 +148,9 @@ class _Search:
         base, chosen = self._fit(others), Trial(c, self._fit([*others, c]))
         tried = [t for t in self._tried(base, others) if not t.candidate.same_as(c)]
         naming = naming_of(chosen, tried, base)
-        generic = max((t for t in tried if t.candidate.mechanism is None), key=lambda t: t.gain, default=chosen)
-        if not naming.known and generic.gain > chosen.gain:
-            chosen = generic
+        generics = [t for t in tried if t.candidate.mechanism is None and t.candidate.covariate == c.covariate]
+        if not naming.known:
+            chosen = max([chosen, *generics], key=lambda t: t.gain)
         gain = chosen.gain - float(base.scores.sum())
         return Term(chosen.candidate, self._p_value(c), gain, naming)
 
@@ -154,7 +159,7 @@ class _Search:
     def _best(self, base: Fit, others: Sequence[Candidate]) -> Trial | None:
         """What is best added to a fit of the others; a mechanism rather than the generic polynomial."""
         tried = self._tried(base, others)
-        known = [t for t in tried if t.candidate.mechanism is not None and t.gain > base.scores.sum()]
+        known = [t for t in tried if t.candidate.mechanism is not None and self._worthwhile(t.fit, base, bool(others))]
         if not tried:
             return None
         best = chosen_of(known or tried)
@@ -181,19 +186,23 @@ class _Search:
         each = [self._in_best_form(base, *label) for label in self._proposed() if label not in taken]
         return [self._fitted_with(others, c, base) for c in _fitted_exactly(each)]
 
-    def _proposed(self) -> Iterator[Label]:
-        """Every mechanism that passed, constant and with every covariate: an effect that begins early looks constant.
+    def _proposed(self) -> list[Label]:
+        """Every mechanism that passed, constant and with every covariate that passed, or in which it may begin early.
 
         Of mechanics that were not fitted, all parameters may be off, and mimic each other.
         """
         names = list(dict.fromkeys(name for name, _ in self.passed))[:MOST_MECHANISMS]
-        yield from (label for label in self._driven if label[0] in names and self._may_have_changed(label))
-        for mechanism, covariate in self._constants.items():
-            if not self.gate.inputs.learnt or any(mechanism == name for name, _ in self.passed):
-                yield mechanism, covariate
+        along = {*(covariate for _, covariate in self.passed), *CUMULATIVE}
+        driven = [(m, covariate) for m, covariate in self._driven if m in names and covariate in along]
+        constant = [label for label in self._constants.items() if not self.gate.inputs.learnt or label[0] in names]
+        return [label for label in dict.fromkeys([*driven, *constant]) if self._may_have_changed(label)]
 
     def _may_have_changed(self, label: Label) -> bool:
-        return label in self.passed or label not in self.unchanged
+        """Whether training does not show it to the same degree: of a learnt base, constants must pass themselves."""
+        if label in self.passed:
+            return True
+        constant = self._constants.get(label[0]) == label[1]
+        return label not in self.unchanged and not (constant and self.gate.inputs.absorbs)
 
     @cached_property
     def _driven(self) -> list[Label]:
@@ -204,25 +213,30 @@ class _Search:
     def _constants(self) -> dict[str | None, str]:
         """By mechanism, the covariate of its constant effect."""
         found = {c.mechanism: c.covariate for c in self.gate.candidates if c.basis.is_constant}
-        return found if self.gate.inputs.learnt else {**found, **constant_refinements(self.rows.evidence)}
+        return found if self.gate.inputs.learnt or not found else {**found, **constant_refinements(self.rows.evidence)}
 
     def _in_best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
         """The simplest form within a standard error of the best, and its gain, both to first order."""
-        constant = self._constants.get(mechanism) == covariate
-        forms = [DriverBasis("constant")] if constant else forms_of(covariate, self.rows.evidence.table)
-        every = [candidate(self.rows.evidence, mechanism, covariate, basis) for basis in forms]
+        forms = [DriverBasis("constant")] if self._constants.get(mechanism) == covariate else []
+        if (mechanism, covariate) in self._driven:
+            forms += forms_of(covariate, self.rows.evidence.table)
+        every = [self._candidate(mechanism, covariate, basis) for basis in forms]
         scores = [base.with_columns(c.plain) for c in every]
         best = max(scores, key=lambda each: float(each.sum()))
         near = [k for k, each in enumerate(scores) if (best - each).sum() <= standard_error(best - each)]
         k = min(near, key=lambda k: (every[k].plain.shape[2], -scores[k].sum()))
         return float((scores[k] - base.scores).sum()), every[k]
 
+    def _candidate(self, mechanism: str | None, covariate: str, basis: DriverBasis) -> Candidate:
+        own = any(c.own for c in self.gate.candidates if c.covariate == covariate)
+        return replace(candidate(self.rows.evidence, mechanism, covariate, basis), own=own)
+
     def _fitted_with(self, others: Sequence[Candidate], c: Candidate, base: Fit) -> Trial:
         """The candidate fitted next to others; a step is moved to where the effect of its size gains most."""
         trial = Trial(c, self._fit([*others, c], base))
         for k in range(MOST_MOVES if c.basis.name == "step" else 0):
             place = best_place(trial.fit, trial.candidate)
-            moved = candidate(self.rows.evidence, *c.label, replace(c.basis, place=place))
+            moved = self._candidate(*c.label, replace(c.basis, place=place))
             again = Trial(moved, self._fit([*others, moved], trial.fit))
             if k > 0 and again.gain <= trial.gain:  # the first place was only near
                 break
@@ -249,23 +263,27 @@ class _Search:
         return np.asarray(evidence.z - np.einsum("nij,nj->ni", evidence.whitener, both - had))
 
     def _let_pass(self, screened: Screened) -> bool:
-        """Note the labels that pass, the largest statistic first; whether there are any."""
+        """Note the labels that pass, before those of earlier rounds, the largest statistic first; whether any did."""
         order = np.argsort(-screened.statistic, kind="stable").tolist()
-        new = [k for k in order if screened.p_value[k] <= self.gate.alpha]
         self.unchanged |= {self.gate.candidates[k].label for k in screened.unchanged}
-        for k in new:
-            c, p = self.gate.candidates[k], float(screened.p_value[k])
-            self.passed[c.label] = min(p, self.passed.get(c.label, 1.0))
+        new: dict[Label, float] = {}
+        for k in order:
+            label, p = self.gate.candidates[k].label, float(screened.p_value[k])
+            if p <= self.gate.alpha:
+                new[label] = min(p, new.get(label, 1.0))
+        self.passed = {**new, **{label: p for label, p in self.passed.items() if label not in new}}
         return bool(new)
 
     def _p_value(self, c: Candidate) -> float:
-        own = [p for label, p in self.passed.items() if c.mechanism == label[0] or c.covariate == label[1]]
-        return min(own or self.passed.values())
+        """That of the label; else the smallest of its mechanism's labels, or of all."""
+        own = [p for label, p in self.passed.items() if label == c.label]
+        same = [p for (mechanism, _), p in self.passed.items() if mechanism == c.mechanism]
+        return min(own or same or self.passed.values())
 
 
 def _fitted_exactly(each: Sequence[tuple[float, Candidate]]) -> list[Candidate]:
-    """Those with the largest gains to first order, and the best of every mechanism; of generic ones the best alone."""
-    ordered = [c for _, c in sorted(each, key=lambda pair: -pair[0])]
-    known = [c for c in ordered if c.mechanism is not None]
-    first = {c.mechanism: c for c in reversed(ordered)}
-    return [*known[:MOST_EXACT], *(c for c in first.values() if not any(c is one for one in known[:MOST_EXACT]))]
+    """Mechanisms with the largest gains to first order, not far behind the best, and the best generic candidate."""
+    ordered = sorted(each, key=lambda pair: -pair[0])
+    known = [(gain, c) for gain, c in ordered if c.mechanism is not None]
+    near = [c for gain, c in known if gain > CLOSE * known[0][0]]
+    return [*near[:MOST_EXACT], *[c for _, c in ordered if c.mechanism is None][:1]]
