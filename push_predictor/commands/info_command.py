@@ -105,7 +105,7 @@ def _describe_model(path: Path) -> dict[str, object]:
         "covariates": list(model.training.covariates),
         "needs": list(model.needs),
         "defaults": dict(model.defaults),
-        "elapsed_time_origin": model.predictor.session.origin,
+        "time_origin": model.predictor.session.origin,
         "covariate_ranges": {name: [known.low, known.high] for name, known in model.covariate_ranges.items()},
     }
 

@@ -203,7 +203,7 @@ def test_info_list_models_and_repr_state_the_defaults(
     assert "defaults" not in repr(base)
     assert main(["info", str(tmp_path / "m"), "--json", "-"]) == 0
     info = json.loads(capsys.readouterr().out)
-    assert (info["needs"], info["defaults"], info["elapsed_time_origin"]) == ([], {"push_index": 90.0}, TUESDAY)
+    assert (info["needs"], info["defaults"], info["time_origin"]) == ([], {"push_index": 90.0}, TUESDAY)
     registry = ModelRegistry()
     registry.load(tmp_path / "m")
     assert "covariates=-; defaults=push_index 90; " in registry.describe("deployed")

@@ -84,7 +84,7 @@ def test_serves_a_model_that_was_trained_on_no_push(tmp_path):
     few_draws = replace(model.predictor, draws=model.predictor.draws[:2])  # for a table in little time
     save_model(replace(model, predictor=few_draws), tmp_path / "prior.model")
     with hosted_server_of([tmp_path / "prior.model"]) as running:
-        assert "windows=0; covariates=-; duration=any" in running.list().descriptions[0]
+        assert "windows=0; covariates=-; defaults=-; duration=any" in running.list().descriptions[0]
         assert running.push([0.02, 0.1, 0.2], duration=0.7).success
         assert not running.push([0.5, 0.1, 0.2]).in_domain
         answered = prediction_from_response(running.batch(MANY))
@@ -392,6 +392,7 @@ def test_list_models_describes_the_training_data(server, folder):
         "pushes": "20",
         "windows": "60",
         "covariates": "-",
+        "defaults": "-",
         "duration": "0.2",
         "speeds": "20..20 mm/s",
         "mean": "zero",
