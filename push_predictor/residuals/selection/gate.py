@@ -34,12 +34,12 @@ class Gate:
     seed: int = 0
     baseline: Baseline | None = None
 
-    def screened(self, z: Array) -> Screened:
-        """Statistic and family-wise p of all candidates on residuals z (n, 3).
+    def screened(self, z: Array, noise: Array | None = None) -> Screened:
+        """Statistic and family-wise p of all candidates on residuals z (n, 3); noise (n, 3): that of them, z if None.
 
         An effect that a fixed property of the rig may have caused in training, too, has the p of its difference.
         """
-        blocks = {kind: out.blocks(z, self.evidence.block) for kind, out in self._residualizers.items()}
+        blocks = {kind: out.blocks(z, self.evidence.block, noise) for kind, out in self._residualizers.items()}
         # Many candidates share one array of nuisance columns: each is projected off only once.
         groups = {(c.kind, id(c.nuisance)): c for c in self.candidates}
         apart = {key: blocks[c.kind].orthogonal_to(c.nuisance) for key, c in groups.items()}

@@ -25,6 +25,7 @@ from push_predictor.models.mechanics.ladder import least_gain
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import constant_refinements
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, best_place, fitted, standard_error
+from push_predictor.residuals.evidence.standardised import FEWEST_BLOCKS
 from push_predictor.residuals.selection.forms import forms_of
 from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import Naming, Trial, chosen_of, naming_of
@@ -37,6 +38,8 @@ MOST_EXACT = 7  # labels that are fitted exactly, by their gain to first order
 CLOSE = 0.4  # of the best gain to first order: less is not fitted exactly
 MOST_MOVES = 3  # of a step's place
 MOST_ROUNDS = 6  # of moves after an addition
+HOPELESS = 0.5  # p from which nothing can be significant
+OBVIOUS, SURE = 30.0, 3.5  # nats, and standard errors: a few pushes far off gain as much
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 Key = tuple[str | None, str, DriverBasis]
 
@@ -92,7 +95,7 @@ class _Search:
     def found(self) -> SearchResult:
         chosen: list[Candidate] = []
         fit = self._fit(chosen)
-        first = screened = self.gate.screened(self._unexplained(fit))
+        first = screened = self._screened(fit, chosen)
         for _ in range(MOST_ADDITIONS):
             if not self._let_pass(screened):
                 break
@@ -100,7 +103,7 @@ class _Search:
             if added is None or not self._worthwhile(added.fit, fit, bool(chosen)):
                 break
             chosen, fit = self._improved([*chosen, added.candidate], added.fit)
-            screened = self.gate.screened(self._unexplained(fit))
+            screened = self._screened(fit, chosen)
         terms = [self._named(chosen[:k] + chosen[k + 1 :], chosen[k]) for k in range(len(chosen))]
         largest: dict[Label, Term] = {}
         for term in sorted(terms, key=lambda term: -term.gain):
@@ -261,6 +264,28 @@ class _Search:
         both = joint_shift(evidence.mechanics, [*evidence.effects, *fit.effects], evidence.push)
         had = joint_shift(evidence.mechanics, evidence.effects, evidence.push)
         return np.asarray(evidence.z - np.einsum("nij,nj->ni", evidence.whitener, both - had))
+
+    def _screened(self, fit: Fit, chosen: Sequence[Candidate]) -> Screened:
+        """All candidates on what a fit leaves.
+
+        The gate takes this for noise. With few blocks an obvious effect would drown in itself, so the noise is then what
+        the best fit of one leaves.
+        """
+        z = self._unexplained(fit)
+        first, few = self.gate.screened(z), int(self.gate.evidence.block.max()) + 1 < FEWEST_BLOCKS
+        if not few or not self.gate.alpha < first.p_value.min() <= HOPELESS:
+            return first
+        labels = {
+            c.label: p for c, p in zip(self.gate.candidates, first.p_value.tolist(), strict=True) if p <= HOPELESS
+        }
+        best = replace(self, passed=labels)._best(fit, chosen)
+        gains = np.zeros(1) if best is None else best.fit.scores - fit.scores
+        if best is None or gains.sum() < max(OBVIOUS, SURE * standard_error(gains)):
+            return first
+        again, p_value = self.gate.screened(z, self._unexplained(best.fit)), first.p_value.copy()
+        same = [k for k, c in enumerate(self.gate.candidates) if c.label == best.candidate.label]
+        p_value[same] = np.minimum(p_value[same], again.p_value[same])
+        return replace(first, p_value=p_value)
 
     def _let_pass(self, screened: Screened) -> bool:
         """Note the labels that pass, before those of earlier rounds, the largest statistic first; whether any did."""
