@@ -268,8 +268,8 @@ class _Search:
     def _screened(self, fit: Fit, chosen: Sequence[Candidate]) -> Screened:
         """All candidates on what a fit leaves.
 
-        The gate takes this for noise. With few blocks an obvious effect would drown in itself, so the noise is then what
-        the best fit of one leaves.
+        The gate takes this for noise. With few blocks an obvious effect would drown in itself: noise is then what the
+        best fit of one leaves.
         """
         z = self._unexplained(fit)
         first, few = self.gate.screened(z), int(self.gate.evidence.block.max()) + 1 < FEWEST_BLOCKS
