@@ -15,11 +15,12 @@ from synthetic import noisy_pushes, square_rig
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanics.prior import CORRELATION
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import concatenate
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.candidates.joint_fit import CORRELATION, RIDGE, Fit, FitRows, _blocks, estimated, fitted
+from push_predictor.residuals.candidates.joint_fit import RIDGE, Fit, FitRows, _blocks, estimated, fitted
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 

@@ -136,11 +136,6 @@ def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
     return dict(zip(acting.names, acting.changes(acting.columns(push)).T, strict=True))
 
 
-def within_limits(changes: Changes) -> Changes:
-    """Changes of at most the largest that a rig can have."""
-    return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in changes.items()}
-
-
 def covariance_of(effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array]) -> Array:
     """Covariance (m, m) of the coefficients of all effects, in their order; cross: see Predictor."""
     starts = np.cumsum([0, *(len(effect.coefficients) for effect in effects)])

@@ -24,7 +24,7 @@ import numpy as np
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 CORRELATION = 0.5  # of the windows of a push; planning/persistence.py finds 0.45 and more
 NOISE_WINDOWS = 6.0  # independent windows that the prior of the noise variance is worth
@@ -54,6 +54,12 @@ def updated(
     return _Update(mechanics, names, means, rows, length).solved()
 
 
+def window_weights(push: IntArray) -> Array:
+    """Weight (n,) of each window by the number (n,) of its push: m windows of a push count as m / (1 + (m - 1) r)."""
+    windows = np.bincount(push)[push]
+    return np.asarray(1.0 / (1.0 + (windows - 1.0) * CORRELATION))
+
+
 @dataclass(frozen=True, eq=False)
 class _Local:
     """The model about some values: residuals (n, 3), derivatives (n, 3, p), noise (n, 3, 3) for a factor of 1."""
@@ -71,8 +77,7 @@ class _Update:
         table = [BY_NAME[name] for name in names]
         self.low, self.high = np.array([p.low for p in table]), np.array([p.high for p in table])
         self.spread = prior_spreads(names)
-        windows = np.bincount(rows.push)[rows.push]
-        self.weight = 1.0 / (1.0 + (windows - 1.0) * CORRELATION)
+        self.weight = window_weights(rows.push)
         self.travel, self.length = rows.inputs[:, 0] * rows.duration, length
 
     def solved(self) -> ParameterUpdate:

@@ -22,6 +22,7 @@ from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint, joint_shift
+from push_predictor.models.mechanics.prior import window_weights
 from push_predictor.models.predictors import Cross
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
@@ -29,7 +30,6 @@ from push_predictor.residuals.evidence.standardised import Evidence, evidence_sc
 from push_predictor.types import Array, IntArray
 
 DEGREES = 5.0  # of freedom of Student's t: single windows that slip or hit a corner must not decide
-CORRELATION = 0.5  # of the windows of a push, as in models/mechanics/prior.py
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 FOLDS = 5
 MOST_STEPS = 10
@@ -42,10 +42,7 @@ SINGULAR = 1e-12  # of the largest variance; less is rounding
 
 @dataclass(frozen=True, eq=False)
 class FitRows:
-    """n new windows, and under them those of training where there are any, with the controls (N, m) of all.
-
-    z (N, 3): standardised residuals.
-    """
+    """n new windows, and under them those of training where there are any, with the controls (N, m) of all."""
 
     evidence: Evidence
     training: Evidence | None = None
@@ -81,6 +78,11 @@ class FitRows:
         size = c.plain.shape[2]
         found = np.zeros(size) if coefficients is None else coefficients
         return Effect(c.mechanism, c.covariate, c.basis, found, np.zeros((size, size)), self.scale)
+
+    def shift(self, effects: Sequence[Effect]) -> Array:
+        """Standardised shift (n, 3) by effects in addition to those that the model has already."""
+        together = joint_shift(self.evidence.mechanics, [*self.evidence.effects, *effects], self.evidence.push)
+        return np.asarray(np.einsum("nij,nj->ni", self.evidence.whitener, together - self.before))
 
     def padded(self, values: Array) -> Array:
         """Values (n, ...) of the new windows, zero at those of training."""
@@ -201,7 +203,7 @@ def best_place(fit: Fit, step: Candidate) -> float:
     """
     rows, others = fit.rows, fit.effects[:-1]
     always = replace(fit.effects[-1], basis=DriverBasis("constant"))
-    shifts = [_linearised(rows, effects, fit.weight, fit.scale).shift for effects in (others, (*others, always))]
+    shifts = [rows.shift(effects) for effects in (others, (*others, always))]
     n = len(shifts[0])
     target = (fit.clear.residual / fit.clear.root)[:n] + fit.shift  # without what the controls express
     without, with_it = (_density((target - shift) / fit.scale) for shift in shifts)
@@ -309,9 +311,7 @@ def _normal(columns: Array, residual: Array, bend: Array | None = None) -> tuple
 
 
 def _shares(evidence: Evidence) -> Array:
-    push = np.unique(evidence.table.push_id, return_inverse=True)[1]
-    windows = np.bincount(push)[push]
-    return np.asarray(1.0 / (1.0 + (windows - 1.0) * CORRELATION))
+    return window_weights(np.unique(evidence.table.push_id, return_inverse=True)[1])
 
 
 # --- held out --------------------------------------------------------------------------------------------------------

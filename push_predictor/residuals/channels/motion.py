@@ -14,7 +14,6 @@ from scipy.special import chdtrc
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, concatenate
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate
@@ -192,15 +191,14 @@ def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> li
     if not found.terms or inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
         return [inputs.learnt] * len(found.terms)
     _, before = baseline.evidence.thinned
-    recorded = [k for k, t in enumerate(found.terms) if _recorded(t.best, before) and baseline.comparable(t.best.basis)]
+    recorded = [
+        k
+        for k, effect in enumerate(found.fit.effects)
+        if {*effect.needs} <= {*before.table.covariates} and baseline.comparable(effect.basis)
+    ]
     again = [candidate(before, *found.terms[k].best.label, found.terms[k].best.basis) for k in recorded]
     now, then = estimated(found.fit)[0], dict(zip(recorded, estimated(fitted(FitRows(before), again))[0], strict=True))
     return [k in then and _differ(effect, then[k]) for k, effect in enumerate(now)]
-
-
-def _recorded(c: Candidate, evidence: Evidence) -> bool:
-    needs = () if c.mechanism is None else mechanism_named(c.mechanism).needs
-    return {*needs, *c.basis.drivers} <= set(evidence.table.covariates)
 
 
 def _differ(one: Effect, other: Effect) -> bool:

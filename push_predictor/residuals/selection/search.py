@@ -20,7 +20,6 @@ import numpy as np
 
 from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanics.ladder import least_gain
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.enumeration import constant_refinements
@@ -173,9 +172,7 @@ class _Search:
         if c.basis.is_constant:
             return []
         forms = {basis.name: basis for basis in forms_of(c.covariate, self.rows.evidence.table) if not basis.offset}
-        tried = [
-            candidate(self.rows.evidence, *c.label, basis) for basis in forms.values() if basis.name != c.basis.name
-        ]
+        tried = [self._candidate(*c.label, basis) for basis in forms.values() if basis.name != c.basis.name]
         return [self._fitted_with(others, t, base) for t in tried if t.plain.shape[2] <= c.plain.shape[2]]
 
     def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
@@ -258,12 +255,11 @@ class _Search:
 
     def _unexplained(self, fit: Fit) -> Array:
         """Standardised residuals (n, 3) of all windows of the gate, minus the effects."""
-        evidence = self.gate.evidence
-        if not fit.effects:
-            return evidence.z
-        both = joint_shift(evidence.mechanics, [*evidence.effects, *fit.effects], evidence.push)
-        had = joint_shift(evidence.mechanics, evidence.effects, evidence.push)
-        return np.asarray(evidence.z - np.einsum("nij,nj->ni", evidence.whitener, both - had))
+        return np.asarray(self._every.z - self._every.shift(fit.effects)) if fit.effects else self._every.z
+
+    @cached_property
+    def _every(self) -> FitRows:
+        return FitRows(self.gate.evidence)
 
     def _screened(self, fit: Fit, chosen: Sequence[Candidate]) -> Screened:
         """All candidates on what a fit leaves.
