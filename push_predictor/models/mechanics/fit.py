@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParameter, ParameterValues
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParameter
 from push_predictor.types import Array, IntArray
 
 DEGREES = 4.0  # of freedom of Student's t: single windows that slip or hit a corner must not decide
@@ -25,28 +25,15 @@ DIFFERENCE = 0.05  # prior standard deviations
 SHORTENINGS = 6
 
 
-class Displacing(Protocol):
-    """What a fit needs of mechanics: PushMechanics, or changes of the mechanics that a model has."""
-
-    def displacement(
-        self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
-    ) -> Array:
-        """See PushMechanics."""
-
-
 @dataclass(frozen=True, eq=False)
 class FitRows:
-    """Windows for a fit: inputs (n, 3), duration (n,) s, outcomes (n, 3) m, m, rad, push (n,) numbers from 0.
-
-    parameters: by name, those that can be fitted.
-    """
+    """Windows for a fit: inputs (n, 3), duration (n,) s, outcomes (n, 3) m, m, rad, push (n,) numbers from 0."""
 
     inputs: Array
     duration: Array
     outcomes: Array
     push: IntArray
     covariates: Mapping[str, Array] = field(default_factory=dict)
-    parameters: Mapping[str, MechanicsParameter] = field(default_factory=lambda: BY_NAME)
 
     def __post_init__(self) -> None:
         n = len(self.duration)
@@ -62,10 +49,6 @@ class FitRows:
     def pushes(self) -> int:
         """Number of pushes."""
         return int(self.push.max()) + 1
-
-    def named(self, names: Sequence[str]) -> list[MechanicsParameter]:
-        """The parameters of these names."""
-        return [self.parameters[name] for name in names]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +81,7 @@ class JointFit:
         """Change (pushes, p) of the values when a push is left out of the fit, by a Gauss-Newton step."""
         scaled = self.residuals / self.scale
         weight, bend = student_weights(scaled) / self.scale**2, student_curvature(scaled) / self.scale**2
-        curvature = _curvature(self.jacobian, bend, self.rows.named(self.names))
+        curvature = _curvature(self.jacobian, bend, _parameters(self.names))
         change = np.zeros((self.rows.pushes, len(self.names)))
         for push in range(self.rows.pushes):
             of_push = self.rows.push == push
@@ -110,7 +93,7 @@ class JointFit:
 
 
 def fit_jointly(
-    mechanics: Displacing, rows: FitRows, names: Sequence[str], start: Mapping[str, float] | None = None
+    mechanics: PushMechanics, rows: FitRows, names: Sequence[str], start: Mapping[str, float] | None = None
 ) -> JointFit:
     """Fit the parameters `names` together, from their textbook values or `start`; the others are the textbook's.
 
@@ -118,30 +101,28 @@ def fit_jointly(
     parameters.PARAMETERS, within the plausible ranges, by Gauss-Newton steps that are shortened until they help.
     Deterministic. Raises TrainingError for a name that is no parameter.
     """
-    if unknown := [name for name in names if name not in rows.parameters]:
-        raise TrainingError(
-            f"{unknown[0]!r} is no parameter of the mechanics, give some of {', '.join(rows.parameters)}"
-        )
+    if unknown := [name for name in names if name not in BY_NAME]:
+        raise TrainingError(f"{unknown[0]!r} is no parameter of the mechanics, give some of {', '.join(BY_NAME)}")
     problem = _Problem(mechanics, rows, tuple(names))
-    values = problem.within(np.array([(start or {}).get(name, rows.parameters[name].textbook) for name in names]))
+    values = problem.within(np.array([(start or {}).get(name, BY_NAME[name].textbook) for name in names]))
     return problem.solved(values, problem.residuals(values), None)
 
 
-def refit(mechanics: Displacing, fit: JointFit, names: Sequence[str]) -> JointFit:
+def refit(mechanics: PushMechanics, fit: JointFit, names: Sequence[str]) -> JointFit:
     """Fit some of the parameters of `fit`, and no others, from its values and derivatives, to NEARLY_CONVERGED."""
     columns = [fit.names.index(name) for name in names]
     problem = _Problem(mechanics, fit.rows, tuple(names))
     values = np.array([fit.values[name] for name in names])
-    same = all(fit.values[p.name] == p.textbook for p in fit.rows.named(fit.names) if p.name not in names)
+    same = all(fit.values[p.name] == p.textbook for p in _parameters(fit.names) if p.name not in names)
     residuals = fit.residuals if same else problem.residuals(values)
     return problem.solved(values, residuals, fit.jacobian[:, :, columns], NEARLY_CONVERGED)
 
 
-def with_candidates(mechanics: Displacing, fit: JointFit, candidates: Sequence[str]) -> JointFit:
+def with_candidates(mechanics: PushMechanics, fit: JointFit, candidates: Sequence[str]) -> JointFit:
     """The fit with further parameters at their textbook values, and their derivatives."""
     names = (*fit.names, *candidates)
     problem = _Problem(mechanics, fit.rows, names)
-    values = np.array([*fit.values.values(), *(p.textbook for p in fit.rows.named(candidates))])
+    values = np.array([*fit.values.values(), *(p.textbook for p in _parameters(candidates))])
     added = problem.jacobian(values, fit.residuals, only=candidates)
     return JointFit(
         fit.rows,
@@ -153,13 +134,13 @@ def with_candidates(mechanics: Displacing, fit: JointFit, candidates: Sequence[s
     )
 
 
-def held_out_residuals(mechanics: Displacing, fit: JointFit) -> Array:
+def held_out_residuals(mechanics: PushMechanics, fit: JointFit) -> Array:
     """Residuals (n, 3) of each push under the parameters fitted without it; no parameter moves by more than its prior's
     standard deviation.
 
     The displacement is computed again: where a tip is close to a corner, derivatives hold for tiny changes only.
     """
-    free = fit.rows.named(fit.names)
+    free = _parameters(fit.names)
     spread, low, high = (np.array([getattr(p, field) for p in free]) for field in ("spread", "low", "high"))
     change = np.clip(fit.without_pushes, -spread, spread)
     values = np.clip(np.array(list(fit.values.values())) + change, low, high)[fit.rows.push]
@@ -203,9 +184,9 @@ def _curvature(jacobian: Array, weight: Array, free: Sequence[MechanicsParameter
 class _Problem:
     """Residuals, derivatives and steps of a joint fit."""
 
-    def __init__(self, mechanics: Displacing, rows: FitRows, names: tuple[str, ...]) -> None:
+    def __init__(self, mechanics: PushMechanics, rows: FitRows, names: tuple[str, ...]) -> None:
         self.mechanics, self.rows, self.names = mechanics, rows, names
-        table = rows.named(names)
+        table = _parameters(names)
         self.low, self.high = np.array([p.low for p in table]), np.array([p.high for p in table])
         self.spread, self.textbook = np.array([p.spread for p in table]), np.array([p.textbook for p in table])
 
@@ -263,9 +244,13 @@ class _Problem:
         weight = student_weights(residuals / scale) / scale**2
         pull = self.spread**-2.0 * (self.textbook - values)
         slope = np.einsum("nkp,nk,nk->p", jacobian, weight, residuals) + pull
-        return np.asarray(np.linalg.solve(_curvature(jacobian, weight, self.rows.named(self.names)), slope))
+        return np.asarray(np.linalg.solve(_curvature(jacobian, weight, _parameters(self.names)), slope))
 
     def _objective(self, values: Array, residuals: Array, scale: Array) -> float:
         return float(
             student_loss(residuals / scale).sum() + 0.5 * np.sum(((values - self.textbook) / self.spread) ** 2)
         )
+
+
+def _parameters(names: Sequence[str]) -> list[MechanicsParameter]:
+    return [BY_NAME[name] for name in names]

@@ -5,15 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.models.mechanics.fit import (
-    Displacing,
     FitRows,
     JointFit,
     fit_jointly,
@@ -24,7 +22,7 @@ from push_predictor.models.mechanics.fit import (
     with_candidates,
 )
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.parameters import PARAMETERS
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.types import Array
 from push_predictor.watch import Watch, no_watch
 
@@ -35,9 +33,6 @@ LEAST_GAIN = 0.03  # nats per push and parameter: less is not worth it
 FEWEST_PUSHES = 3  # of a cross-validation
 CLEARLY = 1.0  # standard errors from push to push: the one standard error rule
 REFITTED = 3  # changes with the largest expected gains that are refitted before one is chosen
-
-
-Group: TypeAlias = tuple[str, ...]  # parameters that are added and dropped together
 
 
 @dataclass(frozen=True)
@@ -73,26 +68,10 @@ def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> l
     pair for a while. So where no single parameter helps, the step adds two, or takes one or two in place of one.
     Candidates are all parameters whose covariates the rows have, and that the support and the data can show.
     """
-    return climb_from(
-        mechanics, fit_jointly(mechanics, rows, ()), [(name,) for name in candidates(mechanics, rows)], watch=watch
-    )
-
-
-def climb_from(
-    mechanics: Displacing,
-    start: JointFit,
-    groups: Sequence[Group],
-    accepts: Callable[[Rung], bool] = lambda rung: True,
-    watch: Watch = no_watch,
-) -> list[Rung]:
-    """The rungs of the ladder from a fit on; groups: of parameters, which can be added and dropped.
-
-    Parameters of the start that are in no group stay. accepts: a condition on rungs in addition to the rule.
-    """
-    rungs, rows = [Rung(start)], start.rows
+    rungs, names = [Rung(fit_jointly(mechanics, rows, ()))], candidates(mechanics, rows)
     while len(rungs) <= MOST_STEPS and rows.pushes >= FEWEST_PUSHES:
         watch(f"fit mechanics: step {len(rungs)}", min(0.8, 0.08 * len(rungs)))
-        found = _next(mechanics, rungs[-1].fit, groups, accepts)
+        found = _next(mechanics, rungs[-1].fit, names)
         if found is None:
             break
         rungs.append(found)
@@ -118,36 +97,32 @@ def all_supports_known(mechanics: PushMechanics, covariates: Mapping[str, Array]
     return recording is not None and set(np.unique(recording).tolist()) <= set(mechanics.supports)
 
 
-def _next(
-    mechanics: Displacing, fit: JointFit, groups: Sequence[Group], accepts: Callable[[Rung], bool]
-) -> Rung | None:
+def _next(mechanics: PushMechanics, fit: JointFit, names: Sequence[str]) -> Rung | None:
     """The next rung, None if no change of the free parameters helps."""
-    free = [group for group in groups if set(group) <= set(fit.names)]
-    others = [group for group in groups if group not in free]
-    most = MOST_PARAMETERS + len(set(fit.names) - {name for group in free for name in group})
-    wide = with_candidates(mechanics, fit, [name for group in others for name in group])
+    others = [name for name in names if name not in fit.names]
+    wide = with_candidates(mechanics, fit, others)
     known = CrossValidation(wide)
     now = known.scores(fit.names)
-    for changes in (_single(others), _exchanges(free, others)):
+    for changes in (_single(others), _exchanges([name for name in names if name in fit.names], others)):
         ranked = [Change(c.added, c.dropped, float((now - known.scores(_after(fit, c))).sum())) for c in changes]
         ranked = sorted((c for c in ranked if c.expected > _least(fit, c)), key=lambda c: -c.expected)
         rungs = [_taken(mechanics, fit, wide, change, ranked) for change in ranked[:REFITTED]]
-        if good := [rung for rung in rungs if worthwhile(fit, rung, most) and accepts(rung)]:
+        if good := [rung for rung in rungs if worthwhile(fit, rung)]:
             return max(good, key=lambda rung: rung.gain)
     return None
 
 
-def _single(others: list[Group]) -> Iterator[Change]:
-    return (Change(group) for group in others)
+def _single(others: Sequence[str]) -> Iterator[Change]:
+    return (Change((name,)) for name in others)
 
 
-def _exchanges(free: list[Group], others: list[Group]) -> Iterator[Change]:
-    """Pairs to add, groups to drop, and one or two in place of one."""
-    pairs = [(*first, *second) for first, second in combinations(others, 2)]
+def _exchanges(free: Sequence[str], others: Sequence[str]) -> Iterator[Change]:
+    """Pairs to add, parameters to drop, and one or two in place of one."""
+    pairs = list(combinations(others, 2))
     yield from (Change(pair) for pair in pairs)
-    for group in free:
-        yield Change((), group)
-        yield from (Change(other, group) for other in (*others, *pairs))
+    for name in free:
+        yield Change((), (name,))
+        yield from (Change(other, (name,)) for other in (*((single,) for single in others), *pairs))
 
 
 def _after(fit: JointFit, change: Change) -> tuple[str, ...]:
@@ -165,7 +140,7 @@ def least_gain(pushes: int) -> float:
     return max(LEAST_EVIDENCE, LEAST_GAIN * pushes)
 
 
-def _taken(mechanics: Displacing, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
+def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
     """The rung with a change, refitted."""
     after = refit(mechanics, wide, _after(fit, change))
     gain = held_out_scores(fit) - held_out_scores(after)
@@ -173,15 +148,12 @@ def _taken(mechanics: Displacing, fit: JointFit, wide: JointFit, change: Change,
     return Rung(after, change.added, change.dropped, float(gain.sum()), _error(gain), rivals)
 
 
-def worthwhile(fit: JointFit, rung: Rung, most: int = MOST_PARAMETERS) -> bool:
-    """Whether the gain of a rung after `fit` is large enough and, for more parameters, beyond its standard error.
-
-    most: free parameters that a rung may have.
-    """
+def worthwhile(fit: JointFit, rung: Rung) -> bool:
+    """Whether the gain of a rung after `fit` is large enough and, for more parameters, beyond its standard error."""
     more = len(rung.fit.names) > len(fit.names)
     least = _least(fit, Change(rung.added, rung.dropped))
     clear = CLEARLY * rung.error if more else 0.0
-    return len(rung.fit.names) <= most and rung.gain > max(least, clear)
+    return len(rung.fit.names) <= MOST_PARAMETERS and rung.gain > max(least, clear)
 
 
 def _error(gain: Array) -> float:
@@ -203,7 +175,7 @@ class CrossValidation:
         pushes = fit.rows.pushes
         fold = np.random.default_rng(0).permutation(pushes) % min(FOLDS, pushes)
         self.fold = fold[fit.rows.push]
-        table = fit.rows.named(fit.names)
+        table = [BY_NAME[name] for name in fit.names]
         self._textbook = np.array([parameter.textbook for parameter in table])
         self._prior = np.array([parameter.spread for parameter in table]) ** -2.0
         self._values = np.array([fit.values[name] for name in fit.names])
