@@ -24,7 +24,7 @@ from push_predictor.online import message_buffer
 from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.recordings import samples
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.samples import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
+from push_predictor.recordings.decoder.rules import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
 

@@ -30,7 +30,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.samples import (
+from push_predictor.recordings.decoder.rules import (
     PUSHER,
     SLIDER,
     WRENCH,

@@ -17,7 +17,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.samples import slider_stream
+from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.types import Array
 

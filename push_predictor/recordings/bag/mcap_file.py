@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Iterator
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from mcap.opcode import Opcode
 from mcap.records import MetadataIndex
@@ -27,6 +27,7 @@ from push_predictor.recordings.bag.mcap_records import (
     split,
     unpack_chunk,
 )
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 from push_predictor.recordings.bag.mcap_summary import (
     DATA_END_SIZE,
     Footer,
@@ -37,15 +38,6 @@ from push_predictor.recordings.bag.mcap_summary import (
 )
 
 MOST_NOTES = 50  # a file can have a million damaged records
-
-
-class RawMessage(NamedTuple):
-    """A message as recorded: topic, type (package/msg/Name), log time in ns, CDR bytes."""
-
-    topic: str
-    type: str
-    log_time: int
-    data: bytes
 
 
 class McapFile:
@@ -94,6 +86,10 @@ class McapFile:
                 seen += yield from self._decoded(self._content(stream, place), place, topics, wanted)
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The messages of the given topics."""
+        return gathered(self.messages(topics))
 
     def _content(self, stream: BinaryIO, place: Place) -> Bytes:
         """The records at a place."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
-"""Bias and weight of a force sensor online: estimated from the free motion so far by the code that reads recordings."""
+"""Bias and weight of a force sensor, from the free motion so far: of a recording that is read, from all of it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.online.sensors.portions import set_back
-from push_predictor.online.sensors.posed_wrench import Wrenches
+from push_predictor.recordings.decoder.posed_wrench import Wrenches
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, joined
+from push_predictor.recordings.windows.clock_set import set_back
 from push_predictor.recordings.windows.free_motion import free_motion
 from push_predictor.types import Array
 
@@ -28,7 +28,7 @@ class _Portion(NamedTuple):
     pusher: PoseStream
 
 
-class LiveBias:
+class BiasSoFar:
     """Holds wrenches back until the bias is known, then subtracts it; it is refined while free motion is added.
 
     estimate: None until the tip was free for long enough. problem: why there is no estimate, or no better one.
@@ -57,12 +57,17 @@ class LiveBias:
         """Whether wrenches are held back."""
         return self.estimate is None and self._count > 0
 
-    def put(self, wrench: Wrenches, slider: PoseStream, pusher: PoseStream) -> Wrenches:
-        """The wrenches without bias that are known with these portions; slider and pusher: their new poses."""
+    def put(self, wrench: Wrenches, slider: PoseStream, pusher: PoseStream, last: bool = False) -> Wrenches:
+        """The wrenches without bias that are known with these portions; slider and pusher: their new poses.
+
+        last: no more will come.
+        """
         known_before = self.estimate is not None
         if not self._final:
             self._keep(_Portion(wrench, slider, pusher))
-        if self._rig is not None and self._next <= self._count and not self._final:
+        if self._rig is not None and not self._final and (
+            self._next <= self._count or (last and self._count > 0 and not known_before)
+        ):
             self._attempt(self._rig)
         if self.estimate is None:
             return _joined([wrench], 0)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which topics a recorder subscribes to for the streams of a recording."""
+"""Where the streams are, as topics name them, and which topics contain them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from push_predictor.errors import RequestError
-from push_predictor.recordings.fields.sources import Source
-from push_predictor.recordings.select import STATIC, STREAMS, TF
+from push_predictor.recordings.fields.sources import POSE_TARGET, WRENCH_TARGET, Source
 from push_predictor.recordings.topics import DEFAULT_TOPICS, Topics
 
+TF, STATIC = "/tf", "_static"  # /tf_static belongs to /tf
+STREAMS = {"slider": POSE_TARGET, "pusher": POSE_TARGET, "wrench": WRENCH_TARGET}
 COVARIATE = "covariate"
 POSES = ("slider", "pusher")
 

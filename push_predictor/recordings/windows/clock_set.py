@@ -1,6 +1,6 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
-"""Portions of live streams, joined."""
+"""Whether the clock of a stream was set back: a replay loops, or a simulation was restarted."""
 
 from __future__ import annotations
 
