@@ -41,6 +41,7 @@ class FollowingSubscription:
         self._subscription: Subscription | None = None
         self._profile: tuple[Any, ...] | None = None
         self._last: int | None = None  # number of the last message
+        self._alone = True  # whether there was at most one publisher at the last look
 
     @property
     def reliability(self) -> ReliabilityPolicy | None:
@@ -50,6 +51,8 @@ class FollowingSubscription:
     def publishers(self) -> list[TopicEndpointInfo]:
         """The present publishers of the topic, of any type."""
         found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
+        if (alone := len(found) <= 1) != self._alone:
+            self._alone, self._last = alone, None
         return found
 
     def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
@@ -89,9 +92,9 @@ class FollowingSubscription:
             yield message
 
     def _note_loss(self, number: int) -> None:
-        """Count the messages that are missing between two: a publisher numbers its messages."""
+        """Count the messages that are missing between two; several publishers number theirs independently."""
         last, self._last = self._last, number
-        if last is not None and number > last + 1 and self._node.count_publishers(self.name) == 1:
+        if last is not None and number > last + 1 and self._alone and self._node.count_publishers(self.name) == 1:
             self.lost += number - last - 1
 
 

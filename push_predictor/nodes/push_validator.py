@@ -22,7 +22,7 @@ from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
-from push_predictor.nodes.parameters import declare, values_of
+from push_predictor.nodes.parameters import declare, topics_of, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.validator.finish_service import FinishService
@@ -37,8 +37,6 @@ from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
-from push_predictor.recordings.select import STREAMS
-from push_predictor.recordings.topics import Topics
 
 PERIOD = 0.02  # s between two looks at what has arrived
 
@@ -59,10 +57,7 @@ class PushValidator(Node):
         self._models = ModelSource(self, [values["model"], *values["compare"]])
         self._rigs = RigSource(self, values["rig"])
         self._writer = ResultWriter(values["output"], self.get_logger())
-        given = {name: values[f"{name}_topic"] for name in STREAMS}
-        wrench = {key: values[key] for key in ("wrench_frame", "wrench_bias")}
-        topics = Topics(**given, **wrench, world=values["world_frame"])
-        self._sensors = SensorSubscriber(self, topics, values["frame_id"], values["scalar_topics"])
+        self._sensors = SensorSubscriber(self, topics_of(values))
         self._client = PredictionClient(self, values["request_timeout"])
         self._session = Session(values["last_answers"], values["report"])
         self._status = StatusPublisher(

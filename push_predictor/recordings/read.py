@@ -11,14 +11,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.definitions import POSE
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import POSES, StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
-from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, UNREADABLE
+from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
 from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, STREAMS, TF, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
@@ -33,6 +31,7 @@ FAULTS = {
     UNREADABLE: "messages are not readable CDR",
     NOT_FINITE: "samples contain NaN or infinity",
     NO_ORIENTATION: "samples have no orientation",
+    OTHER_CLOCK: "samples have a stamp over an hour from those of the poses",
     NO_TRANSFORM: "samples outside the time, or in a dropout, of a transform",
 }
 
@@ -69,7 +68,9 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
             raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)})")
     scalars = {_spelling(bag, name): stream for name, stream in samples.scalars.items() if len(stream)}
     notes = [*bag.notes, *notes]
-    return Recording(bag.name, rig, samples.slider, samples.pusher, wrench, scalars, tuple(notes), decoder.wrench.estimate)
+    return Recording(
+        bag.name, rig, samples.slider, samples.pusher, wrench, scalars, tuple(notes), decoder.wrench.estimate
+    )
 
 
 def recorded_rig(bag: Bag) -> Rig | None:
@@ -185,8 +186,8 @@ def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
         notes.append(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
     one, other = ({frame.strip("/") for frame in decoder.poses[name].named} - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
-        frames = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
-        notes.append(f"slider and tip are given in different frames, {frames}; --world-frame turns both into one by tf")
+        both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
+        notes.append(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
     return notes
 
 
@@ -236,7 +237,9 @@ def _turned(bag: Bag, wrench: WrenchInput, label: str, decoder: StreamDecoder) -
             problem = f"{wrench.problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
             raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
         into = wrench.turned_into
-        found = [f"the axes of the wrench are turned from {wrench.frame!r} to {into!r} by tf, its torque is moved to the tip"]
+        found = [
+            f"the axes of the wrench are turned from {wrench.frame!r} to {into!r} by tf, its torque is moved to the tip"
+        ]
     elif not wrench.oriented:
         problem = f"the poses of {tip} have no orientation; give {WORLD_AXES} or a frame in /tf"
         raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)

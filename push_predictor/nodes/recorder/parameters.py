@@ -15,9 +15,8 @@ from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.parameters import Param, declare, values_of
-from push_predictor.online.recorder.recorded_topics import resolved
-from push_predictor.recordings.select import STREAMS
+from push_predictor.nodes.parameters import Param, declare, topics_of, values_of
+from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.topics import Topics, load_topics
 
 PARAMETERS = (
@@ -61,9 +60,7 @@ def read_options(node: Node) -> RecorderOptions:
     declare(node, PARAMETERS)
     values = values_of(node, PARAMETERS)
     bag = _bag(values)
-    slider, pusher, wrench = (values[f"{name}_topic"] for name in STREAMS)
-    covariates, axes, bias = tuple(values["covariate_topics"]), values["wrench_frame"], values["wrench_bias"]
-    given = Topics(slider, pusher, wrench, covariates, values["world_frame"], axes, bias).over(load_topics(bag))
+    given = topics_of(values).over(load_topics(bag))
     topics = resolved(given, lambda topic: _full_name(node, topic))
     return RecorderOptions(
         bag, topics, values["rig"], values["duration"], values["diagnostics_period"], bool(given.wrench)

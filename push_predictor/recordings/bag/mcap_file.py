@@ -27,7 +27,6 @@ from push_predictor.recordings.bag.mcap_records import (
     split,
     unpack_chunk,
 )
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 from push_predictor.recordings.bag.mcap_summary import (
     DATA_END_SIZE,
     Footer,
@@ -36,6 +35,7 @@ from push_predictor.recordings.bag.mcap_summary import (
     read_metadata,
     read_summary,
 )
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
 MOST_NOTES = 50  # a file can have a million damaged records
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from push_predictor.types import IntArray
 
-
 PORTION = 20_000  # single messages that are gathered
 
 

@@ -14,8 +14,8 @@ from contextlib import closing
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 from push_predictor.recordings.bag.mcap_records import UNREADABLE
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
 MAGIC = b"SQLite format 3\0"
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"

@@ -65,8 +65,10 @@ class BiasSoFar:
         known_before = self.estimate is not None
         if not self._final:
             self._keep(_Portion(wrench, slider, pusher))
-        if self._rig is not None and not self._final and (
-            self._next <= self._count or (last and self._count > 0 and not known_before)
+        if (
+            self._rig is not None
+            and not self._final
+            and (self._next <= self._count or (last and self._count > 0 and not known_before))
         ):
             self._attempt(self._rig)
         if self.estimate is None:

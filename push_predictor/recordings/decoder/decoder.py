@@ -17,6 +17,7 @@ import numpy as np
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.rules import (
+    OTHER_CLOCK,
     PUSHER,
     SCALAR,
     SLIDER,
@@ -35,9 +36,10 @@ from push_predictor.recordings.fields.sources import SCALAR_TARGET, TF_TYPES, So
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import Topics
-from push_predictor.types import Array, IntArray
+from push_predictor.types import IntArray
 
 POSES = {"slider": SLIDER, "pusher": PUSHER}
+FAR = 3_600_000_000_000  # ns from the poses' stamps, at which the stamp of a scalar is of another clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +76,11 @@ class StreamDecoder:
             for name, rules in POSES.items()
         }
         self.wrench = WrenchInput(sources["wrench"], topics, first, "" if topics.world else expected)
-        self.scalars = {name_of(source): TopicInput(source, SCALAR_TARGET) for name, source in named if name == COVARIATE}
+        self.scalars = {
+            name_of(source): TopicInput(source, SCALAR_TARGET) for name, source in named if name == COVARIATE
+        }
         self.headless = 0
+        self._span: tuple[int, int] | None = None  # of the stamps (ns) of the last poses
 
     def add_scalar(self, source: Source) -> TopicInput:
         """Decode a further scalar."""
@@ -89,6 +94,10 @@ class StreamDecoder:
     def __len__(self) -> int:
         """How many messages of the sensors wait."""
         return sum(map(len, self.poses.values())) + len(self.wrench.messages)
+
+    def of(self, stream: str) -> PoseTopic | PoseFrame | WrenchInput:
+        """The input of slider, pusher or wrench."""
+        return self.wrench if stream == "wrench" else self.poses[stream]
 
     def begin(self, rig: Rig) -> None:
         """Begin a run: the samples that are taken from now on are of this rig."""
@@ -107,6 +116,8 @@ class StreamDecoder:
     def take(self, last: bool = False) -> Samples:
         """The usable samples that are known with the messages since the last call; last: no more will come."""
         slider, pusher = (self.poses[name].take(last) for name in POSES)
+        for stamp, _ in (slider, pusher):
+            self._span = (int(stamp.min()), int(stamp.max())) if len(stamp) else self._span
         self.headless += int(np.sum(~has_orientation(pusher[1])))
         self.wrench.world, self.wrench.named = self.world, self.named
         wrench = self.wrench.take(slider, pusher, last)
@@ -114,7 +125,7 @@ class StreamDecoder:
 
     def take_scalars(self) -> dict[str, ScalarStream]:
         """The samples of the scalars alone."""
-        return {name: _scalar(each) for name, each in self.scalars.items() if each.kind}
+        return {name: _scalar(each, self._span) for name, each in self.scalars.items() if each.kind}
 
     @property
     def world(self) -> str:
@@ -152,7 +163,11 @@ def _buffers(topics: Topics, sources: Mapping[str, Source], expected: str) -> di
     }
 
 
-def _scalar(each: TopicInput) -> ScalarStream:
+def _scalar(each: TopicInput, span: tuple[int, int] | None) -> ScalarStream:
+    """The usable samples of a scalar; span: of the stamps (ns) of the poses, None if it is not known."""
     columns = each.take()
-    kept = usable({UNREADABLE: ~columns.valid} | broken(columns.values, SCALAR), each.rejected)
+    faults = {UNREADABLE: ~columns.valid} | broken(columns.values, SCALAR)
+    if span is not None:
+        faults[OTHER_CLOCK] = (columns.stamp < span[0] - FAR) | (columns.stamp > span[1] + FAR)
+    kept = usable(faults, each.rejected)
     return ScalarStream(columns.stamp[kept], columns.values[kept, 0])

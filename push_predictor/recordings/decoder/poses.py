@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM, OTHER_FRAME, UNREADABLE, Rules, broken, usable
 from push_predictor.recordings.decoder.topic_input import TopicInput
@@ -17,6 +19,7 @@ from push_predictor.recordings.fields.sources import POSE_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
 from push_predictor.types import Array, IntArray
 
+Names: TypeAlias = NDArray[np.str_]
 WAIT = 2_000_000_000  # ns that a pose in another frame waits for its transform
 
 
@@ -27,14 +30,13 @@ class PoseTopic:
     the frame `expected`, '' for any.
     """
 
-    def __init__(
-        self, name: str, source: Source, rules: Rules, tf: TransformBuffer, world: str, expected: str
-    ) -> None:
+    def __init__(self, name: str, source: Source, rules: Rules, tf: TransformBuffer, world: str, expected: str) -> None:
         self.messages = TopicInput(source, POSE_TARGET)
         self.problem = ""  # why poses are not turned
         self._name, self._rules, self._tf = name, rules, tf
-        self._world, self._expected = world, "" if world else expected
-        self._stamp, self._values, self._frame = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.str_)
+        self._world, self.expected = world, "" if world else expected
+        self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 7))
+        self._frame: Names = np.empty(0, np.str_)
 
     def __len__(self) -> int:
         return len(self.messages) + len(self._stamp)
@@ -64,13 +66,13 @@ class PoseTopic:
         columns = self.messages.take()
         frames = np.array([name.strip("/") for name in columns.frames])[columns.frame]
         faults = {UNREADABLE: ~columns.valid}
-        if self._expected and self.messages.timed:
-            faults[OTHER_FRAME] = frames != self._expected
+        if self.expected and self.messages.timed:
+            faults[OTHER_FRAME] = frames != self.expected
         kept = usable(faults | broken(columns.values, self._rules), self.rejected)
         found = columns.stamp[kept], columns.values[kept]
         return self._turned(*found, frames[kept], last) if self._world else found
 
-    def _turned(self, stamp: IntArray, values: Array, frame: Array, last: bool) -> tuple[IntArray, Array]:
+    def _turned(self, stamp: IntArray, values: Array, frame: Names, last: bool) -> tuple[IntArray, Array]:
         """The poses in the world whose transforms have come; those after one that waits wait as well."""
         stamp, values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
         frame = np.concatenate([self._frame, frame])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from push_predictor.recordings.fields.sources import (
 )
 from push_predictor.types import IntArray
 
+_Recent: TypeAlias = tuple[IntArray, IntArray, frozenset[str]]  # stamps, when they arrived, frames
 LIMIT = 200_000  # live messages that wait: over 13 minutes at 250 Hz
 RECENT = 250  # samples that are kept for the report about a live topic
 
@@ -43,7 +45,7 @@ class TopicInput:
         self._reader: FieldReader | None = None
         self._waiting: list[tuple[Messages, IntArray | None]] = []
         self._decoded: list[Columns] = []
-        self._recent: list[tuple[IntArray, IntArray, frozenset[str]]] = []
+        self._recent: list[_Recent] = []
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
@@ -54,12 +56,16 @@ class TopicInput:
         """Whether messages contain their time, as far as their type is known."""
         return self._reader is not None and self._reader.timed
 
-    def declare(self, kind: str, schemas: Mapping[str, str], where: object) -> None:
-        """State the type of the messages from now on. schemas: {type: definition}; where: the bag in errors.
+    def check(self, kind: str, schemas: Mapping[str, str], where: object = "") -> str:
+        """The field of a type that is read. schemas: {type: definition}; where: the bag in errors, '' for live topics.
 
         Raises RecordingError for a type without what the stream needs.
         """
-        field = field_to_read(self.source, kind, self.target, schemas, where)
+        return field_to_read(self.source, kind, self.target, schemas, where)
+
+    def declare(self, kind: str, schemas: Mapping[str, str], where: object = "") -> None:
+        """State the type of the messages from now on, see `check`."""
+        field = self.check(kind, schemas, where)
         reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas))
         with self._lock:  # messages of an earlier type cannot be read as those of the new one
             self.dropped += sum(len(messages) for messages, _ in self._waiting)
@@ -86,14 +92,18 @@ class TopicInput:
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
         """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
         self._decode()
-        stamp, arrived = (np.concatenate([np.empty(0, np.int64), *of]) for of in ([r[k] for r in self._recent] for k in (0, 1)))
+        stamp, arrived = (
+            np.concatenate([np.empty(0, np.int64), *of]) for of in ([r[k] for r in self._recent] for k in (0, 1))
+        )
         return stamp[-RECENT:], arrived[-RECENT:], frozenset[str]().union(*(frames for _, _, frames in self._recent))
 
     def _decode(self) -> None:
         with self._lock:
             waiting, self._waiting = self._waiting, []
             reader = self._reader
-        for messages, arrived in waiting if reader is not None else ():
+        if reader is None:
+            return
+        for messages, arrived in waiting:
             columns = reader.read(messages)
             self.named |= columns.named
             self._decoded.append(columns)

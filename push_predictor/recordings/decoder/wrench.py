@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from push_predictor.recordings.decoder.bias_so_far import BiasSoFar
@@ -50,7 +52,7 @@ class WrenchInput:
         self.frame = topics.wrench_tf_frame
         self.world, self.named = topics.world, frozenset[str]()
         self._tf = tf
-        self._expected = expected if topics.wrench_axes == WORLD_AXES else ""  # else headers name the sensor's frame
+        self.expected = expected if topics.wrench_axes == WORLD_AXES else ""  # else headers name the sensor's frame
         axes = self._axes_at if self.frame else None
         self._posed = None if topics.wrench_axes == WORLD_AXES else PosedWrench(axes)
         self.bias = BiasSoFar() if topics.wrench_bias == FREE_MOTION else None
@@ -60,9 +62,7 @@ class WrenchInput:
         if self.bias is not None:
             self.bias.begin(rig)
 
-    def take(
-        self, slider: tuple[IntArray, Array], tip: tuple[IntArray, Array], last: bool = False
-    ) -> WrenchStream:
+    def take(self, slider: tuple[IntArray, Array], tip: tuple[IntArray, Array], last: bool = False) -> WrenchStream:
         """The wrenches that are known with these new poses: stamps (n,) ns and poses (n, 7)."""
         found = self._usable()
         if self._posed is not None:
@@ -75,9 +75,9 @@ class WrenchInput:
 
     def _usable(self) -> Wrenches:
         columns = self.messages.take()
-        other = np.array([name.strip("/") != self._expected for name in columns.frames])[columns.frame]
+        other = np.array([name.strip("/") != self.expected for name in columns.frames])[columns.frame]
         faults = {UNREADABLE: ~columns.valid}
-        faults |= {OTHER_FRAME: other} if self._expected and self.messages.timed else {}
+        faults |= {OTHER_FRAME: other} if self.expected and self.messages.timed else {}
         rules = WRENCH if self._posed is None else SPATIAL_WRENCH
         kept = usable(faults | broken(columns.values, rules), self.messages.rejected)
         return Wrenches(columns.stamp[kept], columns.values[kept])
@@ -96,6 +96,21 @@ class WrenchInput:
             self.problem = str(error)
             return np.zeros(len(stamp), np.bool_), np.zeros((0, 7))
         return found
+
+    @property
+    def received(self) -> int:
+        """How many messages there have been."""
+        return self.messages.received
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """Unusable samples, by fault."""
+        return self.messages.rejected
+
+    @property
+    def dropped(self) -> int:
+        """Messages that nobody took in time."""
+        return self.messages.dropped
 
     @property
     def without_pose(self) -> int:
