@@ -110,7 +110,7 @@ class Watched:
 
     def __init__(self, recording: Path, model: Path, output: Path) -> None:
         domain = free_domain()
-        params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "scalar_topics": ASKED}
+        params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "covariate_topics": ASKED}
         with (
             ros_context(domain) as node,
             hosted_node("predict_server", domain=domain, params={"models": [str(model)]}),
