@@ -137,7 +137,7 @@ class McapFile:
 
         The channels, schemas and metadata among the records are stored.
         """
-        seen, found = 0, list[_Found]()
+        seen, found, unwanted = 0, list[_Found](), set[int]()
         try:
             for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
@@ -148,11 +148,13 @@ class McapFile:
                     if of := wanted.get(number):
                         found.append((of, log_time, start + MESSAGE.size, end))
                     else:
-                        self._check_unwanted(number, topics, place.offset)
+                        unwanted.add(number)
                 elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
                     wanted.update(self._descriptions.wanted(topics, [channel]))
         except UNREADABLE as error:
             self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
+        for number in sorted(unwanted):
+            self._check_unwanted(number, topics, place.offset)
         return found, seen
 
     def _unpacked(self, content: Bytes, found: list[_Found], place: Place) -> tuple[Bytes, list[_Found], bool]:
