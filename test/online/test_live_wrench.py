@@ -13,11 +13,11 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab, Message, short_recording
+from push_predictor.online.sensors.live_wrench import LiveWrench
+from push_predictor.online.sensors.transform_buffer import TransformBuffer
 from turning_sensor import add_tip, add_wrench, measured_at_mount, sensor_tf, tip_rows
 
 from push_predictor.online.sensors import live_bias
-from push_predictor.online.sensors.live_wrench import LiveWrench
-from push_predictor.online.sensors.transform_buffer import TransformBuffer
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, decode
 from push_predictor.recordings.fields.pose_rows import normalised
 from push_predictor.recordings.fields.wrench_axes import in_sensor_axes

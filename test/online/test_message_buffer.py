@@ -16,15 +16,15 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from planar_messages import pose_message, wrench_message
+from push_predictor.online.message_buffer import MessageBuffer
 from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
 from push_predictor.nodes.validator import sensor_subscriber
 from push_predictor.online import message_buffer
-from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.recordings import samples
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.decoder.rules import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
+from push_predictor.recordings.read import read_recording
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from push_predictor.online.recorder.sequence_gaps import SequenceGaps
 
 from push_predictor.online.recorder.live_line import LOG_PERIOD, LiveLine
 from push_predictor.online.recorder.live_recording import NO_RIG
 from push_predictor.online.recorder.pace import Pace
 from push_predictor.online.recorder.progress import Progress, StreamFigures
-from push_predictor.online.recorder.sequence_gaps import SequenceGaps
 
 
 def stamps(*seconds: float) -> np.ndarray:

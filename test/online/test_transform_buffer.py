@@ -13,9 +13,9 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab, Message, pose_rows, robot_in_tf, short_recording
+from push_predictor.online.sensors.transform_buffer import NO_TRANSFORM, SET_BACK, TransformBuffer
 
 from push_predictor.online.sensors import transform_buffer
-from push_predictor.online.sensors.transform_buffer import NO_TRANSFORM, SET_BACK, TransformBuffer
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics

@@ -18,6 +18,7 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_messages import pose_message, wrench_message
+from push_predictor.online.message_buffer import MessageBuffer
 from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
@@ -27,9 +28,7 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.planning.slider_pose import WorldPush, slider_after
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.decoder.rules import (
     PUSHER,
     SLIDER,
@@ -39,6 +38,7 @@ from push_predictor.recordings.decoder.rules import (
     slider_stream,
     wrench_stream,
 )
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from replay_bags import stamped
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.online import scalar_buffer, stream_sync
-from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.fields.message_text import STANDARD
 from push_predictor.recordings.fields.sources import SCALAR_TARGET, FieldReader

@@ -13,6 +13,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab, pose_rows, pose_values
+from push_predictor.recordings.fields.world_frame import poses_in_world
 from test_lab_topics import assert_same_windows, original
 from turning_sensor import add_tip, add_wrench, wrench_rows
 
@@ -21,7 +22,6 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, decode, encode
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree
-from push_predictor.recordings.fields.world_frame import poses_in_world
 from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
