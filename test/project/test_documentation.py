@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from push_predictor.nodes.validator.scalar_subscriber import CLOCK
+from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
 from ros_harness import REPOSITORY
 
 import push_predictor
