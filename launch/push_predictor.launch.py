@@ -51,8 +51,8 @@ ARGUMENTS = (
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
     ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
     ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
-    ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
-    ("scalar_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
+    ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
+    ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
     ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
@@ -109,10 +109,10 @@ def _validator(given: dict[str, str]) -> dict[str, Any]:
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
     if given["model"] == SHIPPED:
         paths["model"] = Path(DEFAULT_MODEL[-1]).stem  # its name at predict_server
-    scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
+    scalars = [topic.strip() for topic in given["covariate_topics"].split(",") if topic.strip()]
     bias = {"wrench_bias": given["wrench_bias"]} if given["wrench_bias"] else {}
     found: dict[str, Any] = {**paths, **_streams(given), **bias, **_qos(given)}
-    return {**found, "scalar_topics": scalars} if scalars else found
+    return {**found, "covariate_topics": scalars} if scalars else found
 
 
 def _streams(given: dict[str, str]) -> dict[str, str]:

@@ -79,7 +79,7 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "wrench_frame",
         "wrench_bias",
         "world_frame",
-        "scalar_topics",
+        "covariate_topics",
         "reliability",
         "rviz",
         "rviz_config",
