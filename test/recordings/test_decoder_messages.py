@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
+from decoding import input_of
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,12 +18,14 @@ from planar_messages import pose_message, wrench_message
 from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
-from push_predictor.nodes.validator import sensor_subscriber
-from push_predictor.online import message_buffer
-from push_predictor.online.message_buffer import MessageBuffer
-from push_predictor.recordings import samples
+from push_predictor.recordings.bag.definitions import POSE as POSE_TYPE
+from push_predictor.recordings.bag.definitions import WRENCH as WRENCH_TYPE
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder import topic_input
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
+from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.decoder.rules import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
+from push_predictor.recordings.topics import Topics
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
 
@@ -45,20 +46,33 @@ def wrench(*numbers: float) -> bytes:
     return serialize_message(message)
 
 
-def filled(buffer: MessageBuffer, *messages: bytes) -> MessageBuffer:
-    for message in messages:
-        buffer.put(message)
-    return buffer
+def decoder(expected: str = "world") -> StreamDecoder:
+    """A decoder of the default topics, with their types."""
+    found = StreamDecoder(Topics(), expected)
+    for name, each in found.inputs().items():
+        each.declare((WRENCH_TYPE if name == "wrench" else POSE_TYPE).name, {})
+    return found
+
+
+def filled(found: StreamDecoder, stream: str, *messages: bytes) -> StreamDecoder:
+    own = found.inputs()[stream]
+    input_of(own, own.kind, *messages)
+    return found
+
+
+def taken(stream: str, *messages: bytes) -> Samples:
+    """The samples of messages of one stream."""
+    return filled(decoder(), stream, *messages).take()
 
 
 def test_usable_messages_become_a_stream_in_order():
-    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
-    stream = slider_stream(*buffer.take())
+    found = filled(decoder(), "slider", pose(*GOOD), pose(*GOOD, nanosec=9))
+    stream = found.take().slider
     assert stream.stamp.tolist() == [7_000_000_005, 7_000_000_009]
     assert (stream.x[0], stream.y[0], stream.z[0]) == (0.1, -0.2, 0.03)
     assert stream.heading == pytest.approx([0.6, 0.6])
-    assert buffer.received == 2 and not buffer.rejected
-    assert len(slider_stream(*buffer.take())) == 0
+    assert found.of("slider").received == 2 and not found.of("slider").rejected
+    assert len(found.take()) == 0
 
 
 @given(st.integers(0, 2**31 * 10**9 - 1), st.floats(-10.0, 10.0), st.floats(-20.0, 20.0))
@@ -67,8 +81,7 @@ def test_a_quaternion_and_its_negative_are_the_same_heading(stamp: int, x: float
     negated = pose_message(stamp, x, -x, 0.5 * x, yaw)
     negated.pose.orientation.z *= -1.0
     negated.pose.orientation.w *= -1.0
-    buffer = filled(MessageBuffer(SLIDER, "world"), serialize_message(message), serialize_message(negated))
-    stream = slider_stream(*buffer.take())
+    stream = taken("slider", serialize_message(message), serialize_message(negated)).slider
     assert stream.stamp.tolist() == [stamp, stamp]
     assert (stream.x[0], stream.y[0], stream.z[0]) == (x, -x, 0.5 * x)
     for heading in stream.heading:
@@ -77,8 +90,7 @@ def test_a_quaternion_and_its_negative_are_the_same_heading(stamp: int, x: float
 
 @given(*[st.floats(-10.0, 10.0)] * 3)
 def test_a_wrench_survives_its_message(fx: float, fy: float, torque: float):
-    message = serialize_message(wrench_message(7, fx, fy, torque))
-    stream = wrench_stream(*filled(MessageBuffer(samples.WRENCH, "world"), message).take())
+    stream = taken("wrench", serialize_message(wrench_message(7, fx, fy, torque))).wrench
     assert (stream.stamp[0], stream.fx[0], stream.fy[0], stream.torque[0]) == (7, fx, fy, torque)
 
 
@@ -96,63 +108,97 @@ def test_a_wrench_survives_its_message(fx: float, fy: float, torque: float):
     ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
 )
 def test_an_unusable_slider_pose_is_counted_by_kind_and_the_others_are_used(message: bytes, kind: str):
-    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
-    assert len(buffer.take()[0]) == 2
-    assert dict(buffer.rejected) == {kind: 1}
+    found = filled(decoder(), "slider", pose(*GOOD), message, pose(*GOOD))
+    assert len(found.take().slider) == 2
+    assert dict(found.of("slider").rejected) == {kind: 1}
 
 
 def test_a_message_with_two_faults_is_counted_once():
-    buffer = filled(MessageBuffer(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
-    buffer.take()
-    assert buffer.rejected.total() == 1
+    found = filled(decoder(), "slider", pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
+    found.take()
+    assert found.of("slider").rejected.total() == 1
 
 
-def test_an_empty_frame_id_accepts_any_frame():
-    assert len(filled(MessageBuffer(SLIDER, ""), pose(*GOOD, frame="map"), pose(*GOOD)).take()[0]) == 2
+def test_without_an_expected_frame_any_is_accepted_and_named():
+    found = filled(decoder(expected=""), "slider", pose(*GOOD, frame="/map"), pose(*GOOD))
+    assert len(found.take().slider) == 2 and found.named == {"map", "world"}
 
 
-def test_the_orientation_of_the_tip_is_ignored():
-    stream = pusher_stream(*filled(MessageBuffer(PUSHER, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
-    assert stream.x.tolist() == [0.1]
-    assert len(filled(MessageBuffer(PUSHER, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
+def test_an_expected_frame_may_have_a_slash():
+    assert len(taken("slider", pose(*GOOD, frame="/world")).slider) == 1
+
+
+def test_the_orientation_of_the_tip_is_ignored_and_a_missing_one_is_counted():
+    found = filled(decoder(), "pusher", pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0), pose(*GOOD))
+    stream = found.take().pusher
+    assert stream.x.tolist() == [0.1, 0.1] and stream.heading.tolist() == [0.0, pytest.approx(0.6)]
+    assert found.headless == 1
+    assert len(taken("pusher", pose(math.nan, *GOOD[1:])).pusher) == 0
 
 
 def test_only_the_planar_part_of_a_wrench_must_be_finite():
-    buffer = filled(
-        MessageBuffer(samples.WRENCH, "world"),
+    found = filled(
+        decoder(),
+        "wrench",
         wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
         wrench(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    stream = wrench_stream(*buffer.take())
+    stream = found.take().wrench
     assert (stream.fx.tolist(), stream.fy.tolist(), stream.torque.tolist()) == ([1.0], [2.0], [3.0])
-    assert dict(buffer.rejected) == {"not finite": 1}
+    assert dict(found.of("wrench").rejected) == {"not finite": 1}
 
 
-def test_a_full_buffer_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(message_buffer, "LIMIT", 100)
-    buffer = MessageBuffer(SLIDER, "world")
-    for k in range(305):
-        buffer.put(pose(*GOOD, nanosec=k))
-    assert len(buffer) <= 100 and len(buffer) + buffer.dropped == 305
-    assert len(buffer._sent) == len(buffer)
-    stamp, _ = buffer.take()
+# --- an input --------------------------------------------------------------------------------------------------------
+
+
+def slider_input(*messages: bytes, live: bool = True) -> TopicInput:
+    return input_of(StreamDecoder(Topics()).inputs()["slider"], POSE_TYPE.name, *messages, live=live)
+
+
+def test_a_live_topic_that_nobody_takes_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(topic_input, "LIMIT", 100)
+    own = slider_input(*(pose(*GOOD, nanosec=k) for k in range(305)))
+    assert len(own) == 100 and own.dropped == 205
+    stamp = own.take().stamp
     assert stamp[-1] == 7_000_000_304 and np.all(np.diff(stamp) == 1)
 
 
-def test_a_conversion_applies_to_the_messages_that_come_after_it():
-    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD))
-    buffer.convert_by(lambda messages, sent: [pose(*GOOD, frame="map", nanosec=time) for time in sent], "map")
-    assert len(buffer) == 0 and buffer.dropped == 1 and len(buffer.recent()[0]) == 0
-    for sent in (3, 4):
-        buffer.put(b"of another type", sent, received=10 * sent)
-    stamp, received, frames = buffer.recent()
-    assert (stamp.tolist(), received.tolist(), frames) == ([7_000_000_003, 7_000_000_004], [30, 40], {"map"})
-    assert buffer.take()[0].tolist() == [7_000_000_003, 7_000_000_004] and not buffer.rejected
+def test_decoded_messages_that_nobody_takes_are_dropped_too(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(topic_input, "LIMIT", 100)
+    own = slider_input()
+    for k in range(305):
+        input_of(own, POSE_TYPE.name, pose(*GOOD, nanosec=k))
+        own.recent()
+    assert len(own) == 100 and own.dropped == 205
+    assert own.take().stamp.tolist() == [7_000_000_205 + k for k in range(100)]
 
 
-def test_unreadable_messages_are_not_among_the_recent_ones():
-    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), b"", pose(*GOOD))
-    assert [len(part) for part in buffer.recent()] == [2, 2, 1]
+def test_a_bag_has_no_limit(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(topic_input, "LIMIT", 100)
+    own = slider_input(*(pose(*GOOD, nanosec=k) for k in range(305)), live=False)
+    assert len(own) == 305 and own.dropped == 0
+
+
+def test_another_type_applies_to_the_messages_that_come_after_it():
+    own = slider_input(pose(*GOOD))
+    own.declare("nav_msgs/msg/Odometry", {})
+    assert len(own) == 0 and own.dropped == 1 and len(own.recent()[0]) == 0
+    own.put(Messages.of("slider/pose", POSE_TYPE.name, [3], [pose(*GOOD)]))
+    assert len(own) == 0 and own.foreign == {POSE_TYPE.name: 1} and own.received == 1
+
+
+def test_a_message_without_a_header_is_dated_by_its_sending():
+    own = StreamDecoder(Topics("slider.pose")).inputs()["slider"]
+    input_of(own, "geometry_msgs/msg/PoseWithCovariance", *[b"\0\1\0\0" + bytes(43 * 8)] * 2)
+    assert not own.timed and own.take().stamp.tolist() == [0, 1]
+
+
+def test_the_recent_messages_are_those_that_are_readable_with_their_receipt_and_frames():
+    own = slider_input(pose(*GOOD, nanosec=1), b"", pose(*GOOD, nanosec=2, frame="map"))
+    stamp, received, frames = own.recent()
+    assert (stamp.tolist(), received.tolist()) == ([7_000_000_001, 7_000_000_002], [0, 2])
+    assert frames == {"world", "map"} == own.named
+    assert len(own) == 3 and len(own.take().stamp) == 3, "they wait as before"
 
 
 def test_messages_and_a_bag_of_them_give_the_same_streams(tmp_path: Path):
@@ -165,9 +211,11 @@ def test_messages_and_a_bag_of_them_give_the_same_streams(tmp_path: Path):
     messages += [("/pusher/pose", POSE, START + k, data) for k, data in enumerate(poses)]
     messages += [("/pusher/wrench", WRENCH, START + k, data) for k, data in enumerate(forces)]
     read = read_recording(write_bag(tmp_path / "some.mcap", messages))
-    slider = slider_stream(*filled(MessageBuffer(SLIDER, "world"), *poses).take())
-    tip = pusher_stream(*filled(MessageBuffer(PUSHER, "world"), *poses).take())
-    force = wrench_stream(*filled(MessageBuffer(samples.WRENCH, "world"), *forces).take())
+    found = decoder()
+    for name, of in (("slider", poses), ("pusher", poses), ("wrench", forces)):
+        filled(found, name, *of)
+    samples = found.take()
+    slider, tip, force = samples.slider, samples.pusher, samples.wrench
     for name in ("stamp", "x", "y", "z", "heading"):
         assert np.array_equal(getattr(slider, name), getattr(read.slider, name)), name
     for name in ("stamp", "x", "y", "z", "heading"):
@@ -175,26 +223,3 @@ def test_messages_and_a_bag_of_them_give_the_same_streams(tmp_path: Path):
     assert read.wrench is not None
     for name in ("stamp", "fx", "fy", "torque"):
         assert np.array_equal(getattr(force, name), getattr(read.wrench, name)), name
-
-
-def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(monkeypatch: pytest.MonkeyPatch):
-    now = [100.0]
-    monkeypatch.setattr(sensor_subscriber, "monotonic", lambda: now[0])
-    slider: list[bytes] = []
-    wrench: list[bytes] = []
-    subscriber: Any = SimpleNamespace(_buffers={"slider": slider, "wrench": wrench}, _empty=0.0, _settled=True)
-    subscriber._scalars = SimpleNamespace(waiting=lambda: True)
-    complete = sensor_subscriber.SensorSubscriber.complete
-    assert not complete(subscriber), "no message yet"
-    slider.append(b"pose")
-    now[0] += 0.9
-    assert not complete(subscriber)
-    now[0] += 0.2
-    assert complete(subscriber), "no wrench for a second"
-    wrench.append(b"force")
-    subscriber._empty = now[0]
-    assert complete(subscriber), "messages of every topic"
-    subscriber._settled = False
-    assert not complete(subscriber), "the root of the tree may not be known yet"
-    now[0] += 1.1
-    assert complete(subscriber)
