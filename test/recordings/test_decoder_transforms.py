@@ -44,6 +44,7 @@ def taken(buffer: TransformBuffer, messages: list[Message], frame: str, portion:
     for first in range(0, len(messages), portion):
         put(buffer, messages[first : first + portion])
         parts.append(buffer.take(frame, last=first + portion >= len(messages)))
+        buffer.forget()
     return np.concatenate([stamp for stamp, _ in parts]), np.concatenate([rows for _, rows in parts])
 
 

@@ -121,6 +121,8 @@ class StreamDecoder:
         self.headless += int(np.sum(~has_orientation(pusher[1])))
         self.wrench.world, self.wrench.named = self.world, self.named
         wrench = self.wrench.take(slider, pusher, last)
+        for buffer in self.tf.values():
+            buffer.forget()
         return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars())
 
     def take_scalars(self) -> dict[str, ScalarStream]:
