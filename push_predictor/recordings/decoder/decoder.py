@@ -136,7 +136,9 @@ class StreamDecoder:
 
     @property
     def named(self) -> frozenset[str]:
-        """The frames that the poses name."""
+        """The frames that the poses name, without a given world, into which they are turned."""
+        if self.topics.world:
+            return frozenset({self.topics.world})
         return frozenset(name.strip("/") for pose in self.poses.values() for name in pose.named)
 
 
