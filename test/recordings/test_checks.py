@@ -40,8 +40,8 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.checks.wrench import wrench_findings
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.decoder.rules import slider_stream
+from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.write import write_recording
