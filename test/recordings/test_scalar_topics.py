@@ -197,7 +197,7 @@ def taken(text: str, kind: str, *messages: bytes) -> tuple[ScalarStream, TopicIn
     """The samples of messages of a scalar; its input."""
     decoder, own = decoder_of(text)
     input_of(own, kind, *messages)
-    return decoder.take().scalars[f"/{text.strip('/')}"], own
+    return decoder.take(last=True).scalars[f"/{text.strip('/')}"], own
 
 
 def test_a_number_without_a_header_is_dated_by_its_sending() -> None:
@@ -222,6 +222,13 @@ def test_unusable_messages_are_counted_by_kind() -> None:
     stream, own = taken("warmth", "std_msgs/msg/Float32", numbers[0], b"\0\1", numbers[1])
     assert stream.value.tolist() == [0.5]
     assert dict(own.rejected) == {"unreadable": 1, "not finite": 1}
+
+
+def test_samples_wait_for_the_first_pose_or_the_end() -> None:
+    decoder, own = decoder_of("warmth")
+    input_of(own, "std_msgs/msg/Float64", float64(1.0))
+    assert decoder.take().scalars == {} and decoder.take_scalars() == {} and len(own) == 1
+    assert decoder.take_scalars(last=True)["/warmth"].value.tolist() == [1.0]
 
 
 def test_a_time_over_an_hour_from_the_poses_is_of_another_clock() -> None:

@@ -123,10 +123,12 @@ class StreamDecoder:
         wrench = self.wrench.take(slider, pusher, last)
         for buffer in self.tf.values():
             buffer.forget()
-        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars())
+        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars(last))
 
-    def take_scalars(self) -> dict[str, ScalarStream]:
-        """The samples of the scalars alone."""
+    def take_scalars(self, last: bool = False) -> dict[str, ScalarStream]:
+        """The samples of the scalars alone; they wait for the first pose, which has the right clock."""
+        if self._span is None and not last:
+            return {}
         return {name: _scalar(each, self._span) for name, each in self.scalars.items() if each.kind}
 
     @property
