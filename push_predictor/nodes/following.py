@@ -16,10 +16,10 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from push_predictor.nodes.message_types import message_class
 from push_predictor.nodes.parameters import given_value
 from push_predictor.nodes.polling import PolledGroup, Taken, take_all
 from push_predictor.nodes.qos import DEPTH, common_profile
-from push_predictor.nodes.replay.topics import message_class
 
 
 class FollowingSubscription:

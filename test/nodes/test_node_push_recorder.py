@@ -27,7 +27,6 @@ from std_msgs.msg import Float32, Float64, String
 from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.qos import KEPT
 from push_predictor.nodes.recorder.parameters import PARAMETERS, RecorderOptions, read_options
 from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
 from push_predictor.online.recorder.live_recording import LiveRecording

@@ -32,6 +32,7 @@ from ros_harness import REPOSITORY, call, free_domain, node_environment, node_pr
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
+from push_predictor.nodes.qos import CLOCK
 from push_predictor_interfaces.srv import (
     Burst,
     GetRate,
@@ -79,7 +80,7 @@ class ReplayClient:
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
         node.create_subscription(String, "rig", lambda m: self.rig.append(m.data), LATCHED)
         node.create_subscription(String, "replay_status", lambda m: self.states.append(m.data), LATCHED)
-        node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), 1000)
+        node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), CLOCK)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._report, 100)
 
     def _report(self, message: DiagnosticArray) -> None:
@@ -195,12 +196,8 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
 
 
 def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
-    with replay(second, start=node_process, play__start_paused=True) as (process, client):
+    with replay(second, start=node_process, play__start_paused=True) as (_, client):
         client.wait_for("paused")
-        assert (
-            "626 messages/s recorded, 626 messages/s at rate 1. A free core of this machine plays about"
-            in process.text()
-        )
         begin = time.monotonic()
         service(client, Resume)
         assert wait_until(lambda: client.received == len(push_messages(1.0)))
@@ -208,18 +205,15 @@ def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
         report = client.report("finished")
     assert report["published"] == str(len(push_messages(1.0)))
     assert report["lost"] == "0"
-    for name in ("late", "late_after"):
-        p50, p99, largest = (float(report[f"{name}_{figure}_us"]) for figure in ("p50", "p99", "max"))
-        assert 0.0 < p50 <= p99 <= largest
-    assert float(report["late_p50_us"]) <= float(report["late_after_p50_us"])
+    p50, p99, largest = (float(report[f"late_{figure}_us"]) for figure in ("p50", "p99", "max"))
+    assert 0.0 < p50 <= p99 <= largest
 
 
 def test_too_high_rate_reports_how_far_the_replay_is_behind(tmp_path: Path) -> None:
     messages = push_messages(5.0)
     bag = write_bag(tmp_path / "long.mcap", messages, rig=None)
-    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (process, client):
+    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, client):
         client.wait_for("paused")
-        assert "play.rate 1e+06 is above the limit of this machine" in process.text()
         service(client, Resume)
         report = client.report("finished")
     assert float(report["late_max_us"]) > 2.5e4  # 3125 messages in 5 us of wall time are impossible
@@ -228,7 +222,8 @@ def test_too_high_rate_reports_how_far_the_replay_is_behind(tmp_path: Path) -> N
 
 def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
     end = START + 2 * 10**9
-    with replay(write_bag(tmp_path / "two.mcap", push_messages(2.0))) as (_, client):
+    bag = write_bag(tmp_path / "two.mcap", push_messages(2.0))
+    with replay(bag, play__clock_publish_frequency=40.0) as (_, client):
         client.wait_for("finished")
         assert [json.loads(text) for text in client.rig] == [RIG]
         assert client.states in (["playing", "finished"], ["finished"])
@@ -300,26 +295,6 @@ def test_pause_rate_stop_and_play_again(second: Path) -> None:
         assert wait_until(lambda: client.received == len(push_messages(1.0)) - 313)
 
 
-def test_restamping_adds_one_offset_and_keeps_rate_1(second: Path) -> None:
-    messages = push_messages(1.0)
-    begin = time.time_ns()
-    with replay(second, restamp=True) as (_, client):
-        assert wait_until(lambda: bool(client.states))
-        assert not service(client, SetRate, rate=2.0).success
-        assert service(client, GetRate).rate == 1.0
-        assert client.receive_all("finished") == len(messages)
-    offsets = {
-        stamp(new) - stamp(old) for t in KINDS for new, old in zip(client.raw[t], recorded(messages, t), strict=True)
-    }
-    assert len(offsets) == 1
-    assert begin <= START + offsets.pop() <= time.time_ns()
-    assert all(
-        new[12:] == old[12:]
-        for new, old in zip(client.raw["slider/pose"], recorded(messages, "slider/pose"), strict=True)
-    )
-    assert all(begin <= t <= time.time_ns() for t in client.clock)
-
-
 def test_namespace_and_remapping_move_the_topics(second: Path) -> None:
     with replay(second, "-r", "slider/pose:=/vicon/pose", namespace="/rig1") as (_, client):
         moved: list[bytes] = []
@@ -348,7 +323,7 @@ def test_topics_are_filtered_as_rosbag2_does(second: Path, options: dict[str, An
 
 
 def test_offset_and_duration_select_a_part(second: Path) -> None:
-    options = {"play__start_offset__nsec": 500_000_000, "play__playback_duration": 0.1}
+    options = {"play__start_offset": 0.5, "play__playback_duration": 0.1}
     with replay(second, **options) as (_, client):
         client.receive_all("finished")
         stamps = [stamp(data) for data in client.raw["pusher/wrench"]]
@@ -379,19 +354,16 @@ def test_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
     assert report["published"] == str(len(push_messages(0.2)))
 
 
-def test_qos_follows_override_file_and_parameters(second: Path, tmp_path: Path) -> None:
-    (tmp_path / "qos.yaml").write_text("/slider/pose: {reliability: best_effort, depth: 7}\n")
-    options = {"play__qos_profile_overrides_path": tmp_path / "qos.yaml", "play__start_paused": True}
-    options["wait_for_subscribers"] = 0.0  # a reliable subscriber never matches a best-effort publisher
+def test_qos_follows_parameters(second: Path) -> None:
+    # A reliable subscriber never matches a best-effort publisher.
+    options = {"play__start_paused": True, "wait_for_subscribers": 0.0}
     with replay(second, "-p", "qos_overrides./pusher/pose.publisher.reliability:=best_effort", **options) as (
         _,
         client,
     ):
         client.wait_for("paused")
-        (slider,) = client.node.get_publishers_info_by_topic("/slider/pose")
         (pusher,) = client.node.get_publishers_info_by_topic("/pusher/pose")
         (wrench,) = client.node.get_publishers_info_by_topic("/pusher/wrench")
-    assert slider.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     assert pusher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     assert wrench.qos_profile.reliability == ReliabilityPolicy.RELIABLE
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hosted_nodes import hosted_node
+from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -34,7 +35,6 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
@@ -110,7 +110,13 @@ class Watched:
 
     def __init__(self, recording: Path, model: Path, output: Path) -> None:
         domain = free_domain()
-        params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "scalar_topics": ASKED}
+        params = {
+            "model": model,
+            "output": output,
+            "report": False,
+            "diagnostics_period": 0.2,
+            "covariate_topics": ASKED,
+        }
         with (
             ros_context(domain) as node,
             hosted_node("predict_server", domain=domain, params={"models": [str(model)]}),

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
+from push_predictor.replay.lateness import Delays
 from repository import REPOSITORY
 
 from push_predictor.online import check_process
@@ -24,7 +25,6 @@ from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.replay.lateness import Delays
 from push_predictor.replay.report import ReplayReport
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"

@@ -121,8 +121,7 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     stage.cost = round(0.15 * SECOND)
     assert stage.run() == TENTHS
     assert stage.player.lateness.maximum == pytest.approx(0.45 * SECOND, rel=0.01)
-    assert stage.player.lateness_after.maximum == pytest.approx(0.6 * SECOND, rel=0.01)
-    assert stage.player.lateness.count == stage.player.lateness_after.count == stage.player.published == 10
+    assert stage.player.published == 10
 
 
 def test_each_message_is_prepared_while_the_player_waits_for_it() -> None:

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import MetadataIndex
 
@@ -37,6 +38,7 @@ from push_predictor.recordings.bag.mcap_summary import (
 )
 from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
+_Found: TypeAlias = tuple[tuple[str, str], int, int, int]  # topic and type, log time, first byte, byte after the last
 MOST_NOTES = 50  # a file can have a million damaged records
 
 
@@ -73,6 +75,27 @@ class McapFile:
 
         One chunk at a time is in memory.
         """
+        for content, found, _ in self._contents(topics):
+            view = memoryview(content)
+            for of, time, start, end in found:
+                yield RawMessage(*of, time, view[start:end].tobytes())
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The same of the given topics, a portion for each topic of a chunk."""
+        single: list[RawMessage] = []
+        for content, found, is_chunk in self._contents(topics):
+            if not is_chunk:  # a portion of one message would be slow
+                single += [RawMessage(*of, time, bytes(content[start:end])) for of, time, start, end in found]
+                continue
+            yield from gathered(single)
+            single = []
+            for of in dict.fromkeys(each[0] for each in found):
+                time, start, end = np.array([each[1:] for each in found if each[0] == of], np.uint64).astype(np.int64).T
+                yield Messages(*of, time, content, start, end - start)
+        yield from gathered(single)
+
+    def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, list[_Found], bool]]:
+        """Consecutive records, the wanted messages among them, and whether they are a chunk."""
         wanted = self._descriptions.wanted(topics, self._descriptions.channels.values())
         seen = 0
         chunks: list[int] = []
@@ -83,13 +106,15 @@ class McapFile:
                     break
                 if place.opcode == Opcode.CHUNK:
                     chunks.append(place.offset)
-                seen += yield from self._decoded(self._content(stream, place), place, topics, wanted)
+                content = self._content(stream, place)
+                found, count = self._found(content, place, topics, wanted)
+                seen += count
+                if self._unpack is None:
+                    yield content, found, place.opcode == Opcode.CHUNK
+                else:
+                    yield self._unpacked(content, found, place)
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics."""
-        return gathered(self.messages(topics))
 
     def _content(self, stream: BinaryIO, place: Place) -> Bytes:
         """The records at a place."""
@@ -105,15 +130,14 @@ class McapFile:
             self._note(place.offset, f"a chunk was skipped: {error or type(error).__name__}")
             return b""
 
-    def _decoded(
+    def _found(
         self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
-    ) -> Generator[RawMessage, None, int]:
-        """Yield the wanted messages of consecutive records and return the number of all messages.
+    ) -> tuple[list[_Found], int]:
+        """The wanted messages among consecutive records, and the number of all messages.
 
         The channels, schemas and metadata among the records are stored.
         """
-        seen = unpackable = 0
-        view = memoryview(content)
+        seen, found, unwanted = 0, list[_Found](), set[int]()
         try:
             for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
@@ -121,29 +145,33 @@ class McapFile:
                         raise ValueError(f"a message has {end - start} bytes, its header alone needs {MESSAGE.size}")
                     seen += 1
                     number, _, log_time, _ = MESSAGE.unpack_from(content, start)
-                    if found := wanted.get(number):
-                        data = self._unpacked(view[start + MESSAGE.size : end])
-                        if data is None:
-                            unpackable += 1
-                        else:
-                            yield RawMessage(*found, log_time, data)
+                    if of := wanted.get(number):
+                        found.append((of, log_time, start + MESSAGE.size, end))
                     else:
-                        self._check_unwanted(number, topics, place.offset)
+                        unwanted.add(number)
                 elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
                     wanted.update(self._descriptions.wanted(topics, [channel]))
         except UNREADABLE as error:
             self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
-        if unpackable:
-            self._note(place.offset, f"{unpackable} messages cannot be decompressed and were skipped")
-        return seen
+        for number in sorted(unwanted):
+            self._check_unwanted(number, topics, place.offset)
+        return found, seen
 
-    def _unpacked(self, data: memoryview) -> bytes | None:
-        if self._unpack is None:
-            return data.tobytes()
-        try:
-            return self._unpack(data.tobytes())
-        except UNREADABLE:
-            return None
+    def _unpacked(self, content: Bytes, found: list[_Found], place: Place) -> tuple[Bytes, list[_Found], bool]:
+        """The same with the messages decompressed."""
+        assert self._unpack is not None
+        unpacked, where, undone = bytearray(), list[_Found](), 0
+        for of, time, start, end in found:
+            try:
+                data = self._unpack(bytes(content[start:end]))
+            except UNREADABLE:
+                undone += 1
+            else:
+                where.append((of, time, len(unpacked), len(unpacked) + len(data)))
+                unpacked += data
+        if undone:
+            self._note(place.offset, f"{undone} messages cannot be decompressed and were skipped")
+        return unpacked, where, place.opcode == Opcode.CHUNK
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a message that is wanted but cannot be decoded; others are ignored."""
