@@ -136,8 +136,9 @@ def _full_name(namespace: str, topic: str) -> str:
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
+    clock = {"play.clock_publish_frequency": 40.0} if is_true(given["use_sim_time"]) else {}
     # Without this wait the validator would miss the first pushes.
-    return {**rig, **rate, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
+    return {**rig, **rate, **clock, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
 
 
 def _node(

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from push_predictor.online.recorder.sequence_gaps import SequenceGaps
 
 from push_predictor.online.recorder.live_line import LOG_PERIOD, LiveLine
 from push_predictor.online.recorder.live_recording import NO_RIG
