@@ -50,7 +50,7 @@ ARGUMENTS = (
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
     ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
     ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
-    ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
+    ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
     ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from time import time_ns
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -42,6 +43,7 @@ class FollowingSubscription:
         self._profile: tuple[Any, ...] | None = None
         self._last: int | None = None  # number of the last message
         self._alone = True  # whether there was at most one publisher at the last look
+        self._since = 0  # when their number changed, ns
 
     @property
     def reliability(self) -> ReliabilityPolicy | None:
@@ -52,7 +54,7 @@ class FollowingSubscription:
         """The present publishers of the topic, of any type."""
         found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
         if (alone := len(found) <= 1) != self._alone:
-            self._alone, self._last = alone, None
+            self._alone, self._last, self._since = alone, None, time_ns()
         return found
 
     def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
@@ -88,11 +90,14 @@ class FollowingSubscription:
         if self._subscription is None:
             return
         for message in take_all(self._subscription):
-            self._note_loss(message.number)
+            self._note_loss(message)
             yield message
 
-    def _note_loss(self, number: int) -> None:
+    def _note_loss(self, message: Taken) -> None:
         """Count the messages that are missing between two; several publishers number theirs independently."""
+        if 0 < message.received <= self._since:  # perhaps of one that has left
+            return
+        number = message.number
         last, self._last = self._last, number
         if last is not None and number > last + 1 and self._alone and self._node.count_publishers(self.name) == 1:
             self.lost += number - last - 1

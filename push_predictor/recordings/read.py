@@ -170,6 +170,8 @@ def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
         pose = decoder.poses[name]
         label = _label(bag, pose)
         if isinstance(pose, PoseFrame):
+            if pose.problem and f"no frame {world!r}" in pose.problem and decoder.topics.world:
+                raise _option_error(bag, "world_frame", world, pose.problem)
             if pose.problem:
                 raise pose.source.error(bag.path, pose.problem)
             notes += _notes(label, pose.rejected, Counter())

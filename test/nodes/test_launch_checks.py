@@ -192,7 +192,7 @@ def validator(monkeypatch: pytest.MonkeyPatch, *words: str) -> dict[str, Any]:
 
 
 def test_covariates_are_a_list_of_topics(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = validator(monkeypatch, "scalar_topics:=surface/temperature, /room/humidity,")
+    given = validator(monkeypatch, "covariate_topics:=surface/temperature, /room/humidity,")
     assert given == {"covariate_topics": ["surface/temperature", "/room/humidity"]}
     (row,) = (row for row in PARAMETERS if row.name == "covariate_topics")
     assert row.allows(given["covariate_topics"])

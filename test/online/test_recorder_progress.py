@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from push_predictor.online.recorder.sequence_gaps import SequenceGaps
 
 from push_predictor.online.recorder.live_line import LOG_PERIOD, LiveLine
 from push_predictor.online.recorder.live_recording import NO_RIG
@@ -38,18 +37,6 @@ def test_a_slow_stream_may_be_silent_for_four_periods() -> None:
     slow.add(stamps(0.0, 2.0), 2.0)
     assert fast.silent(3.9) == 0.0 and fast.silent(4.0) == pytest.approx(3.0)
     assert slow.silent(9.9) == 0.0 and slow.silent(10.0) == pytest.approx(8.0)
-
-
-def test_missing_messages_are_counted_for_a_single_publisher() -> None:
-    gaps = SequenceGaps()
-    gaps.set_publishers(1)
-    assert [gaps.missing(number) for number in (7, 8, 11, 12, 3, 4)] == [0, 0, 2, 0, 0, 0]
-    gaps.set_publishers(1)
-    assert gaps.missing(6) == 1
-    gaps.set_publishers(2)
-    assert [gaps.missing(number) for number in (90, 8, 95)] == [0, 0, 0]
-    gaps.set_publishers(1)
-    assert gaps.missing(200) == 0 and gaps.missing(None) == 0 and gaps.missing(300) == 0
 
 
 class Terminal(io.StringIO):

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
-from push_predictor.replay.lateness import Delays
 from repository import REPOSITORY
 
 from push_predictor.online import check_process
@@ -25,7 +24,7 @@ from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.replay.report import ReplayReport
+from push_predictor.replay.report import Delays, ReplayReport
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
 SECOND = 1_000_000_000
@@ -156,7 +155,7 @@ def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -
 def test_a_replay_reports_what_the_check_found() -> None:
     in_time = Delays(0.0, 0.0, 0.0)
     found = {"problems": ["wrong"], "check": "units_rig"}
-    report = ReplayReport("bag", "playing", 1.0, 0, in_time, in_time, 0.0, 0, None, **found)
+    report = ReplayReport("bag", "playing", 1.0, 0, in_time, 0.0, 0, None, **found)
     assert report.warnings == ["wrong"] and report.values["data_check"] == "units_rig"
 
 

@@ -147,7 +147,7 @@ class SensorSubscriber:
         """The scalars since the last sample of a sensor."""
         with self._draining:
             self._scalars.date(last=True)
-        return self.decoder.take_scalars()
+        return self.decoder.take_scalars(last=True)
 
     def inspect(self) -> list[TopicReport]:
         """Make the reports about the topics anew, and return those to log."""

@@ -121,10 +121,14 @@ class StreamDecoder:
         self.headless += int(np.sum(~has_orientation(pusher[1])))
         self.wrench.world, self.wrench.named = self.world, self.named
         wrench = self.wrench.take(slider, pusher, last)
-        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars())
+        for buffer in self.tf.values():
+            buffer.forget()
+        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars(last))
 
-    def take_scalars(self) -> dict[str, ScalarStream]:
-        """The samples of the scalars alone."""
+    def take_scalars(self, last: bool = False) -> dict[str, ScalarStream]:
+        """The samples of the scalars alone; they wait for the first pose, which has the right clock."""
+        if self._span is None and not last:
+            return {}
         return {name: _scalar(each, self._span) for name, each in self.scalars.items() if each.kind}
 
     @property
@@ -134,7 +138,9 @@ class StreamDecoder:
 
     @property
     def named(self) -> frozenset[str]:
-        """The frames that the poses name."""
+        """The frames that the poses name, without a given world, into which they are turned."""
+        if self.topics.world:
+            return frozenset({self.topics.world})
         return frozenset(name.strip("/") for pose in self.poses.values() for name in pose.named)
 
 

@@ -113,7 +113,6 @@ class TransformBuffer:
         except TransformError as error:
             progress.problem = str(error)
             return nothing
-        self._forget()
         return found
 
     def at(self, frame: str, world: str, stamp: IntArray, asks: str, last: bool = False) -> tuple[BoolArray, Array]:
@@ -129,7 +128,6 @@ class TransformBuffer:
         found = tree.poses_at(frame, world, stamp[known])
         pending = [*stamp[~known].tolist(), *reached] or stamp.tolist()
         self._wanted[asks] = min(pending, default=self._wanted[asks])
-        self._forget()
         return known, found
 
     def recent(self, frame: str, count: int) -> IntArray:
@@ -217,11 +215,11 @@ class TransformBuffer:
             progress.rejected[NO_TRANSFORM] += without
         return stamp, rows
 
-    def _forget(self) -> None:
-        """Drop samples that nobody needs any more."""
+    def forget(self) -> None:
+        """Drop samples that nobody needs any more; call it when all have taken, for who has not is not known yet."""
         known = [*(progress.newest for progress in self._progress.values()), *self._wanted.values()]
         newest = [stamp for stamp in known if stamp is not None]
-        if len(newest) < len(known):
+        if not newest or len(newest) < len(known):
             return
         for child, history in self._histories.items():
             needed = [p.done - history.first for p in self._progress.values() if p.leader == child]

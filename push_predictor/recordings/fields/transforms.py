@@ -126,15 +126,16 @@ def read_tree(recorded: Sequence[tuple[Messages, bool]]) -> TransformTree:
     Raises TransformError for a frame with two parents.
     """
     found: dict[str, list[_Part]] = {}
-    unreadable = 0
+    unreadable = begin = 0
     for messages, static in recorded:
         read = 0
         for block in _READERS[messages.type].blocks(messages):
             read += len(block.rows)
             for number in range(len(block.paths("transforms")) // _NUMBERS):
                 for child, part in _parts(block, f"transforms[{number}]", static):
-                    found.setdefault(child, []).append(part)
+                    found.setdefault(child, []).append(part._replace(rows=part.rows + begin))
         unreadable += len(messages) - read
+        begin += len(messages)
     return TransformTree({child: _edge(child, parts) for child, parts in found.items()}, unreadable)
 
 

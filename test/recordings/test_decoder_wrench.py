@@ -1,9 +1,10 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
-"""A live wrench is turned, moved to the tip and freed of its bias as reading a recording of it does."""
+"""A wrench in portions is turned, moved to the tip and freed of its bias as reading a recording of it does."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,20 +13,22 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
+from decoding import decoder_of, in_portions, joined_samples, put
 from lab_bags import Lab, Message, short_recording
-from push_predictor.online.sensors.live_wrench import LiveWrench
-from push_predictor.online.sensors.transform_buffer import TransformBuffer
 from turning_sensor import add_tip, add_wrench, measured_at_mount, sensor_tf, tip_rows
 
-from push_predictor.online.sensors import live_bias
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, decode
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder import bias_so_far
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
+from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.pose_rows import normalised
+from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
 from push_predictor.recordings.fields.wrench_bias import gravity_direction
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import Topics
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 SLIDER, TIP, SENSOR = "/slider", "/tip", "/ft"
 NAMES = Topics(SLIDER, TIP, SENSOR)
@@ -64,37 +67,23 @@ def turned() -> Lab:
 
 
 @cache
-def still(lifts: bool = True) -> list[Message]:
-    """The messages of a sensor along the world's axes, with a bias."""
-    return lab(biased("world"), "world", lifts=lifts).in_order()
+def still(lifts: bool = True) -> Lab:
+    """A sensor along the world's axes, with a bias."""
+    return lab(biased("world"), "world", lifts=lifts)
 
 
-def live(
-    messages: list[Message], topics: Topics, portion: int, world: str = "world"
-) -> tuple[WrenchStream, LiveWrench, list[int]]:
+def live(made: Lab, topics: Topics, *portions: Sequence[Message]) -> tuple[WrenchStream, StreamDecoder, list[int]]:
     """The wrench as it is known after each portion of messages; the number of wrenches after each."""
-    frame = topics.wrench_tf_frame
-    buffer = TransformBuffer([], world, frame) if frame else None
-    found, parts = LiveWrench(topics, buffer), []
-    rig = original().rig
-    assert rig is not None
-    found.begin(rig)
-    for first in range(0, len(messages), portion):
-        now = messages[first : first + portion]
-        for _, topic, data in now:
-            if buffer is not None and topic.startswith("/tf"):
-                buffer.put(data, topic == "/tf_static")
-        parts.append(found.put(*(taken(now, topic) for topic in (SENSOR, SLIDER, TIP))))
-    counts = [len(part) for part in parts]
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in ("stamp", "fx", "fy", "torque")}
-    return WrenchStream(**joined), found, counts
+    decoder, parts = decoder_of(made, topics, rig=original().rig), []
+    for portion in portions:
+        parts.append(taken(decoder, made, portion))
+    return joined_samples(parts).wrench, decoder, [len(part.wrench) for part in parts]
 
 
-def taken(messages: list[Message], topic: str) -> tuple[IntArray, Array]:
-    columns = decode(
-        [data for _, name, data in messages if name == topic], WRENCH_STAMPED if topic == SENSOR else POSE_STAMPED
-    )
-    return columns.stamp, columns.values
+def taken(decoder: StreamDecoder, made: Lab, portion: Sequence[Message] | None = None) -> Samples:
+    """The samples that are known with a portion of messages, of all by default."""
+    put(decoder, made, made.in_order() if portion is None else portion, live=True)
+    return decoder.take()
 
 
 def assert_same(found: WrenchStream, wanted: WrenchStream | None, atol: float = 1e-9) -> None:
@@ -108,13 +97,11 @@ def assert_same(found: WrenchStream, wanted: WrenchStream | None, atol: float = 
 
 @pytest.mark.parametrize(("portion", "world"), [(29, "world"), (400, "map"), (100_000, "world")])
 def test_a_sensor_at_a_frame_of_tf_gives_the_wrench_of_the_recording(tmp_path: Path, portion: int, world: str) -> None:
-    made, topics = (
-        lab(measured_at_mount(wrench(), original().pusher), "ft", True, world),
-        replace(NAMES, wrench_frame="ft"),
-    )
-    found, state, _ = live(made.in_order(), topics, portion)
+    made = lab(measured_at_mount(wrench(), original().pusher), "ft", True, world)
+    topics = replace(NAMES, wrench_frame="ft")
+    found, state, _ = live(made, topics, *in_portions(made.in_order(), portion))
     assert_same(found, read_recording(made.mcap(tmp_path / "lab"), topics=topics).wrench)
-    assert not state.problems and "wrench without pose" not in state.figures()
+    assert not state.wrench.problem and state.wrench.without_pose == 0 and state.wrench.turned_into == world
 
 
 def test_a_sensor_whose_transforms_are_ahead_of_the_tip_waits_for_it(tmp_path: Path) -> None:
@@ -123,34 +110,30 @@ def test_a_sensor_whose_transforms_are_ahead_of_the_tip_waits_for_it(tmp_path: P
     messages = made.in_order()
     tips = [message for message in messages if message[1] == TIP]
     first = [message for message in messages if message[1] != TIP] + tips[: len(tips) // 2]
-    found, _, counts = live([*first, *tips[len(tips) // 2 :]], topics, len(first))
+    found, _, counts = live(made, topics, first, tips[len(tips) // 2 :])
     assert counts[0] > 50 and counts[1] > 50
     assert_same(found, read_recording(made.mcap(tmp_path / "lab"), topics=topics).wrench)
 
 
 def test_a_frame_that_tf_does_not_have_is_named_and_its_wrenches_wait() -> None:
-    messages = turned().in_order()
-    buffer = TransformBuffer([], "world", "other")
-    found = LiveWrench(replace(NAMES, wrench_frame="other"), buffer)
-    assert len(found.put(taken(messages, SENSOR), taken(messages, SLIDER), taken(messages, TIP))) == 0
-    assert buffer.turned_problem == "no frame 'other'; the frames are none"
-    for _, topic, data in messages:
-        if topic.startswith("/tf"):
-            buffer.put(data, topic == "/tf_static")
-    nothing = taken([], SENSOR), taken([], SLIDER), taken([], TIP)
-    found.put(*nothing)
-    assert buffer.turned_problem == "no frame 'other'; the frames are base, ft, tool0, world"
+    messages, transforms = ([m for m in turned().in_order() if m[1].startswith("/tf") is tf] for tf in (False, True))
+    decoder = decoder_of(turned(), replace(NAMES, wrench_frame="other"))
+    assert len(taken(decoder, turned(), messages).wrench) == 0
+    assert decoder.wrench.problem == "no transform has been published"
+    assert len(taken(decoder, turned(), transforms).wrench) == 0
+    assert decoder.wrench.problem == "no frame 'other'; the frames are base, ft, tool0, world"
 
 
 def test_transforms_of_a_sensor_are_forgotten_when_no_wrench_needs_them() -> None:
-    buffer, made, stamps = TransformBuffer([], "world", "ft"), Lab(), np.arange(0, 60 * SECOND, SECOND // 100)
+    buffer, made, stamps = TransformBuffer([]), Lab(), np.arange(0, 60 * SECOND, SECOND // 100)
     rows = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
     made.transform("/tf", "world", "ft", stamps, rows)
-    for number, (_, _, data) in enumerate(made.in_order()):
-        buffer.put(data, False)
+    for number, (sent, topic, data) in enumerate(made.in_order()):
+        buffer.put(Messages.of(topic, TF_TYPES[0], [sent], [data]), static=False)
         if number % 500 == 499:
             at = stamps[max(number - 600, 0) : number + 3 : 50]
-            decided, poses = buffer.at(at)
+            decided, poses = buffer.at("ft", "world", at, "wrench")
+            buffer.forget()
             assert decided.tolist() == (at <= stamps[number]).tolist() and not np.isnan(poses).any()
     assert 500 <= len(buffer._histories["ft"].edge.stamp) < 1700
 
@@ -170,68 +153,65 @@ def biased(frame: str) -> Array:
 def test_the_bias_is_estimated_as_from_a_recording_and_subtracted(tmp_path: Path, frame: str) -> None:
     topics = replace(NAMES, wrench_frame=frame, wrench_bias="free_motion")
     made = lab(biased(frame), "world" if frame == "world" else "ft")
-    found, state, counts = live(made.in_order(), topics, 50)
+    found, state, counts = live(made, topics, *in_portions(made.in_order(), 50))
     read = read_recording(made.mcap(tmp_path / "lab", original().rig), topics=topics)
     assert_same(found, read.wrench, atol=0.1)
     raw = read_recording(tmp_path / "lab", topics=replace(topics, wrench_bias="none")).wrench
     assert raw is not None and np.abs(raw.fx[: len(found)] - found.fx).max() > 0.4
     first = int(np.flatnonzero(counts)[0])
     assert first > 5 and counts[first] > 100, "held back, then all at once"
-    bias, text = state._bias, str(state.figures()["wrench bias"])  # type: ignore[attr-defined]
-    assert text.startswith("the bias (") and "s of free motion" in text and not state.problems
-    assert bias.estimate.force[:2] == pytest.approx(read.wrench_bias.force[:2], abs=0.06)  # type: ignore[union-attr]
+    estimate, bias = state.wrench.estimate, state.wrench.bias
+    assert estimate is not None and read.wrench_bias is not None and bias is not None and not bias.problem
+    assert estimate.to_text().startswith("the bias (") and "s of free motion" in estimate.to_text()
+    assert estimate.force[:2] == pytest.approx(read.wrench_bias.force[:2], abs=0.06)
 
 
 def test_with_all_samples_at_once_the_estimate_is_that_of_the_recording(tmp_path: Path) -> None:
     topics = replace(NAMES, wrench_frame="tip", wrench_bias="free_motion")
     made = lab(biased("tip"), "ft")
-    found, _, _ = live(made.in_order(), topics, 10**6)
+    found, _, _ = live(made, topics, made.in_order())
     assert_same(found, read_recording(made.mcap(tmp_path / "lab", original().rig), topics=topics).wrench)
 
 
 def test_without_free_motion_the_wrench_is_held_back_and_it_is_said() -> None:
-    topics, messages = replace(NAMES, wrench_bias="free_motion"), still(lifts=False)
+    topics, never = replace(NAMES, wrench_bias="free_motion"), still(lifts=False)
     rig = original().rig
     assert rig is not None
-    held = LiveWrench(topics)
-    portion = [taken(messages, topic) for topic in (SENSOR, SLIDER, TIP)]
-    assert len(held.put(*portion)) == 0 and held.waits_for_bias, "no rig yet"
-    held.begin(replace(rig, pusher_radius=5.0))
-    assert not held.waits_for_bias and len(held.put(*portion)) == 0 and held.waits_for_bias
-    assert held.problems and "contact is found from geometry alone. Lift the tip" in held.problems[0]
-    assert "not known yet: the tip is free for" in str(held.figures()["wrench bias"])
-    held.begin(rig)
-    lifted = still()
-    assert len(held.put(*(taken(lifted, topic) for topic in (SENSOR, SLIDER, TIP)))) == len(wrench())
-    assert not held.problems and not held.waits_for_bias
+    decoder = decoder_of(never, topics)
+    held = decoder.wrench
+    assert len(taken(decoder, never).wrench) == 0 and held.waits_for_bias, "no rig yet"
+    decoder.begin(replace(rig, pusher_radius=5.0))
+    assert not held.waits_for_bias and len(taken(decoder, never).wrench) == 0 and held.waits_for_bias
+    assert held.bias is not None and held.bias.problem.startswith("the tip is free for")
+    decoder.begin(rig)
+    assert len(taken(decoder, still()).wrench) == len(wrench())
+    assert not held.bias.problem and not held.waits_for_bias
 
 
 def test_samples_of_two_times_are_not_one_free_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    topics, messages = replace(NAMES, wrench_bias="free_motion"), still()
-    held, rig = LiveWrench(topics), original().rig
-    assert rig is not None
-    part = [taken(messages[: len(messages) // 2], topic) for topic in (SENSOR, SLIDER, TIP)]
-    monkeypatch.setattr(live_bias, "FIRST", len(part[0][0]) + 1)
-    held.begin(rig)
-    assert len(held.put(*part)) == len(held.put(*part)) == 0, "the clock was set back: half of them were forgotten"
-    monkeypatch.setattr(live_bias, "FIRST", 50)
-    held.begin(rig)
-    everything = [taken(messages, topic) for topic in (SENSOR, SLIDER, TIP)]
-    first = held.put(*everything)
-    estimate = held.figures()["wrench bias"]
-    again = held.put(*part)
-    assert np.array_equal(again.fx, first.fx[: len(again)]) and held.figures()["wrench bias"] == estimate
+    made, rig = still(), original().rig
+    half = made.in_order()[: len(made.messages) // 2]
+    count = sum(topic == SENSOR for _, topic, _ in half)
+    decoder = decoder_of(made, replace(NAMES, wrench_bias="free_motion"), rig=rig)
+    monkeypatch.setattr(bias_so_far, "FIRST", count + 1)
+    assert rig is not None and decoder.wrench.bias is not None
+    decoder.begin(rig)
+    set_back = len(taken(decoder, made, half).wrench), len(taken(decoder, made, half).wrench)
+    assert set_back == (0, 0), "the clock was set back: half of them were forgotten"
+    monkeypatch.setattr(bias_so_far, "FIRST", 50)
+    decoder.begin(rig)
+    first = taken(decoder, made).wrench
+    estimate = decoder.wrench.estimate
+    again = taken(decoder, made, half).wrench
+    assert np.array_equal(again.fx, first.fx[: len(again)]) and decoder.wrench.estimate is estimate
 
 
 def test_few_samples_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live_bias, "MOST", 200)
-    topics, messages = replace(NAMES, wrench_bias="free_motion"), still()
-    rig = original().rig
+    monkeypatch.setattr(bias_so_far, "MOST", 200)
+    topics, rig = replace(NAMES, wrench_bias="free_motion"), original().rig
     assert rig is not None
     for given in (replace(rig, pusher_radius=5.0), rig):  # the bias stays unknown as long as possible, and not
-        held = LiveWrench(topics)
-        held.begin(given)
-        for first in range(0, len(messages), 40):
-            now = messages[first : first + 40]
-            held.put(*(taken(now, topic) for topic in (SENSOR, SLIDER, TIP)))
-            assert held._bias is not None and held._bias._count <= 240
+        decoder = decoder_of(still(), topics, rig=given)
+        for portion in in_portions(still().in_order(), 40):
+            taken(decoder, still(), portion)
+            assert decoder.wrench.bias is not None and decoder.wrench.bias._count <= 240

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Live transforms give the poses that reading a recording of them gives."""
+"""Transforms in any portions give the poses that reading a recording of them gives."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab, Message, pose_rows, robot_in_tf, short_recording
-from push_predictor.online.sensors.transform_buffer import NO_TRANSFORM, SET_BACK, TransformBuffer
 
-from push_predictor.online.sensors import transform_buffer
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder import transform_buffer
+from push_predictor.recordings.decoder.rules import NO_TRANSFORM
+from push_predictor.recordings.decoder.transform_buffer import SET_BACK, TransformBuffer
+from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics
@@ -31,8 +34,8 @@ def original() -> Recording:
 
 
 def put(buffer: TransformBuffer, messages: list[Message]) -> None:
-    for _, topic, data in messages:
-        buffer.put(data, topic == "/tf_static")
+    for sent, topic, data in messages:
+        buffer.put(Messages.of(topic, TF_TYPES[0], [sent], [data]), topic == "/tf_static", live=True)
 
 
 def taken(buffer: TransformBuffer, messages: list[Message], frame: str, portion: int = 40) -> tuple[IntArray, Array]:
@@ -40,7 +43,8 @@ def taken(buffer: TransformBuffer, messages: list[Message], frame: str, portion:
     parts = []
     for first in range(0, len(messages), portion):
         put(buffer, messages[first : first + portion])
-        parts.append(buffer.take(frame))
+        parts.append(buffer.take(frame, last=first + portion >= len(messages)))
+        buffer.forget()
     return np.concatenate([stamp for stamp, _ in parts]), np.concatenate([rows for _, rows in parts])
 
 
@@ -73,10 +77,21 @@ def test_poses_are_those_of_a_recording_however_they_arrive(tmp_path: Path, port
         np.testing.assert_allclose(rows[:, :3], pose_rows(stream)[:, :3], rtol=0.0, atol=1e-12)
 
 
+def test_several_portions_that_are_taken_at_once_stay_in_order() -> None:
+    messages = cart(every(20, 0, 1201), every(4, 0, 1201)).in_order()
+    buffer = TransformBuffer(["tip"], "world")
+    for portion in (messages[:100], messages[100:]):
+        times, data = [sent for sent, _, _ in portion], [each for *_, each in portion]
+        buffer.put(Messages.of("/tf", TF_TYPES[0], times, data), static=False)
+    stamp, rows = buffer.take("tip")
+    assert stamp.tolist() == every(4, 0, 1201).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
+
+
 def test_two_frames_share_the_messages_and_the_world(tmp_path: Path) -> None:
     buffer = TransformBuffer(["block", "tip"])
     put(buffer, robot_in_tf(original(), "map").in_order())
-    assert [len(buffer.take(frame)[0]) for frame in ("block", "tip", "block")] == [
+    assert [len(buffer.take(frame, last=True)[0]) for frame in ("block", "tip", "block")] == [
         len(original().slider),
         len(original().pusher),
         0,
@@ -86,13 +101,13 @@ def test_two_frames_share_the_messages_and_the_world(tmp_path: Path) -> None:
 
 
 def test_a_sample_waits_for_the_other_transforms() -> None:
-    lab, buffer = cart(every(20, 0, 101), every(4, 0, 151)), TransformBuffer(["tip"])
+    lab, buffer = cart(every(20, 0, 1101), every(4, 0, 1151)), TransformBuffer(["tip"])
     put(buffer, lab.in_order())
     stamp, rows = buffer.take("tip")
-    assert stamp[-1] == START + 100 * MILLISECOND, "the cart is known until then"
+    assert stamp[-1] == START + 1100 * MILLISECOND, "the cart is known until then"
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
-    put(buffer, [m for m in cart(every(20, 120, 141), every(4, 0, 0)).in_order() if m[1] == "/tf"])
-    assert buffer.take("tip")[0].tolist() == every(4, 104, 141).tolist()
+    put(buffer, [m for m in cart(every(20, 1120, 1141), every(4, 0, 0)).in_order() if m[1] == "/tf"])
+    assert buffer.take("tip")[0].tolist() == every(4, 1104, 1141).tolist()
 
 
 def test_samples_before_another_transform_began_or_in_its_dropout_are_counted() -> None:
@@ -106,7 +121,7 @@ def test_samples_before_another_transform_began_or_in_its_dropout_are_counted() 
 
 
 def test_a_clock_that_is_set_back_begins_anew() -> None:
-    first = cart(every(20, 60_000, 61_001), every(4, 60_000, 61_001)).in_order()
+    first = cart(every(20, 60_000, 62_001), every(4, 60_000, 62_001)).in_order()
     again = cart(every(20, 0, 1001), every(4, 0, 1001)).in_order()
     buffer = TransformBuffer(["tip"])
     stamp, rows = taken(buffer, [*first, *again], "tip", portion=50)
@@ -114,25 +129,32 @@ def test_a_clock_that_is_set_back_begins_anew() -> None:
     assert jump + len(stamp[jump:]) == len(stamp) and stamp[jump:].tolist() == every(4, 0, 1001).tolist()
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
     waiting = TransformBuffer(["tip"])
-    put(waiting, cart(every(20, 60_000, 60_001), every(4, 60_000, 60_101)).in_order())
+    put(waiting, cart(every(20, 60_000, 61_001), every(4, 60_000, 61_101)).in_order())
     waiting.take("tip")
     put(waiting, again)
     waiting.take("tip")
     assert waiting.rejected("tip")[SET_BACK] == 25, "they waited for the cart"
 
 
-def test_stamps_stay_those_of_one_transform_among_equal_ones() -> None:
+def test_among_equal_transforms_the_nearest_to_the_frame_gives_the_stamps() -> None:
     messages = cart(every(10, 0, 501), every(10, 3, 501)).in_order()
     stamp, _ = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion=1)
-    assert len(stamp) > 40 and {*(stamp % (10 * MILLISECOND))} == {stamp[0] % (10 * MILLISECOND)}
+    assert len(stamp) > 40 and {*(stamp % (10 * MILLISECOND))} == {3 * MILLISECOND}
 
 
-def test_stamps_become_those_of_a_finer_transform_that_comes_later() -> None:
-    messages = cart(every(20, 0, 2001), every(4, 1000, 2001)).in_order()
-    stamp, rows = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion=5)
-    period = np.diff(stamp)
-    assert period.min() > 0 and period[-1] == 4 * MILLISECOND
+@pytest.mark.parametrize("portion", [7, 37, 5000])
+def test_the_transform_with_most_samples_in_the_first_second_of_all_gives_the_stamps(portion: int) -> None:
+    messages = cart(every(20, 0, 2501), every(4, 1000, 2501)).in_order()
+    stamp, rows = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion)
+    assert stamp.tolist() == every(4, 1000, 2501).tolist()
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
+
+
+@pytest.mark.parametrize("portion", [7, 37, 5000])
+def test_a_transform_that_becomes_finer_later_does_not_take_over(portion: int) -> None:
+    tip = np.concatenate([every(20, 0, 1500), every(2, 1500, 3001)])
+    stamp, _ = taken(TransformBuffer(["tip"], "world"), cart(every(10, 0, 3001), tip).in_order(), "tip", portion)
+    assert stamp.tolist() == every(10, 0, 3001).tolist()
 
 
 def test_samples_of_a_frame_without_connection_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,15 +194,15 @@ def test_a_frame_that_is_not_connected_is_named_until_it_is() -> None:
     static = Lab()
     static.transform("/tf_static", "world", "cart", stamps[:1], line(stamps[:1]))
     put(buffer, static.in_order())
-    assert buffer.take("tip")[0].tolist() == stamps.tolist() and not buffer.problem("tip")
+    assert buffer.take("tip", last=True)[0].tolist() == stamps.tolist() and not buffer.problem("tip")
 
 
 def test_a_tree_that_grows_above_its_root_is_reported() -> None:
-    buffer, stamps = TransformBuffer(["tip"]), every(4, 0, 100)
+    buffer, stamps = TransformBuffer(["tip"]), every(4, 0, 1100)
     lab = Lab()
     lab.transform("/tf", "cart", "tip", stamps, line(stamps))
     put(buffer, lab.in_order())
-    assert len(buffer.take("tip")[0]) == 25 and buffer.world == "cart" and not buffer.problem("tip")
+    assert len(buffer.take("tip")[0]) == 275 and buffer.world == "cart" and not buffer.problem("tip")
     static = Lab()
     static.transform("/tf_static", "world", "cart", stamps[:1], line(stamps[:1]))
     put(buffer, static.in_order())
@@ -204,8 +226,8 @@ def test_a_frame_with_two_parents_is_refused_by_name() -> None:
 def test_reports_the_newest_stamps_without_taking_them() -> None:
     buffer = TransformBuffer(["tip"])
     assert len(buffer.recent("tip", 10)) == 0 and "no frame 'tip'" in buffer.problem("tip")
-    put(buffer, cart(every(20, 0, 101), every(4, 0, 101)).in_order())
+    put(buffer, cart(every(20, 0, 1101), every(4, 0, 1101)).in_order())
     waiting = len(buffer)
-    assert buffer.recent("tip", 10).tolist() == every(4, 64, 101).tolist()
-    assert len(buffer) == waiting == 32, "they wait as before"
-    assert len(buffer.take("tip")[0]) == 26 and len(buffer) == 0
+    assert buffer.recent("tip", 10).tolist() == every(4, 1064, 1101).tolist()
+    assert len(buffer) == waiting == 332, "they wait as before"
+    assert len(buffer.take("tip")[0]) == 276 and len(buffer) == 0

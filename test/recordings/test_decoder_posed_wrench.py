@@ -1,14 +1,14 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A live wrench along the tip's axes becomes the wrench along the world's, whatever the portions in which it comes."""
+"""A wrench along the tip's axes becomes the wrench along the world's, whatever the portions in which it comes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from push_predictor.online.sensors.posed_wrench import PosedWrench
 
+from push_predictor.recordings.decoder.posed_wrench import PosedWrench
 from push_predictor.recordings.fields.wrench_axes import at_tip, in_sensor_axes
 from push_predictor.types import Array, IntArray
 
