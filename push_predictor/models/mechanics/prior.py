@@ -23,6 +23,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
+from push_predictor.models.mechanics.kernel.push import drawn_moments
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.types import Array, IntArray
 
@@ -225,11 +226,18 @@ class ProcessNoise:
 
         varied (n, 2 v, 3): displacements under the parameters of `changed`. travel (n,), length c in m.
         """
-        shift = 0.5 * (varied[:, : len(VARYING)] - varied[:, len(VARYING) :])
-        covariance = shift.transpose(0, 2, 1) @ shift
-        share = SHARE * np.array([1.0, 1.0, 1.0 / length])
-        covariance.reshape(-1, 9)[:, ::4] += np.square(travel[:, None] * share) + _TRACKED  # the diagonals
-        return np.asarray(covariance * self._factors)
+        return self.moments(varied, travel, length)[2]
+
+    def moments(self, found: Array, travel: Array, length: float) -> tuple[Array, Array, Array]:
+        """Mean (n, 3) and covariance (n, 3, 3) of outcomes, and covariance (n, 3, 3) of the noise.
+
+        found (n, 2 v + k, 3): displacements under the parameters of `changed`, then under k draws.
+        """
+        n = len(found)
+        mean, covariance, noise = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3))
+        least = np.square(travel[:, None] * (SHARE * np.array([1.0, 1.0, 1.0 / length]))) + _TRACKED
+        drawn_moments(found, len(VARYING), least, self._factors, mean, covariance, noise)
+        return mean, covariance, noise
 
     @cached_property
     def _factors(self) -> Array:

@@ -127,6 +127,50 @@ def shifts(
                 own[column] = changed
 
 
+def drawn_moments(
+    found: cython.double[:, :, :],
+    paired: cython.Py_ssize_t,
+    least: cython.double[:, ::1],
+    factor: cython.double[:, ::1],
+    mean: cython.double[:, ::1],
+    covariance: cython.double[:, :, ::1],
+    noise: cython.double[:, :, ::1],
+) -> None:
+    """Compute moments of displacements (n, k, 3): the noise of the first 2 paired draws, mean and covariance of others.
+
+    noise (n, 3, 3) is written: the sum of squares of half the differences of draw j and draw paired + j, with least
+    (n, 3) added to the diagonal, times factor (3, 3). mean (n, 3) and covariance (n, 3, 3) are written where there are
+    other draws; the covariance includes the noise.
+    """
+    draws: cython.Py_ssize_t = found.shape[1]
+    n: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    total: cython.double
+    with cython.nogil:
+        for n in range(found.shape[0]):
+            for i in range(3):
+                for j in range(i + 1):
+                    total = least[n, i] if i == j else 0.0
+                    for k in range(paired):
+                        one: cython.double = found[n, k, i] - found[n, paired + k, i]
+                        total += 0.25 * one * (found[n, k, j] - found[n, paired + k, j])
+                    noise[n, i, j] = noise[n, j, i] = total * factor[i, j]
+            if draws == 2 * paired:
+                continue
+            for i in range(3):
+                total = 0.0
+                for k in range(2 * paired, draws):
+                    total += found[n, k, i]
+                mean[n, i] = total / (draws - 2 * paired)
+                for j in range(i + 1):
+                    total = 0.0
+                    for k in range(2 * paired, draws):
+                        total += (found[n, k, i] - mean[n, i]) * (found[n, k, j] - mean[n, j])
+                    covariance[n, i, j] = covariance[n, j, i] = total / (draws - 2 * paired) + noise[n, i, j]
+
+
 @cython.cfunc
 @cython.exceptval(check=False)
 def _slider(
