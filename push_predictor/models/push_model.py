@@ -16,6 +16,7 @@ import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import RequestError
+from push_predictor.geometry.boundary import within_box
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.prediction import NOT_FINITE, Prediction
@@ -175,11 +176,10 @@ class PushModel:
         The domain of a prior model are all pushes for which its priors are meant. For covariates see
         `covariates_seen`.
         """
-        if (own := self.predictor.own_limits) is not None:
-            return own.contain(inputs)
-        low, high = self._feature_range
-        features = push_features(self.rig.outline, inputs)
-        return np.asarray(((features >= low) & (features <= high)).all(axis=1))
+        points = inputs if self.predictor.own_limits else push_features(self.rig.outline, inputs)
+        found = np.empty(len(inputs), dtype=np.uint8)
+        within_box(points, *self._domain, found)
+        return found.view(np.bool_)
 
     def covariates_seen(self, push: Push) -> BoolArray:
         """Whether the covariates of each of n pushes lie in the range on which the effects were fitted, (n,).
@@ -249,7 +249,11 @@ class PushModel:
         return (1.0 - DURATION_TOLERANCE) * durations.min(), (1.0 + DURATION_TOLERANCE) * durations.max()
 
     @cached_property
-    def _feature_range(self) -> tuple[Array, Array]:
+    def _domain(self) -> tuple[Array, Array]:
+        """Lowest and highest inputs (3,) of a model with limits of its own, else features (D,)."""
+        if (own := self.predictor.own_limits) is not None:
+            (slowest, fastest), (least, most) = own
+            return np.array([slowest, -np.inf, least]), np.array([fastest, np.inf, most])
         features = push_features(self.rig.outline, self.training.inputs)
         low, high = features.min(axis=0), features.max(axis=0)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)

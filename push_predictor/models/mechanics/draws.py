@@ -63,7 +63,8 @@ def _design(seed: int) -> Array:
     rng = np.random.default_rng(seed)
     signed = _orthogonal(rng.standard_normal((POINTS, POINTS)))[:, :HALF]
     simplex = _orthogonal(np.column_stack([np.ones(POINTS), rng.standard_normal((POINTS, HALF))]))[:, 1:]
-    return np.sqrt(POINTS) * np.concatenate([np.hstack([sign * signed, simplex]) for sign in (1.0, -1.0)])
+    both = np.concatenate([np.hstack([sign * signed, simplex]) for sign in (1.0, -1.0)])
+    return np.asarray(np.sqrt(POINTS) * both)
 
 
 def _orthogonal(columns: Array) -> Array:

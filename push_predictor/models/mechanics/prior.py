@@ -201,8 +201,7 @@ def table_of(names: Sequence[str], draws: Array) -> Array:
 
 VARYING = {"contact_friction": 0.1, "centre_x": 0.004, "centre_y": 0.004}  # standard deviations within a session
 SHARE = 0.05  # of the distance travelled, and of the turn that moves a point at the length c that far
-TRACKER = (1e-4, 1e-4, 1e-3)  # m, m, rad: of the difference of two poses
-_TRACKED = np.square(TRACKER)
+TRACKER = np.array([1e-4, 1e-4, 1e-3])  # m, m, rad: of the difference of two poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,8 +234,7 @@ class ProcessNoise:
         """
         n = len(found)
         mean, covariance, noise = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3))
-        least = np.square(travel[:, None] * (SHARE * np.array([1.0, 1.0, 1.0 / length]))) + _TRACKED
-        drawn_moments(found, len(VARYING), least, self._factors, mean, covariance, noise)
+        drawn_moments(found, len(VARYING), travel, SHARE, length, TRACKER, self._factors, mean, covariance, noise)
         return mean, covariance, noise
 
     @cached_property
