@@ -74,12 +74,13 @@ class PushModel:
         save_model(self, Path(path))
 
     def __repr__(self) -> str:
+        defaults = f"  defaults of covariates: {defaults_in_words(self)}\n" if self.defaults else ""
         return (
             f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
             f"{self._training_in_words()}"
             f"  mean: {mean_in_words(self.predictor)}\n"
             f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
-            f"{self._defaults_in_words()}"
+            f"{defaults}"
             f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
         )
 
@@ -92,9 +93,6 @@ class PushModel:
             f"  trained on {len(self.training)} windows of {self.provenance.pushes} pushes{origin}\n"
             f"  pusher speed {speeds.min():.3g} to {speeds.max():.3g} mm/s, windows of {np.median(durations):.3g} s\n"
         )
-
-    def _defaults_in_words(self) -> str:
-        return f"  defaults of covariates: {defaults_in_words(self)}\n" if self.defaults else ""
 
     def predict(self, pushes: Pushes) -> Prediction:
         """Predict the outcomes of n pushes.

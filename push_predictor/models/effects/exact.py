@@ -13,7 +13,7 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.fitted import Changes, FittedMechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.kernel.push import propagated
 from push_predictor.models.mechanisms import LARGEST
 from push_predictor.models.pushes import Push
@@ -118,7 +118,8 @@ def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, 
         found = JointShift(shift, [], {name: slopes[:, k] for k, name in enumerate(acting.names)})
         exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
     else:
-        still, moved = mechanics.displacements([{}, changes_of(effects, push)], push)
+        changes = acting.changes(acting.columns(push)).T
+        still, moved = mechanics.displacements([{}, dict(zip(acting.names, changes, strict=True))], push)
         found = JointShift(moved - still, [], {})
     shift = found.shift
     for effect in effects:
@@ -133,14 +134,6 @@ def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, 
 def _ends(effects: Sequence[Effect]) -> IntArray:
     """Where the coefficients of each effect end among all, but for the last."""
     return np.cumsum([len(effect.coefficients) for effect in effects])[:-1]
-
-
-def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
-    """The sum of all effects' changes of each parameter, at most the largest that a rig can have."""
-    acting = JointEffects.of(effects)
-    if not acting.effects:
-        return {}
-    return dict(zip(acting.names, acting.changes(acting.columns(push)).T, strict=True))
 
 
 def covariance_of(effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array]) -> Array:
