@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from planar_messages import pose_message
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros_harness import REPOSITORY, free_domain, node_environment, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Float64, String
@@ -40,6 +40,7 @@ pytestmark = pytest.mark.slow
 
 TEMPERATURE, LOSSY = "/surface/temperature", "/lossy"
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Recorded:
