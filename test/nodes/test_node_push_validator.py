@@ -111,7 +111,7 @@ def domain() -> int:
 def served(models: dict[str, Path]) -> Iterator[int]:
     """A domain with a server of both models, for all tests that leave it as it is."""
     params = {"models": list(map(str, models.values()))}
-    with reserved_domain() as domain, node_process("predict_server", domain=domain, params=params):
+    with reserved_domain() as domain, hosted_node("predict_server", domain=domain, params=params):
         yield domain
 
 
@@ -150,9 +150,9 @@ def watched(
     gp, analytical = models.values()
     with ros_context(served) as node:
         received = Listener(node)
-        with validator(served, model=gp, compare=[str(analytical)], output=out) as process:
+        with hosted(served, model=gp, compare=[str(analytical)], output=out) as process:
             received.status.wait_for_first()
-            with replaying(served, recording=hexagon, rate=10.0):
+            with hosting_replay(served, recording=hexagon, rate=10.0):
                 process.wait_for_text(WRITTEN, 60.0)
             judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
             assert wait_until(lambda: len(received.residuals) >= sum(judged) and len(received.markers) >= judged[0])
