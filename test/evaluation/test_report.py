@@ -110,7 +110,7 @@ def table() -> PushTable:
 @pytest.fixture(scope="module")
 def models(square: Rig) -> list[PushModel]:
     training = concatenate([made_up_table(25, 3, name="a"), made_up_table(8, 4, velocity=0.05, name="b")])
-    kinds = {"vhgp": 90, "gp": 90, "analytical": None}
+    kinds = {"vhgp": 60, "gp": 60, "analytical": None}
     return [
         train_model(training, square, kind, name=f"my {kind}", options=TrainingOptions(n_train=n, mean="zero"))
         for kind, n in kinds.items()

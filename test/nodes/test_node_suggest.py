@@ -50,7 +50,7 @@ def ask(folder: Path) -> Iterator[Ask]:
     running = hosted_node("predict_server", domain=domain, params=params)
     with running, harness.ros_context(domain) as node:
         client = node.create_client(SuggestPushes, "suggest_pushes")
-        yield lambda **fields: harness.call(client, SuggestPushes.Request(**{"count": 3, **fields}))
+        yield lambda **fields: harness.call(client, SuggestPushes.Request(**{"count": 2, **fields}))
 
 
 def assert_equal(response: SuggestPushes.Response, expected: Suggested) -> None:
@@ -61,15 +61,15 @@ def assert_equal(response: SuggestPushes.Response, expected: Suggested) -> None:
 
 
 def test_response_equals_the_librarys_pushes(ask: Ask, folder: Path) -> None:
-    assert_equal(ask(), suggest_pushes(load_model(folder / "gp.model"), 3))
+    assert_equal(ask(), suggest_pushes(load_model(folder / "gp.model"), 2))
 
 
 def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> None:
     limits = Limits((0.02, 0.04), (-0.3, 0.5), 0.02, ((0.2, 0.4), (0.9, 0.1)), 0.05)
-    expected = suggest_pushes(load_model(folder / "other.model"), 4, limits, seed=2**63)
-    response = ask(model="other", count=4, transfer_speed=0.05, seed=2**63, **LIMITS)
+    expected = suggest_pushes(load_model(folder / "other.model"), 2, limits, seed=2**63)
+    response = ask(model="other", transfer_speed=0.05, seed=2**63, **LIMITS)
     assert_equal(response, expected)
-    assert list(response.contact) != list(ask(model="other", count=4, seed=2**63, **LIMITS).contact)
+    assert list(response.contact) != list(ask(model="other", seed=2**63, **LIMITS).contact)
 
 
 @pytest.mark.parametrize(
