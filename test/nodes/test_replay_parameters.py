@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from replay_bags import push_messages, write_bag
-from ros_harness import REPOSITORY, free_domain, node_process
+from ros_harness import free_domain
 
 from push_predictor.nodes import runtime
 from push_predictor.nodes.push_replay import PushReplay
-from push_predictor.nodes.replay.parameters import PARAMETERS
 
 
 @pytest.fixture(scope="module")
@@ -64,26 +62,8 @@ def test_bad_parameter_ends_in_one_line_and_status_1(
     assert_one_line(capfd.readouterr().err, text)
 
 
-def test_process_ends_with_the_status_of_a_refused_start() -> None:
-    with node_process("push_replay", domain=free_domain()) as process:
-        assert process.wait(60.0) == 1
-        assert_one_line(process.text(), "recording: '' is not accepted")
-
-
 def assert_one_line(printed: str, text: str) -> None:
     lines = printed.splitlines()
     assert len(lines) == 1, lines
     assert lines[0].startswith("push_replay: ")
     assert text in lines[0]
-
-
-def test_configuration_file_lists_every_parameter_with_its_default() -> None:
-    listed = yaml.safe_load((REPOSITORY / "config/push_replay.yaml").read_text())["/**/push_replay"]["ros__parameters"]
-    assert flat(listed) == {param.name: param.default for param in PARAMETERS}
-
-
-def flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in tree.items():
-        found.update(flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value})
-    return found
