@@ -23,7 +23,7 @@ from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
 from push_predictor_interfaces.srv import ListModels, SuggestPushes
@@ -38,7 +38,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two GPs of the square, and an analytical model, which learns nothing."""
     place = tmp_path_factory.mktemp("models")
     for name, kind, seed in (("gp", "gp", 0), ("other", "gp", 1), ("analytical", "analytical", 0)):
-        save_model(train_model(*square_pushes(60, seed), kind, name=name), place / f"{name}.model")
+        options = TrainingOptions(mean="zero")
+        save_model(train_model(*square_pushes(60, seed), kind, name=name, options=options), place / f"{name}.model")
     return place
 
 

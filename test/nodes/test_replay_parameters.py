@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hosted_nodes import refused_start
 from replay_bags import push_messages, write_bag
-from ros_harness import free_domain
 
 from push_predictor.nodes import runtime
 from push_predictor.nodes.push_replay import PushReplay
@@ -52,18 +52,6 @@ def test_bad_parameter_ends_in_one_line_and_status_1(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    """In this process, whose signal handlers are kept."""
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    given = {"recording": str(second), **params} if params else {}
-    words = [word for name, value in given.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
-    assert runtime.run("push_replay", PushReplay, ["--ros-args", *words]) == 1
-    assert_one_line(capfd.readouterr().err, text)
-
-
-def assert_one_line(printed: str, text: str) -> None:
-    lines = printed.splitlines()
-    assert len(lines) == 1, lines
-    assert lines[0].startswith("push_replay: ")
-    assert text in lines[0]
+    given = {"recording": second, **params} if params else {}
+    line = refused_start(partial(runtime.run, "push_replay", PushReplay), monkeypatch, capfd, **given)
+    assert line.startswith("push_replay: ") and text in line

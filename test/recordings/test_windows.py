@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, wrench_rows
+from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.contact import ContactSample
-from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_segmenter import TARE_SAMPLES, PushSegmenter
-from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
-
-
-def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:
-    assert recording.rig is not None
-    return find_windows(recording, recording.rig, options)
+from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 
 
 def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
