@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.blind.commands import CYCLE, _group, apart, main
+from benchmarks.blind.commands import CYCLE, apart, main
 from benchmarks.blind.effects import DRIVERS, GROUPS, SIZES, World, _laws, draw, undisturbed
 from benchmarks.blind.library import library_without
 from benchmarks.blind.recordings import MODEL, Size, conditions, drawn_for, later_spec, make_one, rig_of
@@ -215,14 +215,6 @@ def test_intervals_of_parameters_are_counted_where_they_can_be_compared() -> Non
     assert one(tilted, reported(0.15, 0.25))["covered"] is True
 
 
-def test_counts_harm_and_failures() -> None:
-    harmful = verdict("contact_friction", "slid_distance", gain={"nlpd": {"value": 0.2, "low": 0.1, "high": 0.3}})
-    failed = {"failed": "TableError: no", "without": None, "seconds": 1.0}
-    scored = score_of({"000": truth(), "001": truth()}, {"000": harmful, "001": failed})
-    assert counted(scored, "harm: interval of the gain wholly above zero") == (1, 2)
-    assert counted(scored, "traces that failed") == (1, 2)
-
-
 @pytest.mark.parametrize(("gain", "size"), [(-0.05, "small"), (-0.1, "medium"), (-0.4, "medium"), (-0.41, "large")])
 def test_oracle_gain_decides_the_size_class(gain: float, size: str) -> None:
     assert one(truth(oracle_gain=gain_of(gain)), no_finding())["size"] == size
@@ -272,12 +264,6 @@ def test_recording_contains_no_hint_of_the_truth(tmp_path: Path) -> None:
     hints = [drawn.kind, "library", str(hidden), "medium", *(name for name in drawn.names if name)]
     for path in (data / "003" / "new").iterdir():
         assert not any(hint.encode() in path.read_bytes() for hint in hints if hint != "contact_friction"), path
-
-
-def test_groups_keep_their_shares_in_random_order() -> None:
-    groups = [[_group(seed, k) for k in range(len(CYCLE))] for seed in (1, 2)]
-    assert sorted(groups[0]) == sorted(groups[1]) == sorted(CYCLE)
-    assert groups[0] != groups[1]
 
 
 @pytest.mark.slow

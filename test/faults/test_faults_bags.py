@@ -128,13 +128,7 @@ print(most() - before)
 """
 
 
-@pytest.mark.parametrize(
-    ("compression", "noise"),
-    [
-        (CompressionType.ZSTD, 4000),
-        (CompressionType.LZ4, 500),
-    ],
-)
+@pytest.mark.parametrize(("compression", "noise"), [(CompressionType.ZSTD, 4000), (CompressionType.LZ4, 500)])
 def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:

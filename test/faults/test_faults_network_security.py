@@ -28,15 +28,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from replay_bags import push_messages, write_bag
-from ros_harness import (
-    REPOSITORY,
-    acquaint,
-    call,
-    free_domain,
-    node_environment,
-    ros_context,
-    wait_until,
-)
+from ros_harness import REPOSITORY, acquaint, call, free_domain, node_environment, ros_context, wait_until
 from validator_bench import HEXAGON
 
 from push_predictor.models.store.model_file import save_model

@@ -25,12 +25,7 @@ from server_bench import GOOD, MANY, hosted_server_of, server_of
 from service_msgs.msg import ServiceEventInfo
 from synthetic import square_pushes, square_rig
 
-from msg_adapters.predictions import (
-    PushQuery,
-    prediction_from_response,
-    query_to_batch_request,
-    query_to_request,
-)
+from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
 from push_predictor.errors import RequestError
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry

@@ -31,15 +31,7 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
 from push_predictor.online import trace_process
-from push_predictor.online.trace_process import (
-    COPIES,
-    EXTENDED,
-    REPORT,
-    VERDICT,
-    Failed,
-    TraceTask,
-    evidence_in,
-)
+from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, Failed, TraceTask, evidence_in
 from push_predictor.recordings.table_file import read_table, write_table
 from push_predictor_interfaces.srv import LoadModel
 

@@ -46,11 +46,7 @@ def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_bad_parameter_ends_in_one_line_and_status_1(
-    second: Path,
-    params: dict[str, Any],
-    text: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    second: Path, params: dict[str, Any], text: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     given = {"recording": second, **params} if params else {}
     line = refused_start(partial(runtime.run, "push_replay", PushReplay), monkeypatch, capfd, **given)

@@ -114,8 +114,7 @@ def test_a_mirrored_frame_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "y", "heading", "finding"),
-    [(ONE_SIDE, 1.0, -1.0, "heading_clockwise"), (SMALL, -1.0, 1.0, "y_mirrored")],
+    ("name", "y", "heading", "finding"), [(ONE_SIDE, 1.0, -1.0, "heading_clockwise"), (SMALL, -1.0, 1.0, "y_mirrored")]
 )
 def test_a_heading_or_a_y_axis_of_the_wrong_sign_is_named(name: str, y: float, heading: float, finding: str) -> None:
     assert list(found(mirrored(sample(name), y, heading), rig_of(name))) == [finding]

@@ -52,12 +52,7 @@ TURN, SHIFT, BOTH = (np.radians(3.0), NOWHERE), (0.0, (0.0012, 0.0)), (np.radian
 
 
 @pytest.mark.parametrize(
-    ("name", "yaw", "shift"),
-    [
-        (OVAL, *TURN),
-        *((name, *SHIFT) for name in (ROUND, ONE_SIDE)),
-        (HEXAGON, *BOTH),
-    ],
+    ("name", "yaw", "shift"), [(OVAL, *TURN), *((name, *SHIFT) for name in (ROUND, ONE_SIDE)), (HEXAGON, *BOTH)]
 )
 def test_world_frames_apart_are_named_with_yaw_and_shift(name: str, yaw: float, shift: tuple[float, float]) -> None:
     apart = other_world(bag(name), yaw, shift)

@@ -78,10 +78,7 @@ def send(sender: TopicSender, clock: Clock, count: int, pause: float = 1e-4) -> 
         clock.now += pause
 
 
-@pytest.mark.parametrize(
-    ("depth", "lag"),
-    [*product([1, 2, 3, 5, 7, 10, 100, 1000], [0.0, 0.025]), (1, 2.0), (7, 2.0)],
-)
+@pytest.mark.parametrize(("depth", "lag"), [*product([1, 2, 3, 5, 7, 10, 100, 1000], [0.0, 0.025]), (1, 2.0), (7, 2.0)])
 def test_fast_replay_overwrites_no_unreceived_message(clock: Clock, depth: int, lag: float):
     publisher = Publisher(clock, lag, depth)
     sender = sender_of(publisher)

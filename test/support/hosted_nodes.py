@@ -76,11 +76,7 @@ class HostedNode:
 
 @contextmanager
 def hosted_node(
-    executable: str,
-    *ros_args: str,
-    domain: int,
-    namespace: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    executable: str, *ros_args: str, domain: int, namespace: str | None = None, params: Mapping[str, Any] | None = None
 ) -> Iterator[HostedNode]:
     """As `node_process`. Leaving ends the node, and raises what made it fail. It is ready when the block begins."""
     make_node, start, environment = NODES[executable]
