@@ -19,7 +19,7 @@ from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from standard_interfaces import provide_interfaces
 from turning_sensor import MOUNT, add_wrench, measured_at
-from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
+from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator, replaying
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -134,12 +134,12 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
     with (
         ros_context(domain) as node,
         hosted_node("predict_server", domain=domain, params={"models": [str(rig.model)]}),
-        node_process("push_validator", domain=domain, params=parameters(rig, output)) as process,
+        hosting_validator(domain=domain, params=parameters(rig, output)) as process,
     ):
         status = Status(node)
         status.wait_for_first()
         status.wait_for_server()
-        with replaying(domain, recording=rig.bag, rate=3.0):
+        with hosting_replay(domain, recording=rig.bag, rate=5.0):
             process.wait_for_text(WRITTEN, 60.0)
         assert "Its axes are turned from 'ft' by tf." in process.text()
         assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()

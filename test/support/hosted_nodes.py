@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import pytest
 from rclpy import utilities
 from rclpy.context import Context
-from ros_harness import START_TIMEOUT, keep_tables, node_arguments, wait_until
+from ros_harness import START_TIMEOUT, free_domain, keep_tables, node_arguments, wait_until
 
+from push_predictor.nodes import runtime
 from push_predictor.nodes.predict_server import PredictServer, start_server
 from push_predictor.nodes.push_recorder import PushRecorder
 from push_predictor.nodes.push_replay import PushReplay
@@ -74,11 +76,7 @@ class HostedNode:
 
 @contextmanager
 def hosted_node(
-    executable: str,
-    *ros_args: str,
-    domain: int,
-    namespace: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    executable: str, *ros_args: str, domain: int, namespace: str | None = None, params: Mapping[str, Any] | None = None
 ) -> Iterator[HostedNode]:
     """As `node_process`. Leaving ends the node, and raises what made it fail. It is ready when the block begins."""
     make_node, start, environment = NODES[executable]
@@ -92,6 +90,29 @@ def hosted_node(
             yield node
         finally:
             assert node.stop() == 0, log.read_text()
+
+
+def refused_start(
+    start: Callable[[list[str]], int],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    *ros_args: str,
+    **params: Any,
+) -> str:
+    """The one line on stderr of a node that does not start, with status 1. This process keeps its signal handlers.
+
+    start: as main() of a node, from its arguments. params: names with `__` for a dot.
+    """
+    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    given = {name.replace("__", "."): value for name, value in params.items()}
+    capfd.readouterr()
+    assert start(["--ros-args", *node_arguments(*ros_args, params=given)]) == 1
+    printed = capfd.readouterr().err
+    lines = [line for line in printed.splitlines() if not line.startswith("[")]  # what other nodes of this process log
+    assert len(lines) == 1, printed
+    return lines[0]
 
 
 @contextmanager
