@@ -99,9 +99,13 @@ class PredictServer(LifecycleNode):
         self._start_threaded()
         self._complete_models()
 
-    def close(self) -> None:
-        """End a trace and long requests, publish the last diagnostics."""
+    def finish(self) -> bool:
+        """End a trace and long requests; whether their clients have got the results."""
         self._closing.set()
+        return self._trace.finish()
+
+    def close(self) -> None:
+        """Publish the last diagnostics."""
         self._trace.close()
         self._diagnostics_thread.stop()
         self._publish_diagnostics()
