@@ -20,13 +20,14 @@ from mcap.reader import make_reader
 from planar_messages import pose_message
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros_harness import REPOSITORY, free_domain, node_environment, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Float64, String
 from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
+from push_predictor.nodes.qos import DEPTH
 from push_predictor.nodes.recorder.parameters import PARAMETERS, RecorderOptions, read_options
 from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
 from push_predictor.online.recorder.live_recording import LiveRecording
@@ -37,6 +38,8 @@ from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
+
+KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for late subscribers
 
 TEMPERATURE, LOSSY = "/surface/temperature", "/lossy"
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)

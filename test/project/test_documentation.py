@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
 from ros_harness import REPOSITORY
 
 import push_predictor
@@ -27,6 +26,7 @@ from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
+from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.topics import DEFAULT_TOPICS
