@@ -94,7 +94,7 @@ def run(
 
 
 class Life:
-    """A node, from its creation to its end. spinning: whether it spins; half_made: whether a signal interrupted this."""
+    """A node, from its creation to its end. spinning: whether it spins; half_made: a signal interrupted its making."""
 
     def __init__(
         self,

@@ -27,6 +27,7 @@ from std_msgs.msg import Float32, Float64, String
 from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
+from push_predictor.nodes.qos import DEPTH
 from push_predictor.nodes.recorder.parameters import PARAMETERS, RecorderOptions, read_options
 from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
 from push_predictor.online.recorder.live_recording import LiveRecording
@@ -37,6 +38,8 @@ from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
+
+KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for late subscribers
 
 TEMPERATURE, LOSSY = "/surface/temperature", "/lossy"
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -10,7 +10,6 @@ import math
 import shutil
 import signal
 from collections.abc import Iterator
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
@@ -64,8 +63,7 @@ from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import runtime
-from push_predictor.nodes.push_validator import PushValidator
+from push_predictor.nodes import push_validator
 from push_predictor.nodes.validator import publishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.validation_run import ValidationRun
@@ -641,7 +639,5 @@ def test_a_bad_parameter_ends_the_start_with_one_line(models, tmp_path: Path, mo
     ]
     for k, (params, words) in enumerate(cases):
         named = ("-r", f"__node:=validator_{k}")
-        line = refused_start(
-            partial(runtime.run, "push_validator", PushValidator), monkeypatch, capfd, *named, **params
-        )
+        line = refused_start(push_validator.main, monkeypatch, capfd, *named, **params)
         assert line.startswith("push_validator: ") and all(word in line for word in words), line
