@@ -207,7 +207,7 @@ def test_names_are_resolved_in_the_namespace_of_the_node(tmp_path: Path) -> None
 
 def test_topics_saved_next_to_an_earlier_bag_are_used_again(tmp_path: Path) -> None:
     (tmp_path / "a.recording.yaml").write_text("slider_topic: /block\nwrench_topic: /netft\n")
-    found = options_of(storage__uri=str(tmp_path / "a"), slider_topic="/other")
+    found = options_of(bag=str(tmp_path / "a"), slider_topic="/other")
     assert (found.topics.slider, found.topics.wrench, found.with_wrench) == ("/other", "/netft", True)
 
 
@@ -221,7 +221,6 @@ def test_an_existing_bag_is_replaced_only_with_force(tmp_path: Path) -> None:
     ("values", "problem"),
     [
         ({}, "bag: '' is not accepted"),
-        ({"bag": "a", "storage__uri": "b"}, "bag: 'a, b' is not accepted, give the path of one bag"),
         ({"bag": "/nowhere/a", "slider_topic": "1 block"}, "topic: '1 block' is not accepted"),
         ({"bag": "/nowhere/a", "wrench_topic": "/tf:ft"}, "wrench_topic: '/tf:ft' is not accepted"),
         ({"bag": "/nowhere/a", "duration": -1.0}, "duration: -1.0 is not accepted"),
