@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Collection, Iterator
 from itertools import zip_longest
 from pathlib import Path
@@ -38,7 +39,8 @@ from push_predictor.recordings.bag.mcap_summary import (
 )
 from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
-_Found: TypeAlias = tuple[tuple[str, str], int, int, int]  # topic and type, log time, first byte, byte after the last
+_Found: TypeAlias = "array[int]"  # of each message: channel, log time, first byte, byte after the last
+_NUMBERS = 4
 MOST_NOTES = 50  # a file can have a million damaged records
 
 
@@ -75,27 +77,31 @@ class McapFile:
 
         One chunk at a time is in memory.
         """
-        for content, found, _ in self._contents(topics):
+        for content, found, wanted, _ in self._contents(topics):
             view = memoryview(content)
-            for of, time, start, end in found:
-                yield RawMessage(*of, time, view[start:end].tobytes())
+            for k in range(0, len(found), _NUMBERS):
+                channel, time, start, end = found[k : k + _NUMBERS]
+                yield RawMessage(*wanted[channel], time, view[start:end].tobytes())
+            del view, content, found  # before the next chunk is read
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """The same of the given topics, a portion for each topic of a chunk."""
         single: list[RawMessage] = []
-        for content, found, is_chunk in self._contents(topics):
+        for content, found, wanted, is_chunk in self._contents(topics):
+            rows = np.array(found).astype(np.int64).reshape(-1, _NUMBERS)
             if not is_chunk:  # a portion of one message would be slow
-                single += [RawMessage(*of, time, bytes(content[start:end])) for of, time, start, end in found]
+                single += [RawMessage(*wanted[c], time, bytes(content[a:b])) for c, time, a, b in rows.tolist()]
                 continue
             yield from gathered(single)
             single = []
-            for of in dict.fromkeys(each[0] for each in found):
-                time, start, end = np.array([each[1:] for each in found if each[0] == of], np.uint64).astype(np.int64).T
+            for of in dict.fromkeys(wanted[channel] for channel in np.unique(rows[:, 0]).tolist()):
+                own = [channel for channel, other in wanted.items() if other == of]
+                _, time, start, end = rows[np.isin(rows[:, 0], own)].T
                 yield Messages(*of, time, content, start, end - start)
         yield from gathered(single)
 
-    def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, list[_Found], bool]]:
-        """Consecutive records, the wanted messages among them, and whether they are a chunk."""
+    def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, _Found, Wanted, bool]]:
+        """Consecutive records, the wanted messages among them, of which channels, and whether they are a chunk."""
         wanted = self._descriptions.wanted(topics, self._descriptions.channels.values())
         seen = 0
         chunks: list[int] = []
@@ -109,10 +115,10 @@ class McapFile:
                 content = self._content(stream, place)
                 found, count = self._found(content, place, topics, wanted)
                 seen += count
-                if self._unpack is None:
-                    yield content, found, place.opcode == Opcode.CHUNK
-                else:
-                    yield self._unpacked(content, found, place)
+                if self._unpack is not None:
+                    content, found = self._unpacked(content, found, place)
+                yield content, found, wanted, place.opcode == Opcode.CHUNK
+                del content, found
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
@@ -132,12 +138,12 @@ class McapFile:
 
     def _found(
         self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
-    ) -> tuple[list[_Found], int]:
+    ) -> tuple[_Found, int]:
         """The wanted messages among consecutive records, and the number of all messages.
 
         The channels, schemas and metadata among the records are stored.
         """
-        seen, found, unwanted = 0, list[_Found](), set[int]()
+        seen, found, unwanted = 0, array("Q"), set[int]()
         try:
             for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
@@ -145,8 +151,8 @@ class McapFile:
                         raise ValueError(f"a message has {end - start} bytes, its header alone needs {MESSAGE.size}")
                     seen += 1
                     number, _, log_time, _ = MESSAGE.unpack_from(content, start)
-                    if of := wanted.get(number):
-                        found.append((of, log_time, start + MESSAGE.size, end))
+                    if number in wanted:
+                        found.extend((number, log_time, start + MESSAGE.size, end))
                     else:
                         unwanted.add(number)
                 elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
@@ -157,21 +163,22 @@ class McapFile:
             self._check_unwanted(number, topics, place.offset)
         return found, seen
 
-    def _unpacked(self, content: Bytes, found: list[_Found], place: Place) -> tuple[Bytes, list[_Found], bool]:
+    def _unpacked(self, content: Bytes, found: _Found, place: Place) -> tuple[Bytes, _Found]:
         """The same with the messages decompressed."""
         assert self._unpack is not None
-        unpacked, where, undone = bytearray(), list[_Found](), 0
-        for of, time, start, end in found:
+        unpacked, where, undone = bytearray(), array("Q"), 0
+        for k in range(0, len(found), _NUMBERS):
+            channel, time, start, end = found[k : k + _NUMBERS]
             try:
                 data = self._unpack(bytes(content[start:end]))
             except UNREADABLE:
                 undone += 1
             else:
-                where.append((of, time, len(unpacked), len(unpacked) + len(data)))
+                where.extend((channel, time, len(unpacked), len(unpacked) + len(data)))
                 unpacked += data
         if undone:
             self._note(place.offset, f"{undone} messages cannot be decompressed and were skipped")
-        return unpacked, where, place.opcode == Opcode.CHUNK
+        return unpacked, where
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a message that is wanted but cannot be decoded; others are ignored."""
