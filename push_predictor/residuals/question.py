@@ -12,8 +12,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import LOCAL
-from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
-from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
+from push_predictor.residuals.evidence.input_shift import ShiftedInput, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of

@@ -17,10 +17,8 @@ from scipy.stats import f, kstest, multivariate_t
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts
 from push_predictor.evaluation.report.figures.coverage import coverage_chart
-from push_predictor.evaluation.report.figures.ellipses import ellipse, inside
-from push_predictor.evaluation.report.figures.nearby import spread_rows
+from push_predictor.evaluation.report.figures.ellipses import ellipse, inside, magnification, spread_rows, start_pose
 from push_predictor.evaluation.report.figures.residuals import trend
-from push_predictor.evaluation.report.figures.slider import magnification, start_pose
 from push_predictor.evaluation.report.maps import arc_length, sector_length
 from push_predictor.evaluation.validation import pit
 from push_predictor.geometry.frames import rotate

@@ -15,8 +15,7 @@ from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
-from push_predictor.residuals.evidence.input_shift import input_shift
+from push_predictor.residuals.evidence.input_shift import about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.types import Array
 

@@ -16,8 +16,8 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.channels.corrections import correct
-from push_predictor.residuals.channels.measurement import MeasurementFinding, gap_responses, measurement_errors
+from push_predictor.residuals.channels.contrast import ChannelFinding
+from push_predictor.residuals.channels.measurement import correct, gap_responses, measurement_errors
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.simulation.spec import simulated_rig
 
@@ -69,14 +69,14 @@ def with_error(mechanism: str, values: tuple[float, ...], seed: int = 2) -> Push
     return windows(planted(recorded(seed), mechanism, values))
 
 
-def judged(table: PushTable, baseline: PushTable | None) -> MeasurementFinding:
+def judged(table: PushTable, baseline: PushTable | None) -> ChannelFinding:
     finding = measurement_errors(table, baseline, RIG)
     assert finding is not None
     return finding
 
 
-def assert_found(finding: MeasurementFinding, mechanism: str, values: tuple[float, ...]) -> None:
-    strongest = finding.errors[0]
+def assert_found(finding: ChannelFinding, mechanism: str, values: tuple[float, ...]) -> None:
+    strongest = finding.effects[0]
     assert strongest.mechanism == mechanism
     assert np.allclose(strongest.values, values, atol=UNIT[mechanism])
     assert all(parameter.low < parameter.value < parameter.high for parameter in strongest.parameters)
@@ -99,47 +99,47 @@ def test_planted_error_is_found_without_training_windows(mechanism: str, values:
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[5]])
 def test_no_error_remains_after_correction(mechanism: str, values: tuple[float, ...]) -> None:
     right = planted(recorded(2), mechanism, values)
-    for error in judged(with_error(mechanism, values), training()).errors:
+    for error in judged(with_error(mechanism, values), training()).effects:
         right = correct(right, error.mechanism, error.values)
-    assert judged(windows(right), training()).errors == ()
+    assert judged(windows(right), training()).effects == ()
     assert "corrected for" in right.notes[-1]
 
 
 def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
     finding = judged(with_error("tool_offset", (0.0, 0.0008)), training())
-    assert finding.errors[0].mechanism == "frame_shift"
-    assert "tool_offset" in finding.errors[0].rivals
-    assert np.allclose(finding.errors[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
+    assert finding.effects[0].mechanism == "frame_shift"
+    assert "tool_offset" in finding.effects[0].rivals
+    assert np.allclose(finding.effects[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_clean_recording_has_no_error(seed: int) -> None:
-    assert judged(clean(seed), training()).errors == ()
-    assert judged(clean(seed), None).errors == ()
+    assert judged(clean(seed), training()).effects == ()
+    assert judged(clean(seed), None).effects == ()
 
 
 @pytest.mark.slow
 def test_change_of_contact_friction_is_not_a_measurement_error() -> None:
-    assert judged(windows(recorded(4, contact_friction=0.5)), training()).errors == ()
+    assert judged(windows(recorded(4, contact_friction=0.5)), training()).effects == ()
 
 
 def test_error_that_training_has_too_is_not_reported() -> None:
     both = [windows(planted(recorded(seed), "frame_shift", (0.001, 0.0))) for seed in (1, 2)]
     by_itself, as_before = ({t.mechanism: t.p_value for t in judged(both[1], base).tested} for base in (None, both[0]))
     assert by_itself["frame_shift"] < 0.05 < as_before["frame_shift"]  # 40 pushes alone do not reach a percent
-    assert judged(both[1], both[0]).errors == ()
+    assert judged(both[1], both[0]).effects == ()
 
 
 def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
     table = clean(2)
     gap = table.covariates["contact_gap"] - 0.001
     worn = replace(table, covariates={**table.covariates, "contact_gap": gap})
-    assert judged(worn, training()).errors == ()
+    assert judged(worn, training()).effects == ()
 
 
 def test_error_below_the_tracker_noise_is_not_reported() -> None:
-    assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).errors == ()
+    assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).effects == ()
 
 
 def test_reports_every_candidate_tested() -> None:

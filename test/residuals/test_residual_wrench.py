@@ -15,8 +15,9 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.channels.contrast import ChannelFinding
 from push_predictor.residuals.channels.limit_load import loads
-from push_predictor.residuals.channels.wrench import WrenchFinding, wrench_effects
+from push_predictor.residuals.channels.wrench import wrench_effects
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array
 
@@ -74,7 +75,7 @@ def predicted_force(contact: Array, angle: Array, contact_friction: float) -> Ar
     return force / np.sqrt(1.0 + moment[np.arange(len(best)), best] ** 2)[:, None]
 
 
-def found(table: PushTable, baseline: PushTable | None) -> WrenchFinding:
+def found(table: PushTable, baseline: PushTable | None) -> ChannelFinding:
     return wrench_effects(table, baseline, MECHANICS, alpha=0.002)
 
 

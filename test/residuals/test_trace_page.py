@@ -33,10 +33,9 @@ from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Sized, Trace, Verdict
-from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
+from push_predictor.residuals.reporting.figures.driver_basis import analysis_rows, basis_charts, determined, strength_of
 from push_predictor.residuals.reporting.figures.errors import error_charts
 from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts
-from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import interval_cell

@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.evaluation.report.figures.calibration import paint_calibration
-from push_predictor.evaluation.report.figures.ellipses import paint_examples
-from push_predictor.evaluation.report.figures.nearby import ENOUGH, examples
-from push_predictor.evaluation.report.figures.push_maps import Panel, paint_maps
+from push_predictor.evaluation.report.figures.ellipses import ENOUGH, examples, paint_examples
 from push_predictor.evaluation.report.figures.residuals import paint_residuals, time_axis
 from push_predictor.evaluation.report.figures.tracks import paint_tracks
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     Condition,
+    Panel,
     PushMap,
     coarse_cells,
     commonest_condition,
     fine_cells,
     fold_order,
+    paint_maps,
     predicted_at_windows,
     push_map,
     recorded_map,

@@ -14,7 +14,7 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.channels.measurement import gap_responses
-from push_predictor.residuals.channels.wrench import WRENCH_BIAS
+from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SETTLED
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.pushes import (

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.push_maps import contact_label
-from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
+from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, contact_label, recorded_map
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -20,7 +19,7 @@ from push_predictor.reporting import chart, html
 from push_predictor.reporting.chart import Chart
 from push_predictor.reporting.html import number
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.partial import Strength, strength_of
+from push_predictor.residuals.reporting.figures.driver_basis import Strength, strength_of
 from push_predictor.residuals.reporting.phrases import bare, count, covariate_phrase, place_of_step
 from push_predictor.types import Array, BoolArray
 

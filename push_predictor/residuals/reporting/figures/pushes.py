@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.push_scores import resampled_means
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.standardised import push_order
-from push_predictor.residuals.reporting.figures.partial import DRAWS, LEAST_PUSHES
 from push_predictor.residuals.reporting.phrases import covariate_phrase, label, shown_unit_of
 from push_predictor.types import Array, IntArray, TextArray
 
+LEAST_PUSHES = 3  # of a bin that is shown
 BINS, PUSHES_PER_BIN = 10, 4  # at most; about
 GAP, WIDTH = 0.05, 0.03  # of the range: levels of a covariate are farther apart, and narrower
 
@@ -108,8 +108,7 @@ def _mean(x: Array, push_id: TextArray, values: Array, rows: Array, square: bool
     if pushes < LEAST_PUSHES:
         return None
     shown = values[rows] ** 2 if square else values[rows]
-    weights = push_bootstrap(push_id[rows], draws=DRAWS)
-    low, high = np.quantile(weights @ shown / weights.sum(axis=1), [0.025, 0.975])
+    low, high = np.quantile(resampled_means(push_id[rows], shown[:, None]), [0.025, 0.975])
     ends = np.array([shown.mean(), low, high])
     return [float(x[rows].mean()), *(np.sqrt(ends) if square else ends).tolist(), float(pushes)]
 
