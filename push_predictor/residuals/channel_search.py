@@ -12,7 +12,7 @@ import numpy as np
 
 from push_predictor.evaluation.offline import window_options
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect, ChannelFinding
+from push_predictor.residuals.channels.contrast import GROSS, NOTHING_FOUND, ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.measurement import correct, measurement_errors
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
 from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
@@ -105,8 +105,8 @@ def _explains_residuals(question: Question, corrected: Corrected) -> bool:
 
 
 def _excess(evidence: Evidence) -> float:
-    """Mean excess of the squared standardised residuals over 1; each square counts at most 25."""
-    return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
+    """Mean excess of the squared standardised residuals over 1; a square counts at most that of a gross error."""
+    return float(np.mean(np.minimum(evidence.z**2, GROSS**2))) - 1.0
 
 
 def _bias_of(forces: ChannelFinding) -> ChannelEffect | None:

@@ -17,6 +17,7 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import blocks_of
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.selection.screening import Screened, block_scores, screen
@@ -26,7 +27,6 @@ DRAWS = 1000
 FOLDS = 5
 GROSS = 5.0  # robust standard deviations; windows farther out are rejected
 TRIMMING_ROUNDS = 4
-FEWEST_PUSHES = 12  # of a training table that is used
 MAD_TO_SD = 1.4826
 COLLINEAR = 1e-6  # share of a column's square that the controls do not explain; less counts as collinear
 

@@ -46,6 +46,7 @@ from push_predictor.residuals.channels.contrast import (
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.outcome import Tested
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -57,7 +58,6 @@ PARAMETERS = {
 }
 ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
 MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
-FEWEST_ROWS = 2.0  # per column
 CORNER = 0.002  # m; contacts closer to a corner may be on either side of it
 
 
@@ -88,7 +88,7 @@ def measurement_errors(
     base = None if baseline is None else _off_corners(baseline, rig.outline)
     both = stacked(_off_corners(windows, rig.outline), base, NEEDED)
     gap = _gap_of(both, rig.outline)
-    if len(gap.z) < FEWEST_ROWS * gap.controls.shape[1] or not gap.tried:
+    if len(both.tables[-1].pushes) < FEWEST_PUSHES or not gap.tried:
         return None
     gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.controls))
     return _searched(gap, alpha, seed)

@@ -19,13 +19,13 @@ import numpy as np
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import ChannelEffect
 from push_predictor.residuals.evidence.drivers import CONSTANT, SENSOR_ZERO
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
 BETWEEN_SESSIONS = 0.02  # N, standard deviation of the zero of a sound sensor, per axis
 PROGRESS = "push_index"  # along which a step within the session is placed
-FEWEST_PUSHES = 12  # of a part of the session or of training
 PLACES = 10  # at which a step is tried
 NORMAL_95 = 1.96
 WRENCH_BIAS = "wrench_bias"

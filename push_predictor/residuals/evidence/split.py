@@ -13,6 +13,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import BoolArray
 
+FEWEST_PUSHES = 12  # of a table, or of a part of one, that anything is concluded from
 BLOCK = 10  # pushes
 FEWEST_BLOCKS = 9  # with fewer pushes the blocks are smaller
 EVERY = 3  # one block in so many is held out
