@@ -15,8 +15,12 @@ from hypothesis import strategies as st
 from scipy.stats import f, kstest, multivariate_t
 
 from push_predictor.evaluation.metrics import standardised
-from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts
-from push_predictor.evaluation.report.figures.coverage import coverage_chart
+from push_predictor.evaluation.report.figures.calibration import (
+    LEVELS,
+    coverage_chart,
+    coverage_curve,
+    expected_counts,
+)
 from push_predictor.evaluation.report.figures.ellipses import ellipse, inside, magnification, spread_rows, start_pose
 from push_predictor.evaluation.report.figures.residuals import trend
 from push_predictor.evaluation.report.maps import arc_length, sector_length

@@ -6,21 +6,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from push_predictor.evaluation.ladder.ladder_text import COLUMNS, count, interval, ladder_answer, ladder_rows, unit
-from push_predictor.evaluation.ladder.scored_ladder import FittedParameter, ScoredLadder
+from push_predictor.evaluation.ladder.scored_ladder import ScoredLadder
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
-from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, Picture, draw, grid
-from push_predictor.reporting.chart import Bars, Chart, limits_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from push_predictor.reporting.chart import Bars, Chart, Line, limits_of
 
 PARAMETER_HEAD = ("Meaning", "Value", "Unit", "Textbook", "Parameter")
 METHOD = (
@@ -37,23 +30,25 @@ ERROR = (
     "Total NMSE of held-out pushes after each step, with 95 % intervals. Step 0 has the textbook values. Hover over a "
     "point to see what its step adds."
 )
+PARAMETERS = (
+    "Fitted parameters in prior standard deviations from the textbook value, in the order of the table. Hover over a "
+    "point to see its name."
+)
 
 
 def write_ladder_page(path: Path, ladder: ScoredLadder) -> Path:
-    """Write the page; return its path. Raises OSError, or PushPredictorError without matplotlib or Jinja2."""
-    with TemporaryDirectory() as folder:
-        parts = _parts(Path(folder), ladder)
-    write_whole(path, html.page(f"Fitted mechanics of the model {ladder.model.name}", parts).encode())
+    """Write the page; return its path. Raises OSError, or PushPredictorError without Jinja2."""
+    write_whole(path, html.page(f"Fitted mechanics of the model {ladder.model.name}", _parts(ladder)).encode())
     return path
 
 
-def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
+def _parts(ladder: ScoredLadder) -> list[str]:
     steps = [(f"{row[0]}  {row[1]}", *row[2:]) for row in ladder_rows(ladder)]
     head = ["Step and free parameters", *(column[0].upper() + column[1:] for column in COLUMNS[2:])]
     parts = [
         html.opening(ladder_answer(ladder), _label(ladder), html.charts([error_chart(ladder)], ERROR)),
         html.heading("Fitted parameters"),
-        html.figure(_picture(folder, ladder)),
+        *([html.charts([parameter_chart(ladder)], PARAMETERS)] if ladder.final else []),
         html.folded_table(
             "Fitted parameters. Values with 95 % intervals from the variation between pushes.",
             PARAMETER_HEAD,
@@ -85,6 +80,24 @@ def error_chart(ladder: ScoredLadder) -> Chart:
     )
 
 
+def parameter_chart(ladder: ScoredLadder) -> Chart:
+    """The fitted parameters with 95 % intervals, in prior standard deviations from the textbook value."""
+    ends = np.array(
+        [[(end - p.parameter.textbook) / p.parameter.spread for end in vars(p.estimate).values()] for p in ladder.final]
+    )
+    number, titles = np.arange(1.0, len(ends) + 1.0), [p.parameter.name for p in ladder.final]
+    x = (0.5, len(ends) + 0.5)
+    return Chart(
+        label="Fitted parameters in prior standard deviations from the textbook value",
+        x_label="parameter",
+        y_label="prior standard deviations",
+        x=x,
+        y=limits_of(ends, np.zeros(1)),
+        marks=(Line("zero", np.array(x), np.zeros(2)), Bars("fit", number, *ends.T, titles)),
+        names={float(k): f"{k:.0f}" for k in number},
+    )
+
+
 def _label(ladder: ScoredLadder) -> str:
     return "textbook values" if len(ladder.steps) == 1 else f"{len(ladder.final)} fitted"
 
@@ -100,52 +113,3 @@ def _parameter_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:
         )
         for p in ladder.final
     ]
-
-
-def _picture(folder: Path, ladder: ScoredLadder) -> Picture:
-    height = 1.2 + 0.36 * max(len(ladder.steps), len(ladder.final), 3)
-    path = draw(folder / "ladder.png", (9.5, height), lambda figure: _paint(figure, ladder))
-    caption = (
-        "Left and middle: total NMSE and NLPD of held-out pushes after each step, with 95 % intervals. "
-        "Right: fitted parameters in prior standard deviations from the textbook value."
-    )
-    return Picture(path, "Held-out scores by step of the ladder, and the fitted parameters", caption)
-
-
-def _paint(figure: Figure, ladder: ScoredLadder) -> None:
-    nmse, nlpd, fitted = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
-    steps = [
-        f"{k}  {row[1]}".replace(" in place of ", "\n   in place of ") for k, row in enumerate(ladder_rows(ladder))
-    ]
-    for axes, name in ((nmse, "nmse"), (nlpd, "nlpd")):
-        estimates = [getattr(step, name) for step in ladder.steps]
-        _intervals(axes, np.array([[e.value, e.low, e.high] for e in estimates]), PREDICTED)
-        axes.set_yticks(range(len(steps)), steps if axes is nmse else [""] * len(steps))
-        axes.set_ylim(len(steps) - 0.5, -0.5)
-        axes.locator_params(axis="x", nbins=4)
-        axes.set_xlabel(f"Held-out {name.upper()}" + (" (nats)" if name == "nlpd" else ""))
-    _paint_parameters(fitted, ladder.final)
-
-
-def _paint_parameters(axes: Axes, parameters: list[FittedParameter]) -> None:
-    axes.axvline(0.0, color=NEARBY, linewidth=0.8)
-    if parameters:
-        scaled = [
-            [
-                (end - p.parameter.textbook) / p.parameter.spread
-                for end in (p.estimate.value, p.estimate.low, p.estimate.high)
-            ]
-            for p in parameters
-        ]
-        _intervals(axes, np.array(scaled), OBSERVED)
-    axes.set_yticks(range(len(parameters)), [p.parameter.name for p in parameters])
-    axes.set_ylim(max(len(parameters), 1) - 0.5, -0.5)
-    axes.set_xlabel("Prior standard deviations")
-
-
-def _intervals(axes: Axes, ends: np.ndarray, colour: str) -> None:
-    """Draw values with intervals (k, 3: value, low, high), one per line."""
-    place = np.arange(len(ends))
-    axes.hlines(place, ends[:, 1], ends[:, 2], color=colour, linewidth=1.6)
-    axes.plot(ends[:, 0], place, "o", color=colour, markersize=4.5)
-    grid(axes)

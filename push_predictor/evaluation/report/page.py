@@ -12,7 +12,7 @@ from typing import Any
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.judgement import count_pushes, judged
-from push_predictor.evaluation.report.figures.coverage import coverage_chart
+from push_predictor.evaluation.report.figures.calibration import coverage_chart
 from push_predictor.evaluation.report.figures.gallery import (
     Validation,
     calibration_pictures,
@@ -112,7 +112,7 @@ def _opening(shown: Validation, metrics: list[dict[str, Any]], alarm: Mapping[st
     if not len(shown.table):
         return [html.opening(NOTHING_FOUND, "no push found"), about]
     answers = [calibration_sentence(main), *(comparison_sentence(main, other) for other in others)]
-    figure = html.charts([coverage_chart(main)], COVERAGE)
+    figure = html.charts([coverage_chart(comparison) for comparison in shown.comparisons], COVERAGE)
     return [html.opening(opening_sentences(first), judged(first).label, figure), html.bullets(answers), about]
 
 

@@ -233,7 +233,7 @@ def _spread(
     baseline: Baseline,
 ) -> VarianceFinding:
     if len(evidence.table.pushes) < FEWEST_PUSHES:
-        return VarianceFinding((), ())
+        return VarianceFinding()
     return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
 
 
