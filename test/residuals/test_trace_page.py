@@ -522,9 +522,9 @@ def test_levels_of_a_covariate_are_bins_of_their_own() -> None:
 def test_bins_have_the_mean_and_an_interval_around_it() -> None:
     table = made_up.pushes(80, 4)
     bins = means_along(axis_of(table, "elapsed_time"), table.push_id, table.covariates["elapsed_time"])
-    np.testing.assert_allclose(bins.x, bins.y)
-    assert len(bins.x) == 10 and bins.pushes.sum() == 80
-    assert np.all((bins.low <= bins.y) & (bins.y <= bins.high))
+    np.testing.assert_allclose(bins.place, bins.value)
+    assert len(bins.place) == 10
+    assert np.all((bins.low <= bins.value) & (bins.value <= bins.high))
 
 
 def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:

@@ -43,7 +43,6 @@ from push_predictor.residuals.channels.contrast import (
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.channels.sensor_zero import BIAS, WRENCH_BIAS, zero_shift
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
-from push_predictor.residuals.evidence.inputs_basis import PUSHES_PER_COLUMN
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.outcome import Sized, Tested
@@ -54,6 +53,7 @@ SURFACE_FRICTION = "surface_friction"
 LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 SIMPLEST_FIRST = ("linear", "step", "quadratic")  # forms of a change of the friction
 MOST_NEAR = 12  # places of a step that are tried near the best of the first
+PUSHES_PER_INPUT = 10  # of the controls: all windows of a push share a contact and an angle
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
@@ -140,7 +140,7 @@ def _pressing(table: PushTable) -> PushTable:
 def _force_of(stack: Stacked, mechanics: FittedMechanics) -> _Force:
     each = [loads(table, mechanics) for table in stack.tables]
     z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
-    most = sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_COLUMN
+    most = sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT
     controls = stack.joined([inputs_of(table, mechanics, most) for table in stack.tables])
     unit = np.maximum([robust_deviation(column) for column in Residualizer(controls)(z).T], 1e-12)
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]

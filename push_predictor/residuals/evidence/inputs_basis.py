@@ -20,7 +20,7 @@ from push_predictor.types import Array
 Kind = Literal["driven", "speed", "constant"]  # an effect depends on another covariate, on the speed, or on neither
 
 DEGREES = (5, 4, 3, 2, 1)
-PUSHES_PER_COLUMN = 5  # of controls: all windows of a push share a contact and an angle
+PUSHES_PER_COLUMN = 5
 VARIES = 0.01  # standard deviation of log velocity; below it the table has one speed
 
 

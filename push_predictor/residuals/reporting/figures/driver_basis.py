@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of
@@ -25,12 +24,13 @@ from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.pushes import (
     LEAST_PUSHES,
     Axis,
+    Bins,
     axis_of,
     bins_along,
     push_means,
     titles,
 )
-from push_predictor.residuals.reporting.phrases import capitalised, interval, shown_unit, with_unit
+from push_predictor.residuals.reporting.phrases import capitalised, shown_unit, with_unit
 from push_predictor.types import Array, BoolArray, IntArray
 
 GRID = 400
@@ -53,7 +53,7 @@ class Seen:
     names: list[str]
     place: Array
     value: Array
-    bins: Binned
+    bins: Bins
 
 
 def basis_charts(trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> list[Chart]:
@@ -140,11 +140,10 @@ def determined(width: Array) -> BoolArray:
     return np.asarray(width <= WIDEST * np.median(width)) if len(width) else np.zeros(0, dtype=np.bool_)
 
 
-def _bars(kind: str, name: str, bins: Binned, q: int, factor: float, unit: str, aside: float) -> Bars:
+def _bars(kind: str, name: str, bins: Bins, q: int, factor: float, unit: str, aside: float) -> Bars:
     kept = determined(bins.high[:, q] - bins.low[:, q])
-    value, low, high = (factor * each[kept, q] for each in (bins.value, bins.low, bins.high))
-    each = [interval(Estimate(*map(float, ends)), unit) for ends in zip(value, low, high, strict=True)]
-    return Bars(kind, bins.place[kept] + aside, value, low, high, each, name=name)
+    each = (factor * ends[kept, q] for ends in (bins.value, bins.low, bins.high))
+    return Bins(bins.place[kept] + aside, *each).bars(kind, unit, name)
 
 
 def _map_chart(trace: Trace, strength: Strength, rows: Rows, q: int) -> Chart:
@@ -200,16 +199,6 @@ class Strength:
         values = self.effect.basis.values(covariates, n)
         variance = np.einsum("nm,qmk,nk->nq", values, self.covariance, values)
         return values @ self.coefficients.T, CENTRAL * np.sqrt(np.maximum(variance, 0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Binned:
-    """Position of each bin (b,), and the q parameters' estimates with their 95 % ends (b, q)."""
-
-    place: Array
-    value: Array
-    low: Array
-    high: Array
 
 
 def analysis_rows(trace: Trace) -> Rows:
@@ -268,7 +257,7 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
 
 
-def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: IntArray) -> Binned:
+def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: IntArray) -> Bins:
     """The parameters in each bin (n,) of windows by least squares, with 95 % ends from a bootstrap of its pushes.
 
     place (n,): position of a window on the axis. Windows of bin -1 and bins of fewer than three pushes are dropped.
@@ -279,7 +268,7 @@ def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: 
     kept = [each for each in found if each is not None]
     q = response.shape[2]
     stacked = np.array(kept).reshape(-1, 4, q)
-    return Binned(stacked[:, 0, 0], stacked[:, 1], stacked[:, 2], stacked[:, 3])
+    return Bins(stacked[:, 0, 0], stacked[:, 1], stacked[:, 2], stacked[:, 3])
 
 
 def per_push(strength: Strength, rows: Rows, response: Array, place: Array) -> tuple[Array, Array]:

@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.figures.calibration import KINDS, coverage_chart, expected_counts, histogram
 from push_predictor.evaluation.validation import Comparison, pit
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.canvas import UNITS
-from push_predictor.reporting.chart import HALF, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
+from push_predictor.reporting.chart import HALF, Band, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.reporting.figures.pushes import Axis, axis_of, means_along, push_means, titles
-from push_predictor.residuals.reporting.phrases import interval
 from push_predictor.types import Array, TextArray
 
 QUARTER = (215.0, 195.0)
@@ -76,11 +74,9 @@ def _error_chart(axis: Axis, judged: Sequence[Judged], k: int, label: str, unit:
         names, square = push_means(one.push_id, size**2)
         each, bins = np.sqrt(square), means_along(replace(axis, x=one.x), one.push_id, size, square=True)
         dots.append(Dots(kind, push_means(one.push_id, one.x)[1], each, titles(names, each, unit)))
-        found = [Estimate(*map(float, ends)) for ends in zip(bins.y, bins.low, bins.high, strict=True)]
         if alike:
-            bars.append(Line(kind, bins.x, bins.y))
-        shown = [interval(gain, unit) for gain in found]
-        bars.append(Bars(kind, bins.x, bins.y, bins.low, bins.high, shown, name=one.model))
+            bars.append(Line(kind, bins.place, bins.value))
+        bars.append(bins.bars(kind, unit, one.model))
         ends += [bins.high, np.quantile(each, [1.0 - SHARE]) if len(each) else np.zeros(0)]
     x, y = limits_of(axis.x, margin=0.02), (0.0, limits_of(*ends)[1])
     return Chart(f"{label} before and after.", axis.label, label, x, y, (*dots, *bars), size=HALF, names=axis.names)
