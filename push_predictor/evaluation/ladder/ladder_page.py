@@ -93,7 +93,7 @@ def parameter_chart(ladder: ScoredLadder) -> Chart:
         y_label="prior standard deviations",
         x=x,
         y=limits_of(ends, np.zeros(1)),
-        marks=(Line("zero", np.array(x), np.zeros(2)), Bars("fit", number, *ends.T, titles)),
+        marks=(Line("zero", np.array(x), np.zeros(2)), Bars("fit", number, ends[:, 0], ends[:, 1], ends[:, 2], titles)),
         names={float(k): f"{k:.0f}" for k in number},
     )
 

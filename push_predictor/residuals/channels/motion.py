@@ -28,7 +28,7 @@ from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED, REJECTED
-from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
+from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
@@ -129,7 +129,7 @@ def motion_effects(
         tested=_tested(found),
         deviation=baseline.deviation if inputs.learnt else None,
         minimum_detectable={
-            **detectable_json(minimum_detectable(found, evidence, inputs, share, baseline)),
+            **minimum_detectable(found, evidence, inputs, share, baseline),
             **_detectable_noise(spread),
         },
         remaining=_remaining(found, share),
