@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a search may trust: inputs inside training."""
+"""What a search may trust: inputs inside training, blocks of pushes that share a disturbance, held-out pushes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.input_shift import about_mechanics, input_shift, widened
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of
 from push_predictor.types import Array
 
 
@@ -151,3 +152,20 @@ def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_
     assert about_mechanics(analytical) is analytical
     informed = about_mechanics(learned)
     assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)
+
+
+@pytest.mark.parametrize(("pushes", "together"), [(90, 10), (27, 3), (5, 1)])
+def test_every_third_block_of_pushes_is_held_out_and_few_pushes_have_smaller_blocks(pushes: int, together: int) -> None:
+    held = held_out_rows(in_order(pushes))
+    assert held.tolist() == [(k // together) % 3 == 2 for k in range(pushes)]
+
+
+@pytest.mark.parametrize(("pushes", "together"), [(800, 4), (250, 2), (60, 1)])
+def test_neighbouring_pushes_share_a_block_where_there_are_enough(pushes: int, together: int) -> None:
+    assert blocks_of(in_order(pushes)).tolist() == [k // together for k in range(pushes)]
+
+
+def in_order(count: int) -> PushTable:
+    """A window of each of these pushes."""
+    nothing = np.zeros((count, 3))
+    return PushTable(nothing, np.full(count, 0.2), nothing, np.arange(count).astype(np.str_))
