@@ -50,7 +50,6 @@ from push_predictor.residuals.selection.forms import step_places, step_places_ne
 from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION = "surface_friction"
-LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 SIMPLEST_FIRST = ("linear", "step", "quadratic")  # forms of a change of the friction
 MOST_NEAR = 12  # places of a step that are tried near the best of the first
 PUSHES_PER_INPUT = 10  # of the controls: all windows of a push share a contact and an angle
@@ -130,11 +129,8 @@ def _of_contact(
 
 
 def _pressing(table: PushTable) -> PushTable:
-    """Windows in which the pusher presses against the slider."""
-    if any(name not in table.covariates for name in FORCES) or not len(table):
-        return table
-    force = table.covariates["normal_force"]
-    return table.take(force > LEAST_FORCE * max(float(np.median(force)), np.finfo(float).tiny))
+    """Windows in which the pusher presses against the slider: the others have no load."""
+    return table.take(table.covariates["normal_force"] > 0.0) if set(FORCES) <= set(table.covariates) else table
 
 
 def _force_of(stack: Stacked, mechanics: FittedMechanics) -> _Force:
