@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.contrast import ChannelFinding
-from push_predictor.residuals.channels.measurement import correct, gap_responses, measurement_errors
+from push_predictor.residuals.channels.measurement import _off_corners, correct, gap_responses, measurement_errors
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.simulation.spec import simulated_rig
 
@@ -140,6 +141,22 @@ def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
 
 def test_error_below_the_tracker_noise_is_not_reported() -> None:
     assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).effects == ()
+
+
+def test_error_that_passes_but_is_smaller_than_the_noise_of_a_window_is_not_reported() -> None:
+    finding = measurement_errors(clean(2), training(), RIG, alpha=0.1)
+    assert finding is not None and min(tried.p_value for tried in finding.tested) <= 0.1
+    assert finding.effects == ()
+
+
+def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none() -> None:
+    table, square, ellipse = clean(2), RIG.outline, shape_outline("ellip2")
+    near = 0.0015 / square.perimeter
+    inputs = table.inputs.copy()
+    inputs[:, 1] = np.where(np.arange(len(table)) % 2, 0.25 + near, 0.25 + 3.0 * near)
+    moved = replace(table, inputs=inputs)
+    assert len(_off_corners(moved, square)) == -(-len(table) // 2)
+    assert len(_off_corners(moved, ellipse)) == len(table)
 
 
 def test_reports_every_candidate_tested() -> None:

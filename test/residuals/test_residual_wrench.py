@@ -121,6 +121,13 @@ def test_drift_of_surface_friction_is_no_step(seed: int) -> None:
     assert effect.basis == "linear"
 
 
+def test_windows_with_a_gross_error_of_the_force_do_not_hide_a_drift() -> None:
+    odd = np.where(np.arange(PUSHES * WINDOWS) % 60 == 7, 1e4, 1.0)
+    (effect,) = found(with_force(made(2, drift=0.2), odd), made(1)).effects
+    assert effect.covariate == "elapsed_time"
+    assert effect.parameters[0].low < np.expm1(0.9 * 0.2) < effect.parameters[0].high
+
+
 def with_force(table: PushTable, factor: Array) -> PushTable:
     forces = {name: table.covariates[name] * factor for name in ("normal_force", "tangential_force")}
     return replace(table, covariates={**table.covariates, **forces})
