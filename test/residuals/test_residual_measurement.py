@@ -14,7 +14,7 @@ import pytest
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.contrast import ChannelFinding
@@ -143,10 +143,15 @@ def test_error_below_the_tracker_noise_is_not_reported() -> None:
     assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).effects == ()
 
 
-def test_error_that_passes_but_is_smaller_than_the_noise_of_a_window_is_not_reported() -> None:
-    finding = measurement_errors(clean(2), training(), RIG, alpha=0.1)
-    assert finding is not None and min(tried.p_value for tried in finding.tested) <= 0.1
-    assert finding.effects == ()
+def test_error_that_is_certain_but_smaller_than_the_noise_of_a_window_is_not_reported() -> None:
+    table = concatenate([replace(clean(2), push_id=np.char.add(f"{k}-", clean(2).push_id)) for k in range(6)])
+    response = gap_responses(table, RIG.outline)["frame_shift"][:, 0]
+    noise = 0.0004 * np.random.default_rng(1).standard_normal(len(table))
+    for shift, reported in ((0.0004, False), (0.001, True)):
+        off = {**table.covariates, "contact_gap": shift * response + noise}
+        finding = judged(replace(table, covariates=off), None)
+        assert {t.mechanism: t.p_value for t in finding.tested}["frame_shift"] <= 0.01
+        assert bool(finding.effects) == reported
 
 
 def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none() -> None:
