@@ -15,7 +15,9 @@ from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.input_shift import about_mechanics, input_shift, widened
+from push_predictor.residuals.evidence.drivers import screening_bases
+from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of
 from push_predictor.types import Array
@@ -169,3 +171,22 @@ def in_order(count: int) -> PushTable:
     """A window of each of these pushes."""
     nothing = np.zeros((count, 3))
     return PushTable(nothing, np.full(count, 0.2), nothing, np.arange(count).astype(np.str_))
+
+
+def test_a_contact_is_far_from_training_beyond_the_margin_and_the_gaps_of_training() -> None:
+    dense, sparse = np.linspace(0.0, 0.5, 101), np.linspace(0.0, 1.0, 9)[:-1]
+    assert _apart(1, np.array([0.52, 0.55]), dense).tolist() == [False, True]
+    assert _apart(1, np.array([0.5625]), sparse).tolist() == [False]
+
+
+def test_speeds_that_hardly_vary_are_one_speed(known: PushTable) -> None:
+    jitter = 1.0 + 1e-3 * np.random.default_rng(0).standard_normal(len(known))
+    basis = inputs_basis(trained(known), with_inputs(known, 0, 0.02 * jitter))
+    assert np.array_equal(basis.columns, basis.without_speed)
+
+
+@pytest.mark.parametrize(("levels", "tried"), [(12, True), (13, False)])
+def test_a_category_of_many_levels_is_not_tried(levels: int, tried: bool) -> None:
+    recording = np.arange(60.0) % levels
+    names = [name for name, _ in screening_bases(replace(in_order(60), covariates={"recording": recording}))]
+    assert ("recording" in names) == tried

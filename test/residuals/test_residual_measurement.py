@@ -155,13 +155,12 @@ def test_error_that_is_certain_but_smaller_than_the_noise_of_a_window_is_not_rep
 
 
 def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none() -> None:
-    table, square, ellipse = clean(2), RIG.outline, shape_outline("ellip2")
-    near = 0.0015 / square.perimeter
+    table, near = clean(2), 0.0015 / RIG.outline.perimeter
     inputs = table.inputs.copy()
     inputs[:, 1] = np.where(np.arange(len(table)) % 2, 0.25 + near, 0.25 + 3.0 * near)
     moved = replace(table, inputs=inputs)
-    assert len(_off_corners(moved, square)) == -(-len(table) // 2)
-    assert len(_off_corners(moved, ellipse)) == len(table)
+    assert len(_off_corners(moved, RIG.outline)) == -(-len(table) // 2)
+    assert len(_off_corners(table, shape_outline("ellip2"))) == len(table)
 
 
 def test_reports_every_candidate_tested() -> None:

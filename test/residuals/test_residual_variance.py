@@ -78,3 +78,9 @@ class TestVariance:
         z[7] *= 300.0
         noise = variance_effects(learnt(), evidence, z, 0.01, names=(), baseline=baseline(learnt())).found
         assert [effect.covariate for effect in noise] == ["model_inputs"]
+
+    def test_variance_of_one_output_is_reported_of_that_one(self) -> None:
+        evidence = seen(learnt(), pushes(COUNT, 401))
+        z = evidence.z * [1.0, 2.0, 1.0]
+        (effect,) = variance_effects(learnt(), evidence, z, 0.01, names=(), baseline=baseline(learnt())).found
+        assert effect.outputs == ("dy",)
