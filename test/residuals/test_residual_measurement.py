@@ -18,7 +18,13 @@ from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.contrast import ChannelFinding
-from push_predictor.residuals.channels.measurement import _off_corners, correct, gap_responses, measurement_errors
+from push_predictor.residuals.channels.measurement import (
+    _geometry,
+    _off_corners,
+    correct,
+    gap_responses,
+    measurement_errors,
+)
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.simulation.spec import simulated_rig
 
@@ -161,6 +167,9 @@ def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none
     moved = replace(table, inputs=inputs)
     assert len(_off_corners(moved, RIG.outline)) == -(-len(table) // 2)
     assert len(_off_corners(table, shape_outline("ellip2"))) == len(table)
+    around = _geometry(table, shape_outline("ellip2"))  # three waves along the outline, rather than a line
+    waves = np.cos(6.0 * np.pi * table.inputs[:, 1])
+    np.testing.assert_allclose(around @ np.linalg.lstsq(around, waves, rcond=None)[0], waves, atol=1e-9)
 
 
 def test_reports_every_candidate_tested() -> None:

@@ -35,7 +35,7 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Sized, Trace, Verdict
 from push_predictor.residuals.reporting.figures.driver_basis import analysis_rows, basis_charts, determined, strength_of
 from push_predictor.residuals.reporting.figures.errors import error_charts
-from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts
+from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts, map_figures
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import interval_cell
@@ -468,6 +468,12 @@ def test_maps_of_a_step_are_split_at_its_place() -> None:
     assert time[halves.masks[0]].max() < JUMP.place <= time[halves.masks[1]].min()
 
 
+def test_maps_show_the_held_out_pushes_without_and_with_the_effect() -> None:
+    (shown,) = map_figures(trace_of("effect"))
+    assert "Map of the mean residual of dx, refit;" in shown and "Map of the mean residual of dx, after;" in shown
+    assert "Mean residual of" in shown and "held-out pushes over contact point" in shown
+
+
 @pytest.mark.parametrize("place", [-1.0, 30.0, 990.0, 2000.0])
 def test_maps_are_whole_where_a_half_would_be_empty(place: float) -> None:
     trace = trace_of("effect")
@@ -525,6 +531,8 @@ def test_bins_have_the_mean_and_an_interval_around_it() -> None:
     np.testing.assert_allclose(bins.place, bins.value)
     assert len(bins.place) == 10
     assert np.all((bins.low <= bins.value) & (bins.value <= bins.high))
+    bars = bins.bars("before", "s", "pushes, in bins")
+    assert bars.y is bins.value and bars.low is bins.low and bars.high is bins.high and " s (95 % CI " in bars.titles[0]
 
 
 def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:
