@@ -25,7 +25,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000
 FOLDS = 5
-GROSS = 5.0  # robust standard deviations; windows farther out are rejected
+GROSS = 5.0  # robust standard deviations; guards against gross errors: windows farther out are rejected
 TRIMMING_ROUNDS = 4
 MAD_TO_SD = 1.4826
 COLLINEAR = 1e-6  # share of a column's square that the controls do not explain; less counts as collinear

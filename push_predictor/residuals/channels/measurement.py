@@ -58,7 +58,7 @@ PARAMETERS = {
 }
 ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
 MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
-CORNER = 0.002  # m; contacts closer to a corner may be on either side of it
+CORNER = 0.002  # m; guards against a wrong normal: contacts closer to a corner may be on either side of it
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,9 @@ from push_predictor.residuals.selection.screening import Controlled, Scores, Scr
 from push_predictor.types import Array
 
 TINY = 1e-12
-MOST = 9.0  # of a square: three standard deviations
+MOST = 9.0  # of a square, three standard deviations: guards against a few windows far off
 TRIED = (OUTPUTS, *((name,) for name in OUTPUTS))  # all outputs, then each
-NOTABLE = 1.2  # least ratio that counts: a base that saw few pushes misjudges its own noise a little
+NOTABLE = 1.2  # least ratio: guards against a base that saw few pushes and misjudges its own noise a little
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,9 @@ from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.types import Array, BoolArray
 
 SPEED_MARGIN = 0.15  # relative: speeds are estimated from few samples
-ANGLE_MARGIN = 0.1  # rad
-CONTACT_MARGIN = 0.03  # of the perimeter
-WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
+ANGLE_MARGIN = 0.1  # rad: guards against the noise of an estimated angle
+CONTACT_MARGIN = 0.03  # of the perimeter: guards against gaps between contacts that lie densely
+WIDEST_GAPS = 2.0  # of training between contacts: guards against new contacts amid sparse ones
 ONE_SIDED = 0.2  # share of training outside the new inputs from which these are a part of them only
 NOTABLE = 0.05  # share of the windows outside from which an input has shifted
 
