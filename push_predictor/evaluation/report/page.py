@@ -112,7 +112,7 @@ def _opening(shown: Validation, metrics: list[dict[str, Any]], alarm: Mapping[st
     if not len(shown.table):
         return [html.opening(NOTHING_FOUND, "no push found"), about]
     answers = [calibration_sentence(main), *(comparison_sentence(main, other) for other in others)]
-    figure = html.charts([coverage_chart(comparison) for comparison in shown.comparisons], COVERAGE)
+    figure = html.charts([coverage_chart(main)], COVERAGE)
     return [html.opening(opening_sentences(first), judged(first).label, figure), html.bullets(answers), about]
 
 
@@ -122,4 +122,6 @@ def _pictures(out: Path, shown: Validation) -> list[str]:
         return parts
     for name, draw_section in SECTIONS:
         parts += [html.heading(name), *map(html.figure, draw_section(out, shown))]
+        if draw_section is calibration_pictures and (others := shown.comparisons[1:]):  # the first opens the page
+            parts.append(html.charts([coverage_chart(other) for other in others], COVERAGE))
     return parts
