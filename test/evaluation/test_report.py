@@ -20,12 +20,12 @@ from hypothesis import strategies as st
 
 from push_predictor.errors import PushPredictorError, TableError
 from push_predictor.evaluation.estimate import Estimate
-from push_predictor.evaluation.report.figures.nearby import examples
-from push_predictor.evaluation.report.figures.push_maps import colour_scale
+from push_predictor.evaluation.report.figures.ellipses import examples
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     arc_length,
     coarse_cells,
+    colour_scale,
     commonest_condition,
     fine_cells,
     predicted_at_windows,

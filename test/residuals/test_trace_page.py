@@ -33,10 +33,9 @@ from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Sized, Trace, Verdict
-from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
+from push_predictor.residuals.reporting.figures.driver_basis import analysis_rows, basis_charts, determined, strength_of
 from push_predictor.residuals.reporting.figures.errors import error_charts
-from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts
-from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
+from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts, map_figures
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import interval_cell
@@ -400,6 +399,12 @@ def test_maps_of_a_step_are_split_at_its_place() -> None:
     assert time[halves.masks[0]].max() < JUMP.place <= time[halves.masks[1]].min()
 
 
+def test_maps_show_the_held_out_pushes_without_and_with_the_effect() -> None:
+    (shown,) = map_figures(trace_of("effect"))
+    assert "Map of the mean residual of dx, refit;" in shown and "Map of the mean residual of dx, after;" in shown
+    assert "Mean residual of" in shown and "held-out pushes over contact point" in shown
+
+
 @pytest.mark.parametrize("place", [-1.0, 30.0, 990.0, 2000.0])
 def test_maps_are_whole_where_a_half_would_be_empty(place: float) -> None:
     trace = trace_of("effect")
@@ -454,9 +459,11 @@ def test_levels_of_a_covariate_are_bins_of_their_own() -> None:
 def test_bins_have_the_mean_and_an_interval_around_it() -> None:
     table = made_up.pushes(80, 4)
     bins = means_along(axis_of(table, "elapsed_time"), table.push_id, table.covariates["elapsed_time"])
-    np.testing.assert_allclose(bins.x, bins.y)
-    assert len(bins.x) == 10 and bins.pushes.sum() == 80
-    assert np.all((bins.low <= bins.y) & (bins.y <= bins.high))
+    np.testing.assert_allclose(bins.place, bins.value)
+    assert len(bins.place) == 10
+    assert np.all((bins.low <= bins.value) & (bins.value <= bins.high))
+    bars = bins.bars("before", "s", "pushes, in bins")
+    assert bars.y is bins.value and bars.low is bins.low and bars.high is bins.high and " s (95 % CI " in bars.titles[0]
 
 
 def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:
