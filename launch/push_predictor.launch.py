@@ -41,7 +41,6 @@ ARGUMENTS = (
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
     ("recording", "", "Recording to replay: a folder, .mcap, .db3 or .bag file. Empty: none, the sensors are live."),
-    ("bag", "", "Another name of the argument recording."),
     ("model", "", "Model file to load and to validate, or default: the simulated one that ships with the package."),
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
     ("output", "", "Folder for the validator's results. Empty: nothing is written."),
@@ -86,7 +85,7 @@ def _problem(context: LaunchContext, given: dict[str, str]) -> str:
 
 
 def _started(given: dict[str, str]) -> list[Node]:
-    recording = given["recording"] or given["bag"]
+    recording = given["recording"]
     nodes = [
         _node("predict_server", "push_predictor", given, _server(given), end_launch()),
         _node("push_validator", "push_validator", given, _validator(given), end_launch()),

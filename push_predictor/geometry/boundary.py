@@ -66,6 +66,19 @@ def place_features(
                 found[n, 1], found[n, 2] = cos(2.0 * M_PI * order * contact), sin(2.0 * M_PI * order * contact)
 
 
+def within_box(
+    points: cython.double[:, :], low: cython.double[::1], high: cython.double[::1], found: cython.uchar[::1]
+) -> None:
+    """Find which of the points (n, D) lie in the box from low (D,) to high (D,), ends included; found (n,)."""
+    n: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for n in range(points.shape[0]):
+            found[n] = True
+            for k in range(points.shape[1]):
+                found[n] = found[n] and points[n, k] >= low[k] and points[n, k] <= high[k]
+
+
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)

@@ -16,6 +16,7 @@ import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import RequestError
+from push_predictor.geometry.boundary import within_box
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.prediction import NOT_FINITE, Prediction
@@ -73,12 +74,13 @@ class PushModel:
         save_model(self, Path(path))
 
     def __repr__(self) -> str:
+        defaults = f"  defaults of covariates: {defaults_in_words(self)}\n" if self.defaults else ""
         return (
             f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
             f"{self._training_in_words()}"
             f"  mean: {mean_in_words(self.predictor)}\n"
             f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
-            f"{self._defaults_in_words()}"
+            f"{defaults}"
             f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
         )
 
@@ -91,9 +93,6 @@ class PushModel:
             f"  trained on {len(self.training)} windows of {self.provenance.pushes} pushes{origin}\n"
             f"  pusher speed {speeds.min():.3g} to {speeds.max():.3g} mm/s, windows of {np.median(durations):.3g} s\n"
         )
-
-    def _defaults_in_words(self) -> str:
-        return f"  defaults of covariates: {defaults_in_words(self)}\n" if self.defaults else ""
 
     def predict(self, pushes: Pushes) -> Prediction:
         """Predict the outcomes of n pushes.
@@ -175,11 +174,10 @@ class PushModel:
         The domain of a prior model are all pushes for which its priors are meant. For covariates see
         `covariates_seen`.
         """
-        if (own := self.predictor.own_limits) is not None:
-            return own.contain(inputs)
-        low, high = self._feature_range
-        features = push_features(self.rig.outline, inputs)
-        return np.asarray(((features >= low) & (features <= high)).all(axis=1))
+        points = inputs if self.predictor.own_limits else push_features(self.rig.outline, inputs)
+        found = np.empty(len(inputs), dtype=np.uint8)
+        within_box(points, *self._domain, found)
+        return found.view(np.bool_)
 
     def covariates_seen(self, push: Push) -> BoolArray:
         """Whether the covariates of each of n pushes lie in the range on which the effects were fitted, (n,).
@@ -249,7 +247,11 @@ class PushModel:
         return (1.0 - DURATION_TOLERANCE) * durations.min(), (1.0 + DURATION_TOLERANCE) * durations.max()
 
     @cached_property
-    def _feature_range(self) -> tuple[Array, Array]:
+    def _domain(self) -> tuple[Array, Array]:
+        """Lowest and highest inputs (3,) of a model with limits of its own, else features (D,)."""
+        if (own := self.predictor.own_limits) is not None:
+            (slowest, fastest), (least, most) = own
+            return np.array([slowest, -np.inf, least]), np.array([fastest, np.inf, most])
         features = push_features(self.rig.outline, self.training.inputs)
         low, high = features.min(axis=0), features.max(axis=0)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)

@@ -88,7 +88,7 @@ def train_learnt(
         each = [_trained(of_mean, rig, rough, mean) for mean in (None, about)]
         zero, mechanics = (trained.density(of_mean) for trained in each)
         about = None if zero_is_better(zero, mechanics) else about
-        near = each[0 if about is None else 1].predictor
+        near = each[0 if about is None else 1]
     trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9), near)
     return _completed(trained, rows, options, watch)
 
@@ -149,11 +149,12 @@ class _Trained:
     """A predictor, and what held-out training pushes showed it to learn.
 
     observed (n, 3): outcomes, or residuals about the mean as it is without the push, SI, at a path of the scaling's
-    travel.
+    travel. fitted: the regression of each output, also where its noise alone predicts held-out pushes better.
     """
 
     predictor: GaussianProcessPredictor
     observed: Array
+    fitted: tuple[Regression, ...]
 
     def density(self, rows: PushTable) -> Array:
         """Log density (pushes,) of each held-out training push, less its share of the hyperparameters, nats.
@@ -177,7 +178,7 @@ def _trained(
     options: LearntOptions,
     about: FittedMean | None,
     watch: Watch = no_watch,
-    near: GaussianProcessPredictor | None = None,
+    near: _Trained | None = None,
 ) -> _Trained:
     """near: GPs of some of the rows about the same mean, where the search of a VHGP begins."""
     mean = None if about is None else about.mean
@@ -191,17 +192,20 @@ def _trained(
     if options.per_path:
         scaling = replace(scaling, travel=float(path.mean()))
     features, block = scaling.features(rig.outline, rows.inputs), _blocks(rows)
-    starts = _starts(near, scaling)
-    regressions: list[Regression] = []
-    for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
-        watch(f"train {options.kind}: {OUTPUTS[k]}", k / len(OUTPUTS))
-        shortest = SHORTEST if mean is None else SHORTEST_OF_RESIDUAL
-        regression = _learnt(features, column, options, shortest, starts[k])
+    starts, shortest = _starts(near, scaling), SHORTEST if mean is None else SHORTEST_OF_RESIDUAL
+    columns, seen = scaling.outcomes(targets).T, scaling.outcomes(observed).T
+
+    fitted: list[Regression] = []
+    chosen: list[Regression] = []
+    for k, name in enumerate(OUTPUTS):
+        watch(f"train {options.kind}: {name}", k / len(OUTPUTS))
+        fitted.append(_learnt(features, columns[k], options, shortest, starts[k]))
+        chosen.append(fitted[k])
         if mean is not None:
-            constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
-            regression = best_held_out([constant, regression], block, seen)
-        regressions.append(regression)
-    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), observed)
+            constant = fit_constant(features, columns[k], heavy_tails=options.kind != "gp", observed=seen[k])
+            chosen[k] = best_held_out([constant, fitted[k]], block, seen[k])
+    predictor = GaussianProcessPredictor(rig, scaling, tuple(chosen), mean=mean)
+    return _Trained(predictor, observed, tuple(fitted))
 
 
 def _speeds(rows: PushTable) -> tuple[float, float]:
@@ -219,11 +223,11 @@ def _blocks(rows: PushTable) -> IntArray:
     return np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
 
 
-def _starts(near: GaussianProcessPredictor | None, scaling: Scaling) -> list[GpParameters | None]:
+def _starts(near: _Trained | None, scaling: Scaling) -> list[GpParameters | None]:
     """Hyperparameters of each output's GP, where there is one of the same features."""
-    if near is None or near.scaling.columns != scaling.columns:
+    if near is None or near.predictor.scaling.columns != scaling.columns:
         return [None] * len(OUTPUTS)
-    return [one.parameters if isinstance(one, GaussianProcess) else None for one in near.regressions]
+    return [one.parameters if isinstance(one, GaussianProcess) else None for one in near.fitted]
 
 
 def _learnt(

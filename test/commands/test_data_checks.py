@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab_bags import short_recording
-from mistakes import MISTAKES, outline_altered
+from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
@@ -80,14 +80,6 @@ def test_train_fails_with_strict_and_states_the_warning(
     assert train(tmp_path, altered["turned"], "--strict") == 1
     (line,) = lines_of(capsys)
     assert line.startswith(f"push_predictor train: {altered['turned']}: The slider is turned by -4.0 degrees")
-
-
-def test_train_warns_of_a_wrong_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rig = read_recording(SMALL).rig
-    assert rig is not None
-    save_rig(outline_altered(rig, size=1.04), tmp_path / "wrong.rig.yaml")
-    assert train(tmp_path, SMALL, "--rig", tmp_path / "wrong.rig.yaml") == 0
-    assert "times as large as its outline" in capsys.readouterr().err
 
 
 def test_a_sound_recording_trains_with_strict_and_without_a_word(

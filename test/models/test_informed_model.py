@@ -296,3 +296,14 @@ def test_a_regression_must_be_worth_its_hyperparameters() -> None:
     assert held_out_score(alone, block) == pytest.approx(density - 1.0)
     wave = np.sin(3.0 * inputs[:, 0]) + 0.1 * noise
     assert best_held_out([fit_constant(inputs, wave, heavy_tails=False), found := fit_gp(inputs, wave)], block) is found
+
+
+def test_the_search_of_a_vhgp_begins_from_the_gps_that_decided_about_the_mean(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise AssertionError("a GP of all rows was fitted")
+
+    monkeypatch.setattr("push_predictor.models.gaussian_process.vhgp.fit_gp", refused)
+    auto = learnt(trained(pushes(24, 0), mean="auto"))
+    assert any(isinstance(regression, ConstantNoise) for regression in auto.regressions)
+    with pytest.raises(AssertionError, match="all rows"):
+        trained(pushes(24, 0), mean="zero")

@@ -43,6 +43,7 @@ KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # f
 
 TEMPERATURE, LOSSY = "/surface/temperature", "/lossy"
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Recorded:
@@ -51,10 +52,7 @@ class Recorded:
     def __init__(self, bag: Path, original: Path) -> None:
         domain, self.bag, self.original = free_domain(), bag, original
         params = {"bag": bag, "covariate_topics": ["surface/temperature", LOSSY], "diagnostics_period": 0.2}
-        with (
-            ros_context(domain) as node,
-            node_process("push_recorder", domain=domain, params=params) as process,
-        ):
+        with ros_context(domain) as node, node_process("push_recorder", domain=domain, params=params) as process:
             status = Status(node, "push_recorder")
             status.wait_for_first()
             publisher = node.create_publisher(Float32, LOSSY, BEST_EFFORT)
@@ -155,10 +153,7 @@ def test_ctrl_c_before_the_first_message_writes_nothing_and_says_so(tmp_path: Pa
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=30.0)
     assert process.returncode == 0 and "Traceback" not in errors
-    assert output.splitlines() == [
-        "No message arrived. No bag was written.",
-        *output.splitlines()[1:],
-    ]
+    assert output.splitlines() == ["No message arrived. No bag was written.", *output.splitlines()[1:]]
     assert "No publisher of /slider/pose." in output and list(tmp_path.iterdir()) == []
 
 

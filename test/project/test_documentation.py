@@ -49,7 +49,7 @@ PYTHON_FILES = [
     for path in (REPOSITORY / room).rglob("*.py")
 ]
 NOT_THERE_YET = {  # what the reader is asked to write
-    "push_predictor/recordings/importers/NAME.py",
+    "push_predictor/recordings/importers/NAME.py"
 }
 SERVICES = (
     "predict_push",

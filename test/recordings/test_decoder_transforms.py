@@ -188,6 +188,26 @@ def test_the_last_static_transform_counts() -> None:
     assert buffer.take("tip")[1][:, 0] == pytest.approx(5.0) and len(buffer._histories["cart"].edge.stamp) == 1
 
 
+def test_a_frame_that_was_static_may_move() -> None:
+    static, moving = Lab(), cart(every(20, 20, 101), every(4, 0, 101))
+    static.transform("/tf_static", "world", "cart", every(1, 0, 1), line(every(1, 0, 1)))
+    buffer = TransformBuffer(["tip"], "world")
+    for messages in (static.in_order(), [message for message in moving.in_order() if message[1] == "/tf"]):
+        put(buffer, messages)
+        buffer.recent("tip", 1)
+    stamp, rows = buffer.take("tip", last=True)
+    assert stamp.tolist() == every(4, 0, 101).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
+
+
+def test_a_pose_at_a_stamp_waits_for_the_slowest_of_two_transforms() -> None:
+    buffer, stamps = TransformBuffer([], "world"), START + np.array([40, 60, 80]) * MILLISECOND
+    put(buffer, cart(every(20, 0, 61), every(4, 0, 101)).in_order())
+    decided, rows = buffer.at("tip", "world", stamps, "wrench")
+    assert decided.tolist() == [True, True, False]
+    np.testing.assert_allclose(rows[:, 0], [0.08, 0.12], atol=1e-12)
+
+
 def test_old_samples_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transform_buffer, "KEPT", 100 * MILLISECOND)
     buffer = TransformBuffer(["tip"])

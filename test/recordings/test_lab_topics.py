@@ -338,13 +338,6 @@ def test_saved_topics_come_back(tmp_path: Path, topics: Topics) -> None:
     assert topics_path(tmp_path / "a.b.mcap").name == "a.b.recording.yaml"
 
 
-def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
-    (tmp_path / "lab.recording.yaml").write_text("frames: {slider: block, pusher: tip, world: base}\n")
-    assert load_topics(tmp_path / "lab.mcap") == Topics("/tf:block", "/tf:tip", world="base")
-    (tmp_path / "lab.recording.yaml").write_text("world_frame: base\n")
-    assert load_topics(tmp_path / "lab.mcap") == Topics(world="base")
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -352,9 +345,6 @@ def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
         ("slider_topic: 3", "slider_topic is 3, give a name"),
         ("slider_topic: ''", "slider_topic is '', give a name"),
         ("covariate_topics: /a", "covariate_topics is '/a', give a list of topics"),
-        ("frames: {tip: a}", "frames is {'tip': 'a'}, give a mapping with the keys slider, pusher, world"),
-        ("frames: {world: a}\nworld_frame: b", "gives both world_frame and frames world, give one of them"),
-        ("frames: {slider: a}\nslider_topic: /b", "gives both slider_topic and frames slider, give one of them"),
         ("- a", r"contains \['a'\], give the keys slider_topic"),
         ("a: [", "cannot be read"),
     ],

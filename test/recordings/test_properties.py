@@ -20,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_messages import pose_message, wrench_message
 from rclpy.serialization import serialize_message
-from synthetic import Push, moved, translating_push
+from synthetic import Push, moved, translating_push, windows_of
 
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
@@ -35,8 +35,6 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.finder import find_windows
-from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.types import Array
@@ -47,11 +45,6 @@ MODELS = [(shape, kind) for shape, *kinds in (
     ("rect1", "vhgp", "analytical"), ("hex", "gp"), ("ellip1", "analytical", "gp"), ("ellip3", "vhgp")
 ) for kind in kinds]  # fmt: skip
 METRES, TURNS = st.floats(-2.0, 2.0), st.floats(-20.0, 20.0)
-
-
-def windows_of(recording: Recording) -> list[PushWindow]:
-    assert recording.rig is not None
-    return find_windows(recording, recording.rig)
 
 
 # --- adapters: a whole recording through messages --------------------------------------------------------------------

@@ -192,10 +192,7 @@ def test_a_wrench_is_turned_into_the_chosen_world(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("world", "message"),
     [
-        (
-            "desk",
-            r"slider_topic '/slider' .*: no frame 'desk'; .*world_frame 'desk' \(option --w",
-        ),
+        ("desk", r"slider_topic '/slider' .*: no frame 'desk'; .*world_frame 'desk' \(option --w"),
         (
             "moon",
             r"slider_topic '/slider' .*: no transforms connect frame 'vicon' .* with 'moon'; .*world_frame 'moon'",

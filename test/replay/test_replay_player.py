@@ -162,10 +162,7 @@ def test_messages_of_equal_time_keep_their_order() -> None:
         (PlayRange(duration=SECOND // 5), TENTHS[:3]),
         (PlayRange(until=START + SECOND // 10), TENTHS[:2]),
         (PlayRange(offset=SECOND // 2, duration=SECOND // 10), TENTHS[5:7]),
-        (
-            PlayRange(duration=SECOND // 10, until=START + SECOND // 2),
-            TENTHS[:6],
-        ),  # the later of the two
+        (PlayRange(duration=SECOND // 10, until=START + SECOND // 2), TENTHS[:6]),  # the later of the two
         (PlayRange(offset=20 * SECOND), []),
     ],
 )

@@ -13,7 +13,8 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.fitted import Changes, FittedMechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.kernel.push import propagated
 from push_predictor.models.mechanisms import LARGEST
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array, IntArray
@@ -54,9 +55,15 @@ class JointEffects:
         parameter, column = self._acting
         return np.asarray(slopes[:, parameter] * columns[:, column, None])
 
+    def uncertainty(self, columns: Array, slopes: Array, covariance: Array) -> Array:
+        """Covariance (n, 3, 3) of the shift for that (m, m) of the coefficients; slopes as in `design`."""
+        found = np.empty((len(columns), 3, 3))
+        propagated(slopes, columns, self._acting, covariance, found)
+        return found
+
     @cached_property
-    def _acting(self) -> tuple[IntArray, IntArray]:
-        """The parameter and the column of the bases that each coefficient (m,) acts on."""
+    def _acting(self) -> IntArray:
+        """The parameter and the column of the bases that each coefficient acts on, (2, m)."""
         ends = np.cumsum([columns_of(basis) for basis in self._bases]).tolist()
         columns_of_basis = dict(zip(self._bases, map(range, [0, *ends], ends), strict=False))
         parameters, columns = [], []
@@ -64,7 +71,7 @@ class JointEffects:
             own, used = [self.names.index(name) for name in effect.quantities], columns_of_basis[effect.basis]
             parameters.append(np.repeat(own, len(used)))
             columns.append(np.tile(used, len(own)))
-        return np.concatenate(parameters), np.concatenate(columns)
+        return np.array([np.concatenate(parameters), np.concatenate(columns)], dtype=np.intp)
 
     @cached_property
     def _weights(self) -> Array:
@@ -111,7 +118,8 @@ def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, 
         found = JointShift(shift, [], {name: slopes[:, k] for k, name in enumerate(acting.names)})
         exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
     else:
-        still, moved = mechanics.displacements([{}, changes_of(effects, push)], push)
+        changes = acting.changes(acting.columns(push)).T
+        still, moved = mechanics.displacements([{}, dict(zip(acting.names, changes, strict=True))], push)
         found = JointShift(moved - still, [], {})
     shift = found.shift
     for effect in effects:
@@ -126,14 +134,6 @@ def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, 
 def _ends(effects: Sequence[Effect]) -> IntArray:
     """Where the coefficients of each effect end among all, but for the last."""
     return np.cumsum([len(effect.coefficients) for effect in effects])[:-1]
-
-
-def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
-    """The sum of all effects' changes of each parameter, at most the largest that a rig can have."""
-    acting = JointEffects.of(effects)
-    if not acting.effects:
-        return {}
-    return dict(zip(acting.names, acting.changes(acting.columns(push)).T, strict=True))
 
 
 def covariance_of(effects: Sequence[Effect], cross: Mapping[tuple[int, int], Array]) -> Array:

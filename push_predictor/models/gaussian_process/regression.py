@@ -67,7 +67,8 @@ class ConstantNoise:
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and the noise at inputs (m, D)."""
-        return _same_everywhere(self.parameters, self.variance, len(inputs))
+        numbers = 0.0, self.variance, self.parameters.noise_mean, self.parameters.noise_spread**2
+        return LatentPrediction(*(np.full(len(inputs), number) for number in numbers))
 
     def function_covariance(self, inputs: Array) -> Array:
         """Posterior covariance (m, m) of f between inputs (m, D): one number."""
@@ -122,8 +123,3 @@ def held_out_score(regression: Regression, block: IntArray, observed: Array | No
 def best_held_out(regressions: Sequence[Regression], block: IntArray, observed: Array | None = None) -> Regression:
     """The regression with the highest held-out score; of equal ones the first."""
     return max(regressions, key=lambda regression: held_out_score(regression, block, observed))
-
-
-def _same_everywhere(parameters: ConstantParameters, variance: float, n: int) -> LatentPrediction:
-    spread = np.full(n, parameters.noise_spread**2)
-    return LatentPrediction(np.zeros(n), np.full(n, variance), np.full(n, parameters.noise_mean), spread)

@@ -23,6 +23,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
+from push_predictor.models.mechanics.kernel.push import drawn_moments
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.types import Array, IntArray
 
@@ -200,8 +201,7 @@ def table_of(names: Sequence[str], draws: Array) -> Array:
 
 VARYING = {"contact_friction": 0.1, "centre_x": 0.004, "centre_y": 0.004}  # standard deviations within a session
 SHARE = 0.05  # of the distance travelled, and of the turn that moves a point at the length c that far
-TRACKER = (1e-4, 1e-4, 1e-3)  # m, m, rad: of the difference of two poses
-_TRACKED = np.square(TRACKER)
+TRACKER = np.array([1e-4, 1e-4, 1e-3])  # m, m, rad: of the difference of two poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,11 +225,17 @@ class ProcessNoise:
 
         varied (n, 2 v, 3): displacements under the parameters of `changed`. travel (n,), length c in m.
         """
-        shift = 0.5 * (varied[:, : len(VARYING)] - varied[:, len(VARYING) :])
-        covariance = shift.transpose(0, 2, 1) @ shift
-        share = SHARE * np.array([1.0, 1.0, 1.0 / length])
-        covariance.reshape(-1, 9)[:, ::4] += np.square(travel[:, None] * share) + _TRACKED  # the diagonals
-        return np.asarray(covariance * self._factors)
+        return self.moments(varied, travel, length)[2]
+
+    def moments(self, found: Array, travel: Array, length: float) -> tuple[Array, Array, Array]:
+        """Mean (n, 3) and covariance (n, 3, 3) of outcomes, and covariance (n, 3, 3) of the noise.
+
+        found (n, 2 v + k, 3): displacements under the parameters of `changed`, then under k draws.
+        """
+        n = len(found)
+        mean, covariance, noise = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3))
+        drawn_moments(found, len(VARYING), travel, SHARE, length, TRACKER, self._factors, mean, covariance, noise)
+        return mean, covariance, noise
 
     @cached_property
     def _factors(self) -> Array:

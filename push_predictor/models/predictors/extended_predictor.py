@@ -137,8 +137,7 @@ class ExtendedPredictor:
             return Shift(together.shift, design.transpose(0, 2, 1) @ self._covariance @ design)
         columns = self._acting.columns(push)
         shift, slopes = self.mechanics.shifted(self._acting.names, self._acting.changes(columns), push)
-        design = self._acting.design(columns, slopes)
-        return Shift(shift, design.transpose(0, 2, 1) @ self._covariance @ design)
+        return Shift(shift, self._acting.uncertainty(columns, slopes, self._covariance))
 
     @cached_property
     def _acting(self) -> JointEffects:

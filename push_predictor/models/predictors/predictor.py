@@ -18,7 +18,7 @@ from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
 # For effects i < j that were estimated jointly: the covariance (coefficients of i, coefficients of j).
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
@@ -45,12 +45,6 @@ class InputLimits(NamedTuple):
 
     velocity: tuple[float, float]
     angle: tuple[float, float]
-
-    def contain(self, inputs: Array) -> BoolArray:
-        """Which of the pushes (n, 3: velocity m/s, contact, angle rad) are within the limits, (n,)."""
-        velocity, _, angle = inputs.T
-        fast = (velocity >= self.velocity[0]) & (velocity <= self.velocity[1])
-        return np.asarray(fast & (angle >= self.angle[0]) & (angle <= self.angle[1]))
 
 
 class BasePredictor(ABC):

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.forward import RECORDING, PushMechanics, Shape
+from push_predictor.models.mechanics.forward import PushMechanics, Shape
 from push_predictor.models.mechanics.prior import ProcessNoise, table_of
 from push_predictor.models.predictors.predictor import BasePredictor, InputLimits, Moments
 from push_predictor.models.pushes import Push
@@ -52,15 +51,11 @@ class PriorPredictor(BasePredictor):
 
     def moments(self, push: Push) -> Moments:
         """See Predictor. The covariance is that of the draws plus the process noise."""
-        found = self._displacements(self._everything, push)
-        noise, drawn = self._noise(found[:, : -len(self.draws)], push), found[:, -len(self.draws) :]
-        mean = drawn.mean(axis=1)
-        away = drawn - mean[:, None]
-        return Moments(mean, away.transpose(0, 2, 1) @ away / len(self.draws) + noise, noise)
+        return Moments(*self.noise.moments(self._displacements(self._everything, push), *self._path(push)))
 
     def process_covariance(self, push: Push) -> Array:
         """Covariance (n, 3, 3) of the process noise."""
-        return self._noise(self._displacements(self._varied, push), push)
+        return self.noise.covariance(self._displacements(self._varied, push), *self._path(push))
 
     @cached_property
     def _mechanics(self) -> PushMechanics:
@@ -81,18 +76,14 @@ class PriorPredictor(BasePredictor):
     def _shape(self) -> Shape:
         return self._mechanics.shape_of(self._everything)
 
+    def _path(self, push: Push) -> tuple[Array, float]:
+        """Path lengths (n,) and the length of the limit surface, m: what the noise depends on."""
+        return push.inputs[:, 0] * push.duration, self._length
+
     @cached_property
     def _length(self) -> float:
         return self.fitted.ellipsoid.length
 
-    def _noise(self, varied: Array, push: Push) -> Array:
-        """Process covariance (n, 3, 3) from displacements (n, 6, 3) under the parameters of `_varied`."""
-        return self.noise.covariance(varied, push.inputs[:, 0] * push.duration, self._length)
-
     def _displacements(self, values: Array, push: Push) -> Array:
         """Displacements (n, k, 3) of n pushes under k rows (k, 28) of parameters."""
-        covariates = self._used(push.covariates)
-        return self._mechanics.drawn(values, push.inputs, push.duration, covariates, self._shape)
-
-    def _used(self, covariates: Mapping[str, Array]) -> dict[str, Array]:
-        return {RECORDING: covariates[RECORDING]} if self.fitted.mechanics.supports else {}
+        return self._mechanics.drawn(values, push.inputs, push.duration, push.covariates, self._shape)

@@ -20,8 +20,7 @@ from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.topics import Topics, load_topics
 
 PARAMETERS = (
-    Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required, unless storage.uri is given."),
-    Param("storage.uri", "", "Another name of the parameter bag, as rosbag2 has it."),
+    Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required."),
     Param("force", False, "Replace a bag that exists."),
     Param("rig", "", "Rig file (YAML, a push_rig record) to record. Empty: the record on topic rig."),
     Param("slider_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the slider's pose. Empty: slider/pose."),
@@ -68,10 +67,9 @@ def read_options(node: Node) -> RecorderOptions:
 
 
 def _bag(values: Mapping[str, Any]) -> Path:
-    names = {values["bag"], values["storage.uri"]} - {""}
-    if len(names) != 1:
-        raise RequestError("bag", ", ".join(sorted(names)), "the path of one bag: a folder, or FILE.mcap")
-    path = Path(names.pop()).expanduser()
+    if not values["bag"]:
+        raise RequestError("bag", "", "the path of a bag: a folder, or FILE.mcap")
+    path = Path(values["bag"]).expanduser()
     if path.exists() and not values["force"]:
         raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
     return path

@@ -127,6 +127,85 @@ def shifts(
                 own[column] = changed
 
 
+def drawn_moments(
+    found: cython.double[:, :, :],
+    paired: cython.Py_ssize_t,
+    path: cython.double[:],
+    share: cython.double,
+    length: cython.double,
+    tracked: cython.double[::1],
+    factor: cython.double[:, ::1],
+    mean: cython.double[:, ::1],
+    covariance: cython.double[:, :, ::1],
+    noise: cython.double[:, :, ::1],
+) -> None:
+    """Compute moments of displacements (n, k, 3): the noise of the first 2 paired draws, mean and covariance of others.
+
+    noise (n, 3, 3) is written: the sum of squares of half the differences of draw j and draw paired + j. On the
+    diagonal those of a share of the path (n,) in m, of a turn by its arc at the length in m, and of tracked (3,) are
+    added. All is multiplied by factor (3, 3). mean (n, 3) and covariance (n, 3, 3), noise included, are written where
+    there are other draws.
+    """
+    draws: cython.Py_ssize_t = found.shape[1]
+    n: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    total: cython.double
+    with cython.nogil:
+        for n in range(found.shape[0]):
+            for i in range(3):
+                far: cython.double = path[n] * share / length if i == 2 else path[n] * share
+                for j in range(i + 1):
+                    total = far * far + tracked[i] * tracked[i] if i == j else 0.0
+                    for k in range(paired):
+                        one: cython.double = found[n, k, i] - found[n, paired + k, i]
+                        total += 0.25 * one * (found[n, k, j] - found[n, paired + k, j])
+                    noise[n, i, j] = noise[n, j, i] = total * factor[i, j]
+            if draws == 2 * paired:
+                continue
+            for i in range(3):
+                total = 0.0
+                for k in range(2 * paired, draws):
+                    total += found[n, k, i]
+                mean[n, i] = total / (draws - 2 * paired)
+                for j in range(i + 1):
+                    total = 0.0
+                    for k in range(2 * paired, draws):
+                        total += (found[n, k, i] - mean[n, i]) * (found[n, k, j] - mean[n, j])
+                    covariance[n, i, j] = covariance[n, j, i] = total / (draws - 2 * paired) + noise[n, i, j]
+
+
+def propagated(
+    slopes: cython.double[:, :, :],
+    columns: cython.double[:, :],
+    acting: cython.Py_ssize_t[:, ::1],
+    covariance: cython.double[:, ::1],
+    found: cython.double[:, :, ::1],
+) -> None:
+    """Compute the covariance (n, 3, 3) of shifts that are linear in m coefficients with covariance (m, m).
+
+    slopes (n, q, 3): derivatives of the shift by q parameters. columns (n, b) of bases. acting (2, m): the parameter
+    that each coefficient changes, and the column of which it is the factor.
+    """
+    count: cython.Py_ssize_t = acting.shape[1]
+    n: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    m: cython.Py_ssize_t
+    with cython.nogil:
+        for n in range(slopes.shape[0]):
+            for i in range(3):
+                for j in range(i + 1):
+                    total: cython.double = 0.0
+                    for k in range(count):
+                        one: cython.double = slopes[n, acting[0, k], i] * columns[n, acting[1, k]]
+                        for m in range(count):
+                            total += one * covariance[k, m] * slopes[n, acting[0, m], j] * columns[n, acting[1, m]]
+                    found[n, i, j] = found[n, j, i] = total
+
+
 @cython.cfunc
 @cython.exceptval(check=False)
 def _slider(
