@@ -16,7 +16,7 @@ pytest.importorskip("rosbags")
 from diagnostic_msgs.msg import DiagnosticStatus
 from hosted_nodes import hosted_node
 from lab_bags import LABORATORY, Lab, laboratory, pose_rows, robot_in_tf, short_recording, write_db3
-from ros_harness import call, free_domain, node_process, ros_context, wait_until
+from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from standard_interfaces import provide_interfaces
 from turning_sensor import MOUNT, add_tip, add_wrench, measured_at
@@ -28,7 +28,6 @@ from push_predictor.recordings.fields.pose_rows import composed, inverted, norma
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.topics import STREAMS, Topics, save_topics
 from push_predictor.recordings.windows.finder import find_windows
-from push_predictor_interfaces.srv import Resume
 
 pytestmark = pytest.mark.slow
 
@@ -143,25 +142,19 @@ def test_a_bag_its_validation_and_its_copy_by_the_recorder_have_equal_windows(
         ros_context(domain) as node,
         hosted_node("predict_server", domain=domain, params={"models": [str(rig.model)]}),
         node_process("push_validator", domain=domain, params=parameters(rig, output)) as process,
-        node_process("push_recorder", domain=domain, params=of_recorder(rig, tmp_path / "copy")) as recorder,
     ):
-        status, recording = Status(node), Status(node, "push_recorder")
+        status = Status(node)
         status.wait_for_first()
-        recording.wait_for_first()
         status.wait_for_server()
-        with replaying(domain, recording=rig.bag, rate=3.0, **{"play.start_paused": True}):
-            topics = ["/tf", "/tf_static", IN_TF.slider, FORCE]
-            assert wait_until(lambda: all(node.count_subscribers(topic) == 2 for topic in topics))
-            call(node.create_client(Resume, "push_replay/resume"), Resume.Request())
+        with replaying(domain, recording=rig.bag, rate=3.0):
             process.wait_for_text(WRITTEN, 60.0)
-        assert recorder.stop() == 0, recorder.text()
-        summary = recorder.text()
         turned = "Its axes are turned from 'ft' by tf."
         assert any(turned in values.get("wrench topic", "") for *_, values in status.all), process.text()
         assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert process.stop() == 0, process.text()
     assert_same_as_offline(output, rig.model, rig.bag)
     assert_windows_of_the_poses(output)
+    summary = recorded_again(rig, tmp_path / "copy")
     bag, validated, copy = (load_data([path]) for path in (rig.bag, output / "pushes.csv", tmp_path / "copy"))
     assert f"{len(bag)} windows of" in summary
     for other in (validated, copy):
@@ -172,9 +165,22 @@ def test_a_bag_its_validation_and_its_copy_by_the_recorder_have_equal_windows(
             np.testing.assert_allclose(other.covariates[name], bag.covariates[name], rtol=0.0, atol=1e-9)
 
 
-def of_recorder(rig: Rig, bag: Path) -> dict[str, object]:
+def recorded_again(rig: Rig, copy: Path) -> str:
+    """Record a replay of the bag; returns what the recorder has logged. One node listens: a replay waits for one."""
     topics = {f"{name}_topic": getattr(rig.topics, name) for name in STREAMS}
-    return {**topics, "wrench_frame": rig.topics.wrench_frame, "world_frame": rig.topics.world, "bag": bag}
+    params = {**topics, "wrench_frame": rig.topics.wrench_frame, "world_frame": rig.topics.world, "bag": copy}
+    domain = free_domain()
+    with (
+        ros_context(domain) as node,
+        node_process("push_recorder", domain=domain, params=params) as process,
+    ):
+        status, samples = Status(node, "push_recorder"), len(short_recording(SECONDS).slider)
+        status.wait_for_first()
+        with replaying(domain, recording=rig.bag, rate=4.0) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+            status.wait_for("slider samples", str(samples))
+        assert process.stop() == 0, process.text()
+        return process.text()
 
 
 def assert_windows_of_the_poses(output: Path) -> None:

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
+from decoding import decoder_of, in_portions
+from decoding import put as hand
 from lab_bags import Lab, Message, pose_rows, robot_in_tf, short_recording
 
 from push_predictor.recordings.bag.messages import Messages
@@ -110,6 +112,16 @@ def test_a_sample_waits_for_the_other_transforms() -> None:
     assert buffer.take("tip")[0].tolist() == every(4, 1104, 1141).tolist()
 
 
+def test_a_single_stamp_is_known_once_all_transforms_have_reached_it() -> None:
+    buffer, stamps = TransformBuffer([]), every(10, 0, 200)
+    put(buffer, cart(every(20, 0, 101), every(4, 0, 151)).in_order())
+    known, rows = buffer.at("tip", "world", stamps, "wrench")
+    assert stamps[known].tolist() == every(10, 0, 101).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamps[known] - START), atol=1e-12)
+    known, rows = buffer.at("tip", "world", stamps, "wrench", last=True)
+    assert known.all() and np.isnan(rows[stamps > START + 100 * MILLISECOND]).all()
+
+
 def test_samples_before_another_transform_began_or_in_its_dropout_are_counted() -> None:
     coarse = every(20, 200, 2000)
     coarse = coarse[(coarse < START + 800 * MILLISECOND) | (coarse > START + 1300 * MILLISECOND)]
@@ -202,6 +214,16 @@ def test_old_samples_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     stamp, _ = taken(buffer, cart(every(20, 0, 3001), every(4, 0, 3001)).in_order(), "tip")
     assert len(stamp) == 751
     assert {child: len(history.edge.stamp) for child, history in buffer._histories.items()}["tip"] < 50
+
+
+def test_a_decoder_keeps_the_transforms_of_some_seconds() -> None:
+    lab = cart(every(40, 0, 12_000), every(10, 0, 12_000))
+    decoder = decoder_of(lab, Topics("/tf:cart", "/tf:tip"))
+    for portion in in_portions(lab.in_order(), 100):
+        hand(decoder, lab, portion)
+        decoder.take()
+    (buffer,) = decoder.tf.values()
+    assert 500 <= len(buffer._histories["tip"].edge.stamp) < 700
 
 
 def test_a_frame_that_is_not_connected_is_named_until_it_is() -> None:
