@@ -118,9 +118,7 @@ def test_the_other_commands_check_as_train_does(
 ) -> None:
     def run(name: str, *words: str) -> list[str]:
         path = str(altered[name])
-        main(
-            ["validate", str(model), path, *words] if command == "validate" else ["trace", path, "--model", str(model)]
-        )
+        main(["validate", str(model), path, *words] if command == "validate" else ["trace", str(model), path])
         return lines_of(capsys)
 
     assert any("its positions are probably in mm" in line for line in run("both in mm"))
