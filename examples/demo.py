@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] = ()) -> int:
         print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
         _print_summary([comparison for _, comparison in results])
         change = hidden.result()
-        difference = f"predictions differ by at most {largest:.1e} m or rad"
+        difference = f"predictions differ by at most {largest:.1e} m or rad" if largest else "the same predictions"
         report = beside.submit(_report, models, results, difference)  # drawn in the meantime
         closed = loop.close_the_loop(paths[0], models[0].name, OUT, change, stages)
         pages = [*report.result(), *closed]

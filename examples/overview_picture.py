@@ -11,11 +11,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.ellipses import inside, paint_ellipse
-from push_predictor.evaluation.report.figures.nearby import Example, examples
-from push_predictor.evaluation.report.figures.push_maps import colour_scale, paint_panel
+from push_predictor.evaluation.report.figures.ellipses import Example, examples, inside, paint_ellipse
 from push_predictor.evaluation.report.map_conditions import fixed_covariates
-from push_predictor.evaluation.report.maps import coarse_cells, commonest_condition, fine_cells, push_map, recorded_map
+from push_predictor.evaluation.report.maps import (
+    coarse_cells,
+    colour_scale,
+    commonest_condition,
+    fine_cells,
+    paint_panel,
+    push_map,
+    recorded_map,
+)
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable

@@ -41,7 +41,6 @@ ARGUMENTS = (
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
     ("recording", "", "Recording to replay: a folder, .mcap, .db3 or .bag file. Empty: none, the sensors are live."),
-    ("bag", "", "Another name of the argument recording."),
     ("model", "", "Model file to load and to validate, or default: the simulated one that ships with the package."),
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
     ("output", "", "Folder for the validator's results. Empty: nothing is written."),
@@ -51,8 +50,8 @@ ARGUMENTS = (
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
     ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
     ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
-    ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
-    ("scalar_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
+    ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
+    ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
     ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
@@ -86,7 +85,7 @@ def _problem(context: LaunchContext, given: dict[str, str]) -> str:
 
 
 def _started(given: dict[str, str]) -> list[Node]:
-    recording = given["recording"] or given["bag"]
+    recording = given["recording"]
     nodes = [
         _node("predict_server", "push_predictor", given, _server(given), end_launch()),
         _node("push_validator", "push_validator", given, _validator(given), end_launch()),
@@ -109,10 +108,10 @@ def _validator(given: dict[str, str]) -> dict[str, Any]:
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
     if given["model"] == SHIPPED:
         paths["model"] = Path(DEFAULT_MODEL[-1]).stem  # its name at predict_server
-    scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
+    scalars = [topic.strip() for topic in given["covariate_topics"].split(",") if topic.strip()]
     bias = {"wrench_bias": given["wrench_bias"]} if given["wrench_bias"] else {}
     found: dict[str, Any] = {**paths, **_streams(given), **bias, **_qos(given)}
-    return {**found, "scalar_topics": scalars} if scalars else found
+    return {**found, "covariate_topics": scalars} if scalars else found
 
 
 def _streams(given: dict[str, str]) -> dict[str, str]:
@@ -136,8 +135,9 @@ def _full_name(namespace: str, topic: str) -> str:
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
+    clock = {"play.clock_publish_frequency": 40.0} if is_true(given["use_sim_time"]) else {}
     # Without this wait the validator would miss the first pushes.
-    return {**rig, **rate, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
+    return {**rig, **rate, **clock, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
 
 
 def _node(

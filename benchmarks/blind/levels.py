@@ -120,7 +120,7 @@ def _found(model: PushModel, loaded: LoadedData) -> dict[str, list[str]]:
 
 def _names(searched: Searched) -> list[str]:
     """Channel, mechanism and covariate of everything that was found."""
-    errors = searched.measured.errors if searched.measured else ()
+    errors = searched.measured.effects if searched.measured else ()
     motion = searched.motion
     return [
         *(f"measurement: {error.mechanism} {error.p_value:.4f}" for error in errors),

@@ -13,7 +13,6 @@ memory first, and sleep like push_replay: absolute deadlines, timer slack 1 ns.
 from __future__ import annotations
 
 import argparse
-import gc
 import json
 import sys
 from collections.abc import Callable
@@ -21,9 +20,10 @@ from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter_ns, sleep
 
-from push_predictor.recordings.bag.reader import RawMessage, open_bag
-from push_predictor.replay.clock import SECOND, reduce_timer_slack
-from push_predictor.replay.lateness import Delays, Lateness
+from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.replay.clock import SECOND
+from push_predictor.replay.report import Delays, Lateness
 
 PUSH_TOPICS = ("/slider/pose", "/pusher/pose", "/pusher/wrench")
 
@@ -40,17 +40,13 @@ def main() -> int:
     end = every[0].log_time + options.seconds * SECOND
     messages = [message for message in every if message.log_time <= end]
     publish = _publisher(messages) if options.kind == "publish" else lambda message: None
-    late, late_after = lateness(messages, options.rate, publish)
-    print(json.dumps({"late": asdict(late), "late_after": asdict(late_after)}))
+    print(json.dumps({"late": asdict(lateness(messages, options.rate, publish))}))
     return 0
 
 
-def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMessage], object]) -> tuple[Delays, Delays]:
-    """Sleep until the time of each message and publish it; returns the delays up to then and after publishing."""
-    reduce_timer_slack()
-    gc.collect()
-    gc.freeze()
-    late, late_after, first = Lateness(), Lateness(), messages[0].log_time
+def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMessage], object]) -> Delays:
+    """Sleep until the time of each message and publish it; returns the delays up to then."""
+    late, first = Lateness(), messages[0].log_time
     begin = perf_counter_ns() + SECOND // 100  # the first deadline is not late
     for message in messages:
         deadline = begin + round((message.log_time - first) / rate)
@@ -58,16 +54,15 @@ def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMess
             sleep(remaining / SECOND)
         now = perf_counter_ns()
         publish(message)
-        late_after.add(perf_counter_ns() - deadline)
         late.add(now - deadline)
-    return late.delays(), late_after.delays()
+    return late.delays()
 
 
 def _publisher(messages: list[RawMessage]) -> Callable[[RawMessage], object]:
     """A function that publishes a message, once each push topic has a subscriber."""
     import rclpy
 
-    from push_predictor.nodes.replay.topics import message_class
+    from push_predictor.nodes.message_types import message_class
 
     rclpy.init()
     node = rclpy.create_node("bare_loop")

@@ -46,7 +46,7 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.simulation.sensors import Sensors
 
 TOPICS = {"/slider/pose": PoseStamped, "/pusher/pose": PoseStamped, "/pusher/wrench": WrenchStamped}
-Figures: TypeAlias = tuple[float, float, float, float]  # p50 and p99 of the lateness, the same after publishing, us
+Figures: TypeAlias = tuple[float, float]  # p50 and p99 of the lateness, us
 SECONDS_A_PUSH = 2.0  # at least, at 20 mm/s over 30 mm
 
 
@@ -131,8 +131,8 @@ def _replay(bag: Path, rate: float, seconds: float) -> Figures:
     printed = subprocess.run(command, check=True, stderr=subprocess.PIPE, text=True).stderr
     print(printed, end="", flush=True)
     (summary,) = re.findall(r"finished: .*", printed)
-    late, late_after = re.findall(r"p50 (\d+) us, p99 (\d+) us", summary)
-    return float(late[0]), float(late[1]), float(late_after[0]), float(late_after[1])
+    (late,) = re.findall(r"p50 (\d+) us, p99 (\d+) us", summary)
+    return float(late[0]), float(late[1])
 
 
 def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
@@ -140,7 +140,7 @@ def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
     options = ["--rate", str(rate), "--seconds", str(seconds)]
     command = [sys.executable, "-m", "benchmarks.nodes.bare_loop", kind, str(bag), *options]
     found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
-    return found["late"]["p50"], found["late"]["p99"], found["late_after"]["p50"], found["late_after"]["p99"]
+    return found["late"]["p50"], found["late"]["p99"]
 
 
 def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
@@ -152,12 +152,11 @@ def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
         print(f"{name:12s} medians: {_text(found)}")
     for name in ("sleep", "publish"):
         ratios = [ours / bare for ours, bare in zip(medians["push_replay"], medians[name], strict=True)]
-        after = f", after {ratios[2]:.2f} and {ratios[3]:.2f}" if name == "publish" else ""
-        print(f"push_replay over {name}: late p50 {ratios[0]:.2f} and p99 {ratios[1]:.2f}{after}")
+        print(f"push_replay over {name}: late p50 {ratios[0]:.2f} and p99 {ratios[1]:.2f}")
 
 
 def _text(figures: Sequence[float]) -> str:
-    return "late p50 {:.0f} us, p99 {:.0f} us; after p50 {:.0f} us, p99 {:.0f} us".format(*figures)
+    return "late p50 {:.0f} us, p99 {:.0f} us".format(*figures)
 
 
 def _compare(bag: Path, received: dict[str, list[bytes]], seconds: float) -> int:

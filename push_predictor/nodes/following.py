@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from time import time_ns
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -15,10 +16,10 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from push_predictor.nodes.message_types import message_class
 from push_predictor.nodes.parameters import given_value
 from push_predictor.nodes.polling import PolledGroup, Taken, take_all
 from push_predictor.nodes.qos import DEPTH, common_profile
-from push_predictor.nodes.replay.topics import message_class
 
 
 class FollowingSubscription:
@@ -41,6 +42,8 @@ class FollowingSubscription:
         self._subscription: Subscription | None = None
         self._profile: tuple[Any, ...] | None = None
         self._last: int | None = None  # number of the last message
+        self._alone = True  # whether there was at most one publisher at the last look
+        self._since = 0  # when their number changed, ns
 
     @property
     def reliability(self) -> ReliabilityPolicy | None:
@@ -50,6 +53,8 @@ class FollowingSubscription:
     def publishers(self) -> list[TopicEndpointInfo]:
         """The present publishers of the topic, of any type."""
         found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
+        if (alone := len(found) <= 1) != self._alone:
+            self._alone, self._last, self._since = alone, None, time_ns()
         return found
 
     def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
@@ -85,13 +90,16 @@ class FollowingSubscription:
         if self._subscription is None:
             return
         for message in take_all(self._subscription):
-            self._note_loss(message.number)
+            self._note_loss(message)
             yield message
 
-    def _note_loss(self, number: int) -> None:
-        """Count the messages that are missing between two: a publisher numbers its messages."""
+    def _note_loss(self, message: Taken) -> None:
+        """Count the messages that are missing between two; several publishers number theirs independently."""
+        if 0 < message.received <= self._since:  # perhaps of one that has left
+            return
+        number = message.number
         last, self._last = self._last, number
-        if last is not None and number > last + 1 and self._node.count_publishers(self.name) == 1:
+        if last is not None and number > last + 1 and self._alone and self._node.count_publishers(self.name) == 1:
             self.lost += number - last - 1
 
 

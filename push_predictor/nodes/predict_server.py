@@ -90,7 +90,7 @@ class PredictServer(LifecycleNode):
     def start(self) -> None:
         """Configure and activate, as a lifecycle manager would; without a model the node stays inactive.
 
-        predict_push and suggest_pushes queue requests until the activation is over, so that no early client is refused.
+        predictions queue until the activation is over, so that no early client is refused.
         """
         self._starting = True
         if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
@@ -99,9 +99,13 @@ class PredictServer(LifecycleNode):
         self._start_threaded()
         self._complete_models()
 
-    def close(self) -> None:
-        """End a trace and long requests, publish the last diagnostics."""
+    def finish(self) -> bool:
+        """End a trace and long requests; whether their clients have got the results."""
         self._closing.set()
+        return self._trace.finish()
+
+    def close(self) -> None:
+        """Publish the last diagnostics."""
         self._trace.close()
         self._diagnostics_thread.stop()
         self._publish_diagnostics()
@@ -146,21 +150,22 @@ class PredictServer(LifecycleNode):
             self._start_threaded()
 
     def _create_services(self) -> None:
+        # In threads: what must be fast, and what may take seconds, so that nothing else waits for it.
         self._threaded = [
             ThreadedService(self, kind, name, callback, SERVICE_QOS)
             for kind, name, callback in (
                 (PredictPush, "predict_push", self._on_push),
-                (SuggestPushes, "suggest_pushes", self._on_suggest),  # takes up to half a minute
+                (PredictPushBatch, "predict_push_batch", self._on_batch),
+                (RolloutPushes, "rollout_pushes", self._on_rollout),
+                (SuggestPushes, "suggest_pushes", self._on_suggest),
+                (LoadModel, "load_model", self._on_load),
             )
         ]
         self._other_services = [
             self.create_service(kind, name, callback, qos_profile=SERVICE_QOS)
             for kind, name, callback in (
-                (PredictPushBatch, "predict_push_batch", self._on_batch),
                 (PredictSliderPose, "predict_slider_pose", self._on_pose),
-                (RolloutPushes, "rollout_pushes", self._on_rollout),
                 (ListModels, "list_models", self._on_list),
-                (LoadModel, "load_model", self._on_load),
             )
         ]
 
@@ -238,11 +243,25 @@ class PredictServer(LifecycleNode):
             return response
         self.get_logger().info(response.message)
         gc.collect()
-        if request.make_default:
-            self.set_parameters([Parameter("default_model", value=response.name)])
+        self._in_executor(partial(self._use, response.name, request.make_default, was_empty))
+        return response
+
+    def _use(self, name: str, as_default: bool, was_empty: bool) -> None:
+        """Take a loaded model into use."""
+        if as_default:
+            self.set_parameters([Parameter("default_model", value=name)])
         if was_empty and self._state == "inactive" and self.value("autostart"):
             self.trigger_activate()
-        return response
+
+    def _in_executor(self, work: Callable[[], None]) -> None:
+        """Let the executor do some work and wait for it: parameters and states are changed in its thread only."""
+        if self.executor is None:
+            work()
+            return
+        done = Event()
+        self.executor.create_task(work).add_done_callback(lambda _: done.set())
+        while not done.wait(0.1) and not self._closing.is_set():
+            pass
 
     def _prediction(self, handler: Handler, request: Any, response: Any) -> Any:
         start = perf_counter()

@@ -12,7 +12,6 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
     sys.exit(entry.push_replay())
 
-import gc
 import json
 import os
 import struct
@@ -31,24 +30,22 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.errors import RecordingError, RequestError, RigError
-from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
+from push_predictor.errors import RecordingError, RigError
+from push_predictor.nodes.qos import CLOCK, LATCHED
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
 from push_predictor.nodes.replay.topics import ReplayTopics
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
-from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
+from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.recordings.topics import Topics, load_topics
-from push_predictor.replay.capacity import measure_capacity
-from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
-from push_predictor.replay.flow_control import FlowControl
+from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
 from push_predictor.replay.options import ReplayOptions
 from push_predictor.replay.player import PlayerOutput, ReplayPlayer
 from push_predictor.replay.push_topics import missing_poses, push_topics
 from push_predictor.replay.report import ReplayReport
-from push_predictor.replay.restamper import Restamper
 from push_predictor.replay.source import BagSource
 from push_predictor.resources import share_path
 
@@ -64,12 +61,10 @@ class PushReplay(Node):
         self._ending = threading.Event()
         self._options = options = read_options(self)
         bag = open_bag(options.recording)
-        _check_storage(options.storage, bag)
-        self._restamper = Restamper() if options.restamp else None
         self._topics = self._open_topics(bag)
-        self._source = BagSource(bag, tuple(self._topics.senders))
+        self._source = BagSource(bag, tuple(self._topics.publishers))
         self._status = self.create_publisher(String, "replay_status", LATCHED)
-        self._clock_publisher = self.create_publisher(Clock, "/clock", KEPT)
+        self._clock_publisher = self.create_publisher(Clock, "/clock", CLOCK)
         self._rig = self.create_publisher(String, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
@@ -78,7 +73,7 @@ class PushReplay(Node):
         self._player = self._make_player(options)
         self._check(bag)
         self._start_reporting()
-        self._controls = ReplayControls(self, self._player, restamps=options.restamp)
+        ReplayControls(self, self._player)
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
             thread.start()
@@ -87,7 +82,6 @@ class PushReplay(Node):
         """Stop the playback and publish the last report."""
         self._ending.set()
         self._player.close()
-        self._controls.close()
         self._checks.stop()
         for thread in self._threads:
             thread.join()
@@ -98,8 +92,7 @@ class PushReplay(Node):
 
     def _open_topics(self, bag: Bag) -> ReplayTopics:
         chosen = {topic: kind for topic, kind in bag.topics.items() if self._options.filter.accepts(topic)}
-        overrides = read_overrides(self._options.qos_overrides)
-        topics = ReplayTopics(self, chosen, bag.qos, overrides, self._restamper, FlowControl(self._ending.is_set))
+        topics = ReplayTopics(self, chosen, bag.qos, self._ending.is_set)
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")
         return topics
@@ -152,20 +145,19 @@ class PushReplay(Node):
 
     def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
         wall = SystemClock()
-        clock = PlayerClock(wall, options.rate, options.start_paused, options.spin)
+        clock = PlayerClock(wall, options.rate, options.start_paused)
         output = PlayerOutput(self._prepare, self._settle, self._announce)
         return ReplayPlayer(self._source, clock, wall, output, options.window, options.loop, options.delay)
 
     def _prepare(self, message: RawMessage) -> Callable[[], bool]:
-        publish = self._topics.prepare(message)
-        untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
-        if self._options.triggers_clock(message.topic) or untimed:
-            return partial(self._publish_with_clock, message.log_time, publish)
-        return publish
+        self._topics.make_room(message.topic)
+        if self._options.triggers_clock(message.topic) or message.topic in self._topics.untimed:
+            return partial(self._publish_with_clock, message)
+        return partial(self._topics.publish, message)
 
-    def _publish_with_clock(self, recorded: int, publish: Callable[[], bool]) -> bool:
-        self._publish_clock(recorded)
-        return publish()
+    def _publish_with_clock(self, message: RawMessage) -> bool:
+        self._publish_clock(message.log_time)
+        return self._topics.publish(message)
 
     def _settle(self) -> None:
         """Wait for acknowledgements, so that no subscriber receives `finished` before the last message."""
@@ -188,32 +180,17 @@ class PushReplay(Node):
                 self._stop.request()
 
     def _play(self) -> None:
-        reduce_timer_slack()
-        self._log_capacity()
         self._wait_for_subscribers()
         self._player.play(self._options.range)
-        gc.collect()
-        gc.freeze()  # objects that exist by now need no further collection while messages wait
         self._player.run()
 
-    def _log_capacity(self) -> None:
-        """State how many messages per second the rate requires, and what this machine can play."""
-        rate, found = self._options.rate, measure_capacity(self._source, SystemClock())
-        if found is None:
-            return
-        if rate > found.largest_rate:
-            late = f"play.rate {rate:g} is above the limit of this machine: messages will be late, none is dropped"
-            self.get_logger().warning(f"{late}. {found.to_text(rate)}")
-        else:
-            self.get_logger().info(found.to_text(rate))
-
     def _wait_for_subscribers(self) -> None:
-        senders = self._topics.senders
-        needed = push_topics(senders, self._streams)
-        wanted = [sender for topic, sender in senders.items() if topic in needed] or list(senders.values())
+        publishers = self._topics.publishers
+        needed = push_topics(publishers, self._streams)
+        wanted = [each for topic, each in publishers.items() if topic in needed] or list(publishers.values())
         deadline = time.perf_counter_ns() + self._options.wait_for_subscribers
         while time.perf_counter_ns() < deadline and not self._ending.is_set():
-            if all(sender.publisher.get_subscription_count() for sender in wanted) and self._rig_received():
+            if all(each.get_subscription_count() for each in wanted) and self._rig_received():
                 return
             time.sleep(0.01)
 
@@ -231,9 +208,6 @@ class PushReplay(Node):
             self._player.report_time(self._publish_clock)
 
     def _publish_clock(self, recorded: int) -> None:
-        if self._restamper is not None:
-            self._restamper.settle(recorded)
-            recorded += self._restamper.offset or 0
         self._clock_publisher.publish(b"\0\1\0\0" + struct.pack("<iI", *divmod(recorded, SECOND)))
 
     def _guarded(self, work: Callable[[], None]) -> None:
@@ -254,12 +228,10 @@ class PushReplay(Node):
             rate=self._player.rate,
             published=self._player.published,
             late=self._player.lateness.delays(),
-            late_after=self._player.lateness_after.delays(),
             behind=self._player.behind / SECOND,
             lost=self._player.failed + self._topics.overwritten,
             acknowledged=self._acknowledged,
             skipped=self._topics.skipped,
-            unstamped=self._topics.unstamped,
             damage=self._source.damage,
             rig=self._rig_warning,
             problems=self._checks.problems,
@@ -279,13 +251,6 @@ def main() -> int:
     # By default Fast DDS asks subscribers only every 3 s what they lack; a fast replay overwrites it in that time.
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(share_path("config", "fastdds_replay.xml")))
     return run("push_replay", PushReplay)
-
-
-def _check_storage(wanted: str, bag: Bag) -> None:
-    """Raise RequestError if the parameter storage.storage_id does not fit the recording."""
-    if wanted and wanted != bag.storage:
-        reason = f"the format of {bag.path}" if bag.storage else f"rosbag2 has no name for the format of {bag.path}"
-        raise RequestError("storage.storage_id", wanted, f"{bag.storage!r}, {reason}")
 
 
 def _size(path: Path) -> int:

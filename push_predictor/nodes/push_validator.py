@@ -12,7 +12,6 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
     sys.exit(entry.push_validator())
 
-import threading
 from collections.abc import Sequence
 from time import monotonic
 
@@ -22,9 +21,9 @@ from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
-from push_predictor.nodes.parameters import declare, values_of
+from push_predictor.nodes.parameters import declare, topics_of, values_of
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.parameters import PARAMETERS
@@ -37,8 +36,6 @@ from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
-from push_predictor.recordings.select import STREAMS
-from push_predictor.recordings.topics import Topics
 
 PERIOD = 0.02  # s between two looks at what has arrived
 
@@ -49,20 +46,17 @@ class PushValidator(Node):
     The executor's thread does all work, every PERIOD. Raises PushPredictorError for a bad parameter.
     """
 
-    def __init__(self, stop: Stop) -> None:
+    def __init__(self) -> None:
         super().__init__("push_validator")
         declare(self, PARAMETERS)
         values = values_of(self, PARAMETERS)
-        self._stop, self._closing, self._closed = stop, threading.Event(), threading.Event()
+        self._closing = self._closed = False
         self._results = ResultPublishers(self, lambda: self._sensors.world)
         self._alarm = AlarmProcess(checked_rate(values["false_alarm_rate"]), self._on_alarm)
         self._models = ModelSource(self, [values["model"], *values["compare"]])
         self._rigs = RigSource(self, values["rig"])
         self._writer = ResultWriter(values["output"], self.get_logger())
-        given = {name: values[f"{name}_topic"] for name in STREAMS}
-        wrench = {key: values[key] for key in ("wrench_frame", "wrench_bias")}
-        topics = Topics(**given, **wrench, world=values["world_frame"])
-        self._sensors = SensorSubscriber(self, topics, values["frame_id"], values["scalar_topics"])
+        self._sensors = SensorSubscriber(self, topics_of(values))
         self._client = PredictionClient(self, values["request_timeout"])
         self._session = Session(values["last_answers"], values["report"])
         self._status = StatusPublisher(
@@ -76,11 +70,13 @@ class PushValidator(Node):
         self.create_timer(PERIOD, self._work, clock=steady)
         self.create_timer(values["diagnostics_period"], lambda: self._status.publish(self._run), clock=steady)
 
+    def finish(self) -> bool:
+        """Write the results; whether that is done."""
+        self._closing = True
+        return self._closed
+
     def close(self) -> None:
-        """Wait until the results are written. Raises PushPredictorError if they cannot be."""
-        self._closing.set()
-        while not self._closed.wait(0.1) and self._stop.error is None:
-            pass
+        """End what runs. Raises PushPredictorError if the results could not be written."""
         self._writer.close()
         self._alarm.stop()
         if self._run is None:
@@ -101,9 +97,9 @@ class PushValidator(Node):
             self._results.alarm(self._run.validation.names[0], state, end)
 
     def _work(self) -> None:
-        if self._closed.is_set():
-            return  # close() ends what works here, from another thread
-        if self._closing.is_set():
+        if self._closed:
+            return
+        if self._closing:
             self._session.shut_down(monotonic())
         self._finish.work()  # before the samples: those that came before a call belong to its run
         self._sensors.look()
@@ -119,7 +115,7 @@ class PushValidator(Node):
         self._finish.answer()
         if self._session.over:
             self._status.publish(self._run)
-            self._closed.set()
+            self._closed = True
 
     def _advance(self) -> None:
         """Let the session go through its states: open, drain, write."""
@@ -142,7 +138,7 @@ class PushValidator(Node):
         if models is None or rig is None or not len(self._sensors):
             return
         # A recording gives the finder every stream from its beginning, so a run begins with all of them.
-        if complete or self._closing.is_set() or self._finish.requested:
+        if complete or self._closing or self._finish.requested:
             output, scalars = self._writer.folder, self._sensors.scalar_names
             if self._run is not None:
                 self._run.checks.check.stop()
@@ -176,4 +172,4 @@ class PushValidator(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit status."""
-    return run("push_validator", PushValidator, args)
+    return run("push_validator", lambda stop: PushValidator(), args)

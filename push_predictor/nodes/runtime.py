@@ -1,30 +1,23 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The life of a node process: start, spin, signals, end. SIGINT and SIGTERM end it with status 0.
-
-Their handlers run in the main thread, between two of its instructions. So the main thread only waits: another thread
-creates the node, starts it and spins it.
-"""
+"""The life of a node process: start, spin, signals, end. SIGINT and SIGTERM end it with status 0."""
 
 from __future__ import annotations
 
 import argparse
-import ctypes
 import os
-import queue
 import signal
 import sys
-import threading
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import rclpy
+from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_predictor import __version__
@@ -32,6 +25,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.network_security import LIMITED, limit_discovery, require_security, security_hint
 from push_predictor.online.child_process import kill_children
 
+TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start or a callback may still end after a signal
 _GRAPH_ERRORS = (
     rclpy_implementation.RCLError,
@@ -43,7 +37,10 @@ _GRAPH_ERRORS = (
 
 
 class Closable(Protocol):
-    """A node with a method close() that runs while the graph is still available."""
+    """A node with a method close(), which is called when it no longer spins, while the graph is still available.
+
+    A method finish(), if it has one, is called before, in turns with the executor, until it returns True.
+    """
 
     def close(self) -> None:
         """End its threads, write and publish its last results."""
@@ -59,34 +56,17 @@ class Stop:
     """A request to end the process, made by a signal, the node itself or one of its threads."""
 
     def __init__(self) -> None:
-        # Not an Event: a signal handler that calls set() while its own thread is inside wait() can block for ever on
-        # the lock of that Event. put() of a SimpleQueue is reentrant.
-        self._requests: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self.requested = False
         self.error: BaseException | None = None
-        self.signalled = False
 
     def request(self) -> None:
-        """End with status 0. May be called by a signal handler."""
-        self._requests.put(None)
-
-    def signal(self) -> None:
-        """The same for a signal: what takes longer than GRACE is then interrupted."""
-        self.signalled = True
-        self._requests.put(None)
+        """End with status 0."""
+        self.requested = True
 
     def fail(self, error: BaseException) -> None:
         """End with status 1 and report the error."""
         self.error = self.error or error
-        self._requests.put(None)
-
-    def wait(self) -> None:
-        """Block until the end is requested."""
-        # With a timeout: Python's main thread misses a signal that the kernel delivers to another thread.
-        while True:
-            try:
-                return self._requests.get(timeout=0.2)
-            except queue.Empty:
-                continue
+        self.requested = True
 
 
 def run(
@@ -102,18 +82,19 @@ def run(
     _parse(name, args)
     stop = Stop()
     _handle_signals(stop)
-    life = _Life(name, make_node, stop, args, start)
-    life.begin()
-    stop.wait()
-    return life.end()
+    life = Life(name, make_node, stop, args, start)
+    life.spin()
+    signal.setitimer(signal.ITIMER_REAL, 0.0)  # the end is not interrupted
+    status = life.end()
+    if life.half_made:  # it may have threads that only a whole node could end
+        kill_children()
+        sys.stdout.flush()
+        os._exit(status)
+    return status
 
 
-class _InterruptedError(BaseException):
-    """Raised in the thread of a node: no handler of Exception catches it."""
-
-
-class _Life:
-    """A node, from its creation to its end, in a thread of its own."""
+class Life:
+    """A node, from its creation to its end. spinning: whether it spins; half_made: a signal interrupted its making."""
 
     def __init__(
         self,
@@ -122,89 +103,68 @@ class _Life:
         stop: Stop,
         args: Sequence[str] | None,
         start: Callable[[Any], None] | None,
+        context: Context | None = None,
     ) -> None:
         self._name, self._make_node, self._stop, self._args, self._start = name, make_node, stop, args, start
-        self._node: Closable | None = None
+        self._context = context
+        self._node: Any = None
         self._executor: Executor | None = None
-        self._spinning = threading.Event()
-        self._ending = False
-        self._thread = threading.Thread(target=self._live, name="executor", daemon=True)
+        self.spinning = self.half_made = False
 
-    def begin(self) -> None:
-        """Create, start and spin the node."""
-        self._thread.start()
-
-    def end(self) -> int:
-        """Close the node; returns the exit status."""
-        self._await_start()
+    def spin(self) -> None:
+        """Create the node, start it, and spin it until the end is requested."""
         try:
-            self._close()
-        finally:
-            rclpy.try_shutdown()
-        return self._status()
-
-    def _live(self) -> None:
-        try:
-            self._node = _made(self._name, self._make_node, self._stop, self._args)
+            self._node = self._made()
             if self._start is not None:
                 self._start(self._node)
-            assert isinstance(self._node, Node)
-            self._executor = SingleThreadedExecutor()
+            self._executor = SingleThreadedExecutor(context=self._context)
             self._executor.add_node(self._node)
-            self._spinning.set()
-            self._executor.spin()
+            self.spinning = True
+            while not self._stop.requested:
+                self._executor.spin_once(timeout_sec=TURN)
         except ExternalShutdownException:
             self._stop.request()
-        except _InterruptedError:
-            self._executor = None  # a node that does not spin cannot be closed
-        except BaseException as error:  # the main thread waits for it and reports it
-            if not self._ending:  # rclpy's executor may use what its shutdown has destroyed
-                self._stop.fail(error)
+        except KeyboardInterrupt:
+            self.half_made = self._node is None
+        except BaseException as error:
+            self._stop.fail(error)
 
-    def _await_start(self) -> None:
-        """Wait until the node spins or its thread has ended; after a signal not for long."""
-        while self._thread.is_alive() and not self._spinning.wait(GRACE):
-            if not self._stop.signalled:
-                continue
-            if self._node is not None:
-                self._interrupt()
-            elif not self._spinning.wait(GRACE) and self._node is None:
-                self._exit()  # a half-created node may have threads that only it can end
-
-    def _close(self) -> None:
-        if self._node is None:
-            return
+    def end(self) -> int:
+        """Close the node, in the thread in which it was spun; returns the exit status."""
         try:
             if self._executor is not None:
-                self._node.close()
+                self._close(self._executor)
+        finally:
+            if self._executor is not None:
+                self._executor.shutdown()
+            if self._node is not None:
+                self._node.destroy_node()
+            rclpy.try_shutdown(context=self._context)
+        return self._status()
+
+    def _close(self, executor: Executor) -> None:
+        """End a node that spins. What is wrong then is the error of the node, unless it has one already."""
+        try:
+            finish = getattr(self._node, "finish", lambda: True)
+            while self._stop.error is None and not finish():
+                executor.spin_once(timeout_sec=TURN)
+        except ExternalShutdownException:
+            pass
+        except Exception as error:
+            self._stop.fail(error)
+        try:
+            self._node.close()
         except PushPredictorError as error:
             self._stop.fail(error)
-        finally:
-            self._end_thread()
-            self._node.destroy_node()
 
-    def _end_thread(self) -> None:
-        self._ending = True
-        if self._executor is not None:
-            self._executor.shutdown()
-        self._thread.join(GRACE if self._stop.signalled else None)
-        if self._thread.is_alive():
-            self._interrupt()
-
-    def _interrupt(self) -> None:
-        """End the thread while it works, such as on the table of a model; no result is lost."""
-        assert self._thread.ident is not None
-        number, exception = ctypes.c_ulong(self._thread.ident), ctypes.py_object(_InterruptedError)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(number, exception)
-        self._thread.join(GRACE)
-        if self._thread.is_alive():
-            self._exit()
-
-    def _exit(self) -> NoReturn:
-        """End the process at once. The middleware's shared memory remains."""
-        kill_children()
-        sys.stdout.flush()
-        os._exit(self._status())
+    def _made(self) -> Closable:
+        limited = limit_discovery()
+        require_security()
+        # rclpy's own handlers shut the context down at once, before the last diagnostics are published.
+        rclpy.init(args=self._args, context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        if limited:
+            get_logger(self._name).info(LIMITED)
+        return self._make_node(self._stop)
 
     def _status(self) -> int:
         error = self._stop.error
@@ -247,20 +207,17 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _made(name: str, make_node: MakeNode, stop: Stop, args: Sequence[str] | None) -> Closable:
-    limited = limit_discovery()
-    require_security()
-    # rclpy's own handlers shut the context down at once, before the last diagnostics are published.
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    if limited:
-        get_logger(name).info(LIMITED)
-    return make_node(stop)
-
-
 def _handle_signals(stop: Stop) -> None:
+    """End at SIGINT and SIGTERM; what takes longer than GRACE then, a start or a callback, is interrupted."""
+
     def end(number: int, frame: object) -> None:
-        stop.signal()
+        stop.request()
         signal.signal(number, signal.SIG_DFL)  # a second signal ends the process at once
+        signal.setitimer(signal.ITIMER_REAL, GRACE)
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
+    signal.signal(signal.SIGALRM, interrupt)

@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 from push_predictor.online.check_process import CheckProcess
-from push_predictor.online.sensors.portions import set_back
-from push_predictor.online.stream_sync import Samples
+from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, joined
+from push_predictor.recordings.windows.clock_set import set_back
 
 FIRST = 1000  # samples of the slider's pose before the first check
 MOST = 50_000  # samples of a stream that are kept: 200 s at 250 Hz, 2 MB

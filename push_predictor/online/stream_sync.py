@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from time import monotonic
 
-from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
+from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP
 from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, describe_clock_offset
@@ -20,20 +19,6 @@ PATIENCE = 5.0  # s of waiting for a stream that lags behind
 SENSOR_LAG, SCALAR_LAG = 0.5e9 * LONGEST_LAG, 0.5 * LONGEST_GAP
 SILENT = 2.0  # s without a sample after which a stream is called silent
 LAGS = 50  # portions of a stream over which its stamps are compared with the slider's
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A portion of each stream; scalars: of each scalar topic that is or was published, by its name in a recording."""
-
-    slider: PoseStream
-    pusher: PoseStream
-    wrench: WrenchStream
-    scalars: Mapping[str, ScalarStream] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        """How many samples of the sensors."""
-        return len(self.slider) + len(self.pusher) + len(self.wrench)
 
 
 class StreamSync:

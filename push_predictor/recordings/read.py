@@ -1,51 +1,38 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Read a recording: decode the messages of a bag into streams."""
+"""Read a recording: the messages of a bag, decoded into streams."""
 
 from __future__ import annotations
 
 import os
-from functools import partial
+from collections import Counter
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.definitions import POSE
 from push_predictor.recordings.bag.reader import Bag, open_bag
-from push_predictor.recordings.fields.sources import TF_TYPES
-from push_predictor.recordings.fields.wrench_bias import WrenchBias
+from push_predictor.recordings.decoder.decoder import POSES, StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
+from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
+from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, STREAMS, TF, sources_of
+from push_predictor.recordings.decoder.wrench import WrenchInput
+from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
+from push_predictor.recordings.fields.transforms import WORLD
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, rig_from_record
-from push_predictor.recordings.samples import (
-    NO_ORIENTATION,
-    NOT_FINITE,
-    PUSHER,
-    SLIDER,
-    SPATIAL_WRENCH,
-    UNREADABLE,
-    WRENCH,
-    SampleRules,
-    UsableSamples,
-    check_samples,
-    has_orientation,
-    pusher_stream,
-    scalar_rules,
-    slider_stream,
-)
-from push_predictor.recordings.select import Messages, select
-from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
-from push_predictor.recordings.topics import WORLD_AXES, Topics, load_topics
-from push_predictor.recordings.windows.free_motion import free_motion
-from push_predictor.recordings.wrench import WrenchContext, read_wrench
+from push_predictor.recordings.streams import Recording, WrenchStream
+from push_predictor.recordings.topics import NO_BIAS, NO_WRENCH, TIP_AXES, WORLD_AXES, Topics, load_topics
 
 __all__ = ["Topics", "read_recording", "recorded_rig", "require_rig"]
 
-FRAME = "world"
 FAULTS = {
     UNREADABLE: "messages are not readable CDR",
     NOT_FINITE: "samples contain NaN or infinity",
     NO_ORIENTATION: "samples have no orientation",
+    OTHER_CLOCK: "samples have a stamp over an hour from those of the poses",
+    NO_TRANSFORM: "samples outside the time, or in a dropout, of a transform",
 }
 
 
@@ -54,29 +41,36 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
 
     topics: where the streams are; those not given are read from NAME.recording.yaml, else have their default. Streams
     keep file order. Stamps are header stamps; a scalar without a header has its log time. Samples that break a rule of
-    recordings/samples.py are discarded; the notes count them. rig replaces the recorded one.
+    decoder/rules.py are discarded; the notes count them. rig replaces the recorded one.
 
     Raises RecordingError for a file that is not a recording, and for a topic that is missing, empty or of a type that
     does not fit, with the option, its value and what the bag contains; RigError for an invalid push_rig record.
     """
     bag, chosen = open_bag(Path(path)), topics.over(load_topics(Path(path)))
-    found = select(bag, chosen)
-    notes = list(found.notes)
-    world = chosen.world or FRAME
-    poses = _usable(found.slider, SLIDER, notes, world), _usable(found.pusher, PUSHER, notes, world)
-    notes += _different_frames(*poses)
-    slider, pusher = slider_stream(poses[0].stamp, poses[0].values), _pusher(poses[1], notes)
-    has_tf = any(kind in TF_TYPES for kind in bag.topics.values())
     rig = rig if rig is not None else recorded_rig(bag)
-    free = None if rig is None else partial(free_motion, rig, slider, pusher)
-    context = WrenchContext(bag.path, has_tf, chosen, *poses, found.tree, found.world, free)
-    wrench, bias = _wrench(found.wrench, context, notes)
-    scalars = {name: _scalar(messages, notes) for name, messages in found.scalars.items()}
-    for messages, stream in ((found.slider, slider), (found.pusher, pusher)):
+    notes: list[str] = []
+    if rig is None and chosen.wrench_bias not in ("", NO_BIAS):
+        notes.append("the bias of the wrench is not subtracted: free motion is found with a rig, and there is none")
+        chosen = replace(chosen, wrench_bias="")
+    decoder = StreamDecoder(chosen)
+    if rig is not None:
+        decoder.begin(rig)
+    for messages in bag.portions(_declared(bag, chosen, decoder)):
+        decoder.put(messages)
+    samples = decoder.take(last=True)
+    notes += _notes_on_poses(bag, decoder)
+    wrench = _wrench(bag, decoder, samples.wrench, notes)
+    for name, each in decoder.scalars.items():
+        notes += _notes(_spelling(bag, name), each.rejected, each.foreign)
+    for name, stream in (("slider", samples.slider), ("pusher", samples.pusher)):
         if not len(stream):
-            raise RecordingError(f"{bag.path}: topic {messages.topic} has no usable sample ({'; '.join(notes)})")
-    scalars = {topic: stream for topic, stream in scalars.items() if len(stream)}
-    return Recording(bag.name, rig, slider, pusher, wrench, scalars, (*bag.notes, *notes), bias)
+            label = _label(bag, decoder.poses[name])
+            raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)})")
+    scalars = {_spelling(bag, name): stream for name, stream in samples.scalars.items() if len(stream)}
+    notes = [*bag.notes, *notes]
+    return Recording(
+        bag.name, rig, samples.slider, samples.pusher, wrench, scalars, tuple(notes), decoder.wrench.estimate
+    )
 
 
 def recorded_rig(bag: Bag) -> Rig | None:
@@ -92,43 +86,183 @@ def require_rig(recording: Recording) -> Rig:
     return recording.rig
 
 
-def _different_frames(slider: UsableSamples, tip: UsableSamples) -> list[str]:
-    """A note on poses whose messages name different frames."""
-    one, other = ({frame.strip("/") for frame in each.frames} - {""} for each in (slider, tip))
-    if one == other or not one or not other:
+# --- topics ----------------------------------------------------------------------------------------------------------
+
+
+def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder) -> set[str]:
+    """Declare the types of all topics to the decoder; returns the topics to read. Raises RecordingError."""
+    every = sources_of(topics)
+    named = {name: source for name, source in every if name in STREAMS}
+    given = {name for name in named if getattr(topics, name)} - ({"wrench"} if topics.wrench == NO_WRENCH else set())
+    further = [source for name, source in every if name == COVARIATE]
+    _check_present(bag, named, given, further)
+    read = {_named(bag, source.topic) for source in further}
+    for name, source in named.items():
+        if (name, source.text) == ("wrench", NO_WRENCH) or not (kind := _kind(bag, name, source, name in given)):
+            continue
+        read.add(_named(bag, source.topic))
+        if not source.frame:
+            decoder.inputs()[name].declare(kind, bag.schemas, bag.path)
+    for source in further:
+        decoder.scalars[name_of(source)].declare(bag.topics[_named(bag, source.topic)], bag.schemas, bag.path)
+    for topic, kind in bag.topics.items():  # the others that contain one number
+        if kind in SCALAR_FIELDS and name_of(_scalar_source(topic)) not in decoder.scalars:
+            decoder.add_scalar(_scalar_source(topic)).declare(kind, bag.schemas, bag.path)
+            read.add(topic)
+    of_tf = {_named(bag, source.topic) for source in named.values() if source.frame}
+    of_tf |= {_named(bag, TF)} if topics.world or (topics.wrench_tf_frame and not of_tf) else set()
+    both = {name for topic in of_tf for name in (topic, topic + STATIC)}
+    return read | {name for name in both if bag.topics.get(name) in TF_TYPES}
+
+
+def _scalar_source(topic: str) -> Source:
+    return Source("covariate_topics", "--covariate-topic", topic)
+
+
+def _kind(bag: Bag, name: str, source: Source, given: bool) -> str:
+    """The type to read from a source's topic, '' without the topic."""
+    kind, target = bag.topics.get(_named(bag, source.topic), ""), STREAMS[name]
+    if source.frame and kind not in TF_TYPES:
+        raise source.error(bag.path, f"{source.topic} is of type {kind!r}; only {TF_TYPES[0]} has frames")
+    return kind if given or kind in target.known or not kind else target.type
+
+
+def _check_present(bag: Bag, named: Mapping[str, Source], given: Collection[str], further: list[Source]) -> None:
+    """Raise RecordingError for a missing topic, with the topics of the bag and their types."""
+    present = ", ".join(f"{topic} ({kind})" for topic, kind in bag.topics.items()) or "no topic"
+    for source in [*(named[name] for name in named if name in given), *further]:
+        if _named(bag, source.topic) not in bag.topics:
+            raise source.error(bag.path, f"no such topic; the bag contains {present}")
+    poses = [source for name, source in named.items() if name not in given and STREAMS[name] is POSE_TARGET]
+    missing = [(_named(bag, source.topic), source.option) for source in poses]
+    if missing := [(topic, option) for topic, option in missing if topic not in bag.topics]:
+        names, options = (" and ".join(each) for each in zip(*missing, strict=True))
+        raise RecordingError(f"{bag.path}: no topic {names} of {POSE.name}; it contains {present}; give {options}")
+
+
+def _named(bag: Bag, name: str) -> str:
+    """The bag's own spelling of a topic's name."""
+    return next((topic for topic in bag.topics if key_of(topic) == key_of(name)), f"/{key_of(name)}")
+
+
+def _spelling(bag: Bag, name: str) -> str:
+    """The name of a scalar with the bag's own spelling of its topic."""
+    topic, dot, field = name.partition(".")
+    return _named(bag, topic) + dot + field
+
+
+def _label(bag: Bag, pose: PoseTopic | PoseFrame) -> str:
+    """The name of a pose's source in notes."""
+    source = pose.source if isinstance(pose, PoseFrame) else pose.messages.source
+    return _named(bag, source.topic) + source.text[len(source.topic) :]
+
+
+# --- notes -----------------------------------------------------------------------------------------------------------
+
+
+def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
+    """What was discarded and assumed. Raises RecordingError for a stream without a readable message, or a frame."""
+    notes, world = [], decoder.world or WORLD
+    for buffer_topic, buffer in decoder.tf.items():
+        if buffer.unreadable:
+            notes.append(f"{_named(bag, buffer_topic)}: {buffer.unreadable} {FAULTS[UNREADABLE]}; discarded")
+    for name in POSES:
+        pose = decoder.poses[name]
+        label = _label(bag, pose)
+        if isinstance(pose, PoseFrame):
+            if pose.problem and f"no frame {world!r}" in pose.problem and decoder.topics.world:
+                raise _option_error(bag, "world_frame", world, pose.problem)
+            if pose.problem:
+                raise pose.source.error(bag.path, pose.problem)
+            notes += _notes(label, pose.rejected, Counter())
+            continue
+        _check_read(bag, label, pose)
+        if pose.problem:
+            turned = f"; the frame of the poses is turned into world_frame {world!r} (option --world-frame)"
+            raise pose.messages.source.error(bag.path, pose.problem + turned)
+        notes += _notes(label, pose.rejected, pose.messages.foreign)
+        if frames := pose.named - ({world} if not decoder.topics.world else pose.named):
+            notes.append(f"{label}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
+    if decoder.headless:
+        label = _label(bag, decoder.poses["pusher"])
+        notes.append(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
+    one, other = ({frame.strip("/") for frame in decoder.poses[name].named} - {""} for name in POSES)
+    if one != other and one and other and not decoder.topics.world:
+        both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
+        notes.append(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
+    return notes
+
+
+def _check_read(bag: Bag, label: str, pose: PoseTopic) -> None:
+    messages = pose.messages
+    if messages.foreign and not messages.received:
+        kind = next(iter(messages.foreign))
+        raise RecordingError(f"{bag.path}: topic {label} is of type {kind!r}, {messages.kind} is accepted")
+    if not messages.received:
+        known = "".join(f"; {note}" for note in bag.notes[:3])
+        raise RecordingError(f"{bag.path}: topic {label} contains no readable message{known}")
+
+
+def _notes(label: str, rejected: Mapping[str, int], foreign: Mapping[str, int]) -> list[str]:
+    found = [f"{label}: {count} messages have type {kind!r}; discarded" for kind, count in foreign.items()]
+    return found + [f"{label}: {count} {FAULTS[fault]}; discarded" for fault, count in rejected.items()]
+
+
+def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: list[str]) -> WrenchStream | None:
+    """The stream, None without any message; notes state what was assumed. Raises RecordingError."""
+    wrench, topics = decoder.wrench, decoder.topics
+    label = _named(bag, wrench.messages.source.topic)
+    if not wrench.messages.received:
+        return None
+    notes += _notes(label, wrench.messages.rejected, wrench.messages.foreign)
+    if topics.wrench_axes == WORLD_AXES:
+        notes += _unexpected_frame(bag, decoder, label)
+    else:
+        notes += _turned(bag, wrench, label, decoder)
+    if wrench.bias is not None:
+        if wrench.bias.estimate is None:
+            problem = wrench.bias.problem or "there is no wrench"
+            raise _option_error(bag, "wrench_bias", topics.wrench_bias, f"{problem}, or give {NO_BIAS}")
+        notes.append(f"{label}: subtracted {wrench.bias.estimate.to_text()}")
+    return found
+
+
+def _turned(bag: Bag, wrench: WrenchInput, label: str, decoder: StreamDecoder) -> list[str]:
+    """Notes on a wrench whose axes are turned. Raises RecordingError if they cannot be."""
+    topics, tip = decoder.topics, _label(bag, decoder.poses["pusher"])
+    found = [f"the axes of the wrench are turned with the tip ({tip})"]
+    if wrench.frame:
+        if not any(kind in TF_TYPES for kind in bag.topics.values()):
+            problem = f"the bag has no /tf; give {TIP_AXES} or {WORLD_AXES}, or record /tf and /tf_static"
+            raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+        if wrench.problem:
+            problem = f"{wrench.problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
+            raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+        into = wrench.turned_into
+        found = [
+            f"the axes of the wrench are turned from {wrench.frame!r} to {into!r} by tf, its torque is moved to the tip"
+        ]
+    elif not wrench.oriented:
+        problem = f"the poses of {tip} have no orientation; give {WORLD_AXES} or a frame in /tf"
+        raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+    if without := wrench.without_pose:
+        found.append(f"{label}: {without} samples outside the time, or in a dropout, of their frame; discarded")
+    return found
+
+
+def _option_error(bag: Bag, key: str, value: str, problem: str) -> RecordingError:
+    return RecordingError(f"{bag.path}: {key} {value!r} (option --{key.replace('_', '-')}): {problem}")
+
+
+def _unexpected_frame(bag: Bag, decoder: StreamDecoder, label: str) -> list[str]:
+    """A note on a wrench in a frame that is not that of the poses, none if the axes were given or are the poses'."""
+    world = decoder.world or WORLD
+    others = sorted({frame.strip("/") for frame in decoder.wrench.messages.named} - {world, *decoder.named})
+    if not others or decoder.topics.wrench_frame:
         return []
-    frames = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
-    return [f"slider and tip are given in different frames, {frames}; --world-frame turns both into one by tf"]
-
-
-def _pusher(samples: UsableSamples, notes: list[str]) -> PoseStream:
-    if missing := int(np.sum(~has_orientation(samples.values))):
-        notes.append(f"{samples.topic}: {missing} samples have no orientation; heading 0 is used")
-    return pusher_stream(samples.stamp, samples.values)
-
-
-def _wrench(
-    messages: Messages | None, context: WrenchContext, notes: list[str]
-) -> tuple[WrenchStream | None, WrenchBias | None]:
-    if messages is None or not messages.data:
-        return None, None
-    rules = WRENCH if context.topics.wrench_axes == WORLD_AXES else SPATIAL_WRENCH
-    return read_wrench(_usable(messages, rules, notes), context, notes)
-
-
-def _scalar(messages: Messages, notes: list[str]) -> ScalarStream:
-    samples = _usable(messages, scalar_rules(messages.type), notes)
-    return ScalarStream(samples.stamp, samples.values[:, 0])
-
-
-def _usable(messages: Messages, rules: SampleRules, notes: list[str], world: str = FRAME) -> UsableSamples:
-    """The usable samples; notes report rejected samples and frames of poses."""
-    checked = check_samples(messages.data, rules)
-    stamp = checked.stamp if rules.layout.header else np.array(messages.log_times, np.uint64).astype(np.int64)
-    for kind, count in messages.foreign.items():
-        notes.append(f"{messages.topic}: {count} messages have type {kind!r}; discarded")
-    for fault, count in checked.rejected.items():
-        notes.append(f"{messages.topic}: {count} {FAULTS[fault]}; discarded")
-    if messages.type == POSE.name and (frames := checked.frames - {world}):
-        notes.append(f"{messages.topic}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
-    return UsableSamples(messages.topic, stamp[checked.usable], checked.values[checked.usable], checked.frames)
+    has_tf = any(kind in TF_TYPES for kind in bag.topics.values())
+    by_tf = f"--wrench-frame {others[-1] or 'FRAME'} turns the axes by tf" if has_tf else "the bag has no /tf"
+    return [
+        f"{label}: frame_id {', '.join(map(repr, others))} is treated as {world!r}; {by_tf}, "
+        f"--wrench-frame {TIP_AXES} turns them with the tip, --wrench-frame {WORLD_AXES} confirms them"
+    ]

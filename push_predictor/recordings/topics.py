@@ -13,7 +13,6 @@ from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
 
 ENDING = ".recording.yaml"
-FRAMES = ("slider", "pusher", "world")
 STREAMS = ("slider", "pusher", "wrench")
 WORLD_AXES, TIP_AXES = "world", "tip"
 FREE_MOTION, NO_BIAS = "free_motion", "none"
@@ -25,7 +24,6 @@ KEYS = (
     "wrench_frame",
     "wrench_bias",
     "world_frame",
-    "frames",
 )
 
 
@@ -115,27 +113,13 @@ def _parsed(saved: object, path: Path) -> Topics:
         raise RecordingError(f"{path}: contains {saved!r}, give the keys {', '.join(KEYS)}")
     if unknown := [key for key in saved if key not in KEYS]:
         raise RecordingError(f"{path}: key {unknown[0]!r} is not accepted, give {', '.join(KEYS)}")
-    frames = _frames(saved.get("frames"), path)
     given = {name: _text(saved.get(_key(name)), path, _key(name)) for name in STREAMS}
-    for name in ("slider", "pusher"):
-        if frames[name] and given[name]:
-            raise RecordingError(f"{path}: gives both {_key(name)} and frames {name}, give one of them")
-        given[name] = given[name] or (f"/tf:{frames[name]}" if frames[name] else "")
     covariates = _list(saved.get("covariate_topics"), path)
     axes, bias = (_text(saved.get(key), path, key) for key in ("wrench_frame", "wrench_bias"))
     if bias not in ("", *BIASES):
         raise RecordingError(f"{path}: wrench_bias is {bias!r}, give {' or '.join(BIASES)}")
     world = _text(saved.get("world_frame"), path, "world_frame")
-    if world and frames["world"]:
-        raise RecordingError(f"{path}: gives both world_frame and frames world, give one of them")
-    return Topics(**given, covariates=covariates, world=world or frames["world"], wrench_frame=axes, wrench_bias=bias)
-
-
-def _frames(value: object, path: Path) -> dict[str, str]:
-    if value is not None and not (isinstance(value, dict) and set(value) <= set(FRAMES)):
-        raise RecordingError(f"{path}: frames is {value!r}, give a mapping with the keys {', '.join(FRAMES)}")
-    given = value if isinstance(value, dict) else {}
-    return {name: _text(given.get(name), path, f"frames {name}") for name in FRAMES}
+    return Topics(**given, covariates=covariates, world=world, wrench_frame=axes, wrench_bias=bias)
 
 
 def _list(value: object, path: Path) -> tuple[str, ...]:

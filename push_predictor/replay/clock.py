@@ -5,14 +5,11 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
 import threading
 import time
 from typing import Protocol
 
 SECOND = 1_000_000_000
-SHORTEST = 30_000  # ns of active waiting: a shorter sleep ends late, since the wake-up takes as long
 COARSE = 20_000_000  # ns: a longer sleep waits on a condition that a control notifies; the rest is one plain sleep
 
 
@@ -53,11 +50,10 @@ class PlayerClock:
     and any later control wakes it.
     """
 
-    def __init__(self, wall: SteadyClock, rate: float = 1.0, paused: bool = False, spin: int = 0) -> None:
+    def __init__(self, wall: SteadyClock, rate: float = 1.0, paused: bool = False) -> None:
         self._wall = wall
         self._rate = rate
         self._paused = paused
-        self._spin = spin
         self._recorded, self._at = 0, wall.now()
         self._changed = threading.Condition()
         self.generation = 0
@@ -117,17 +113,9 @@ class PlayerClock:
                 self._wall.wait(self._changed, None if remaining is None else remaining - COARSE // 2)
                 return False
             deadline = self._deadline(recorded)
-        self._sleep_to(deadline)
+        if (remaining := deadline - self._wall.now()) > 0:
+            self._wall.sleep(remaining)
         return generation == self.generation
-
-    def _sleep_to(self, deadline: int) -> None:
-        remaining = deadline - self._wall.now()
-        # At most half of a short wait: other programs need the core too.
-        spin = min(self._spin, max(remaining // 2, SHORTEST))
-        if remaining > spin:
-            self._wall.sleep(remaining - spin)
-        while spin > 0 and self._wall.now() < deadline:
-            pass
 
     def _change(self, rate: float | None = None, paused: bool | None = None, recorded: int | None = None) -> None:
         with self._changed:
@@ -144,9 +132,3 @@ class PlayerClock:
 
     def _deadline(self, recorded: int) -> int:
         return self._at + round((recorded - self._recorded) / self._rate)
-
-
-def reduce_timer_slack() -> None:
-    """Set the timer slack of this thread's sleeps to 1 ns; Linux's default is 50 us."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK

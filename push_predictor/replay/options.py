@@ -37,14 +37,12 @@ class TopicFilter:
 class ReplayOptions:
     """The options of a replay; times in ns.
 
-    storage: rosbag2's name of the recording's format, empty for any. clock_triggers: topics before whose messages
-    /clock is published if clock_with_topics, empty for all. topics: of the streams of pushes, where they were given.
+    clock_triggers: topics before whose messages /clock is published if clock_with_topics, empty for all. topics: of the
+    streams of pushes, where they were given.
     """
 
     recording: Path
     rig: Path | None
-    restamp: bool
-    spin: int
     wait_for_subscribers: int
     exit_when_finished: bool
     rate: float
@@ -55,9 +53,7 @@ class ReplayOptions:
     clock_frequency: float
     clock_with_topics: bool
     clock_triggers: tuple[str, ...]
-    storage: str
     filter: TopicFilter
-    qos_overrides: Path | None
     window: int
     acked_timeout: int
     strict: bool
@@ -68,55 +64,37 @@ class ReplayOptions:
         return self.clock_with_topics and (not self.clock_triggers or _listed(topic, self.clock_triggers))
 
 
-def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
-    """The options for parameter values by name and times (ns) by name. Raises RequestError for a wrong value."""
-    if values["restamp"] and values["play.rate"] != 1.0:
-        accepted = "1.0, which restamp requires, or restamp false"
-        raise RequestError("play.rate", values["play.rate"], accepted)
-    for name in ("play.start_offset", "play.delay"):
-        if times[name] < 0:
-            raise RequestError(name, times[name] / SECOND, "0 s or more")
-    return _options(values, times)
-
-
-def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
+def replay_options(values: Mapping[str, Any]) -> ReplayOptions:
+    """The options for parameter values by name. Raises RequestError for a wrong value."""
     return ReplayOptions(
         recording=_recording(values),
         rig=_path(values["rig"]),
-        restamp=values["restamp"],
-        spin=values["spin_us"] * 1000,
-        wait_for_subscribers=round(values["wait_for_subscribers"] * SECOND),
+        wait_for_subscribers=_ns(values["wait_for_subscribers"]),
         exit_when_finished=values["exit_when_finished"],
         rate=values["play.rate"],
         loop=values["play.loop"],
         start_paused=values["play.start_paused"],
         range=PlayRange(
-            times["play.start_offset"],
-            _limit(times["play.playback_duration"]),
-            _limit(times["play.playback_until_timestamp"]),
+            _ns(values["play.start_offset"]),
+            _limit(values["play.playback_duration"]),
+            _limit(values["play.playback_until_timestamp"]),
         ),
-        delay=times["play.delay"],
+        delay=_ns(values["play.delay"]),
         clock_frequency=values["play.clock_publish_frequency"],
         clock_with_topics=values["play.clock_publish_on_topic_publish"],
         clock_triggers=tuple(values["play.clock_trigger_topics"]),
-        storage=values["storage.storage_id"],
         filter=_filter(values),
-        qos_overrides=_path(values["play.qos_profile_overrides_path"]),
         window=values["play.read_ahead_queue_size"],
-        acked_timeout=times["play.wait_acked_timeout"],
+        acked_timeout=_ns(values["play.wait_acked_timeout"]),
         strict=values["strict"],
         topics=_topics(values),
     )
 
 
 def _recording(values: Mapping[str, Any]) -> Path:
-    paths = {Path(values[name]).expanduser() for name in ("recording", "storage.uri") if values[name]}
-    if not paths:
+    if not values["recording"]:
         raise RequestError("recording", "", "the path of a recording (docs/reference/recordings.md)")
-    if len(paths) > 1:
-        accepted = f"one recording: recording is {values['recording']!r}"
-        raise RequestError("storage.uri", values["storage.uri"], accepted)
-    return paths.pop()
+    return Path(values["recording"]).expanduser()
 
 
 def _topics(values: Mapping[str, Any]) -> Topics:
@@ -146,8 +124,12 @@ def _matches(regex: str, topic: str) -> bool:
     return bool(regex) and re.fullmatch(regex, topic) is not None
 
 
-def _limit(time: int) -> int | None:
-    return None if time < 0 else time
+def _limit(seconds: float) -> int | None:
+    return None if seconds < 0.0 else _ns(seconds)
+
+
+def _ns(seconds: float) -> int:
+    return round(seconds * SECOND)
 
 
 def _path(text: str) -> Path | None:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from push_predictor.recordings.bag.reader import RawMessage
 from push_predictor.replay.clock import PlayerClock, SteadyClock
-from push_predictor.replay.lateness import Lateness
 from push_predictor.replay.play_range import PlayRange
+from push_predictor.replay.report import Lateness
 from push_predictor.replay.source import ReadAhead, Source
 
 _READING = 300_000  # ns: nothing is read ahead in less time than this before a deadline
@@ -39,7 +39,7 @@ class ReplayPlayer:
     """Plays a source by a clock. run() takes a thread; all other methods may be called from any thread.
 
     Messages are never dropped: a late one is published at once. published and failed count messages. lateness: delay
-    up to the call that publishes a message; lateness_after: up to its return.
+    up to the call that publishes a message.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ReplayPlayer:
         self._stopped = self._closed = False
         self._time: int | None = None
         self.state = "waiting"
-        self.lateness, self.lateness_after = Lateness(), Lateness()
+        self.lateness = Lateness()
         self.published = self.failed = 0
 
     def run(self) -> None:
@@ -234,13 +234,11 @@ class ReplayPlayer:
         return True
 
     def _send_at(self, head: RawMessage, publish: Callable[[], bool], generation: int, deadline: int) -> None:
-        # After a sleep the caches are cold: each line before the message is published costs about a microsecond.
         with self._lock:
             # A control may have come between the sleep and the lock: the head may have changed.
             if generation == self._clock.generation and not self._stopped:
                 begin = self._wall.now()
                 self._send(head, publish)
-                self.lateness_after.add(self._wall.now() - deadline)
                 self.lateness.add(begin - deadline)
 
     def _send(self, message: RawMessage, publish: Callable[[], bool]) -> None:

@@ -6,17 +6,51 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from push_predictor.replay.lateness import Delays
+import numpy as np
+
+LAST = 100_000  # messages over which percentiles are taken
+
+
+@dataclass(frozen=True)
+class Delays:
+    """Percentiles of the lateness of the last messages, and the maximum of all, us."""
+
+    p50: float
+    p99: float
+    maximum: float
+
+    def to_text(self) -> str:
+        """The figures without decimals."""
+        return f"p50 {self.p50:.0f} us, p99 {self.p99:.0f} us, max {self.maximum:.0f} us"
+
+
+class Lateness:
+    """How late messages are."""
+
+    def __init__(self) -> None:
+        self._last: deque[int] = deque(maxlen=LAST)
+        self.maximum = 0  # ns
+
+    def add(self, late: int) -> None:
+        """Add one message, ns; before its time counts as 0."""
+        self._last.append(max(late, 0))
+        self.maximum = max(self.maximum, late)
+
+    def delays(self) -> Delays:
+        """The figures so far."""
+        p50, p99 = np.quantile(list(self._last) or [0], (0.5, 0.99), method="higher").tolist()
+        return Delays(p50 / 1000.0, p99 / 1000.0, self.maximum / 1000.0)
 
 
 @dataclass(frozen=True)
 class ReplayReport:
     """State of a replay; behind in s, acknowledged None before the end.
 
-    late: delay of the messages up to the call that publishes them; late_after: up to its return.
+    late: delay of the messages up to the call that publishes them.
     problems: what the check of the recording found; check: its result.
     """
 
@@ -25,12 +59,10 @@ class ReplayReport:
     rate: float
     published: int
     late: Delays
-    late_after: Delays
     behind: float
     lost: int
     acknowledged: bool | None
     skipped: Mapping[str, str] = field(default_factory=dict)
-    unstamped: Sequence[str] = ()
     damage: Sequence[str] = ()
     rig: str = ""
     problems: Sequence[str] = ()
@@ -44,7 +76,6 @@ class ReplayReport:
         warnings += [f"damaged: {text}" for text in self.damage]
         warnings += [f"{self.behind:.3f} s behind schedule"] if self.behind > 0.1 else []
         warnings += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
-        warnings += [f"not restamped: {topic} (its type does not begin with a header)" for topic in self.unstamped]
         return [*warnings, *([self.rig] if self.rig else []), *self.problems]
 
     @property
@@ -58,9 +89,6 @@ class ReplayReport:
             "late_p50_us": f"{self.late.p50:.1f}",
             "late_p99_us": f"{self.late.p99:.1f}",
             "late_max_us": f"{self.late.maximum:.1f}",
-            "late_after_p50_us": f"{self.late_after.p50:.1f}",
-            "late_after_p99_us": f"{self.late_after.p99:.1f}",
-            "late_after_max_us": f"{self.late_after.maximum:.1f}",
             "behind_s": f"{self.behind:.6f}",
             "lost": str(self.lost),
             "acknowledged": {None: "unknown", True: "yes", False: "no"}[self.acknowledged],
@@ -74,7 +102,6 @@ class ReplayReport:
         """One line for the log."""
         figures = (
             f"{self.state}: published {self.published} messages of {self.recording} at rate {self.rate:g}, "
-            f"late {self.late.to_text()}, after publishing {self.late_after.to_text()}, "
-            f"lost {self.lost}, acknowledged {self.values['acknowledged']}"
+            f"late {self.late.to_text()}, lost {self.lost}, acknowledged {self.values['acknowledged']}"
         )
         return "; ".join([figures, *self.warnings])

@@ -12,10 +12,11 @@ import numpy as np
 
 from push_predictor.evaluation.offline import window_options
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.corrections import correct
-from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
+from push_predictor.residuals.channels.contrast import GROSS, NOTHING_FOUND, ChannelEffect, ChannelFinding
+from push_predictor.residuals.channels.measurement import correct, measurement_errors
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
-from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, WrenchFinding, wrench_effects
+from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
+from push_predictor.residuals.channels.wrench import wrench_effects
 from push_predictor.residuals.evidence.loading import corrected_data
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
@@ -33,10 +34,10 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
     model, analysis, seed = question.model, question.windows, question.seed
     watch("measurement", 0.1)
     measured = measurement_errors(analysis, model.training, question.loaded.rig, question.share("measurement"), seed)
-    if measured is not None and measured.errors:
+    if measured is not None and measured.effects:
         corrected = _corrected(question, measured)
         if _explains_residuals(question, corrected):
-            return Searched(measured, NO_MOTION, NO_WRENCH, corrected)
+            return Searched(measured, NO_MOTION, NOTHING_FOUND, corrected)
     watch("motion", 0.15)
     motion = motion_effects(
         model, question.evidence, question.share("motion"), question.covariates, seed, inside=question.inside
@@ -47,9 +48,9 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
     bias = _bias_of(forces)
     if bias is None:
         return Searched(measured, motion, forces)
-    corrected = _corrected(question, bias)
+    corrected = _corrected(question, ChannelFinding((bias,), forces.tested))
     if not _changes(question, corrected):
-        return Searched(measured, motion, _without_bias(forces), harmless=bias.errors)
+        return Searched(measured, motion, _without_bias(forces), harmless=(bias,))
     first = forces.effects[0].mechanism == WRENCH_BIAS if forces.effects else not motion.variance
     return Searched(measured, motion, forces, corrected if first and not motion.terms else None)
 
@@ -62,28 +63,28 @@ class Searched:
     the verdict. harmless: errors that change neither windows nor residuals.
     """
 
-    measured: MeasurementFinding | None
+    measured: ChannelFinding | None
     motion: MotionFinding
-    forces: WrenchFinding
+    forces: ChannelFinding
     corrected: Corrected | None = None
-    harmless: tuple[MeasurementFault, ...] = ()
+    harmless: tuple[ChannelEffect, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
     """Measurement errors, and the same pushes cut again from corrected streams; None without streams."""
 
-    finding: MeasurementFinding
+    finding: ChannelFinding
     evidence: Evidence | None
     held_out: PushTable | None
 
 
-def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
+def _corrected(question: Question, measured: ChannelFinding) -> Corrected:
     """The windows of the recordings after all corrections."""
     if question.loaded.recordings is None:
         return Corrected(measured, None, None)
     recordings = list(question.loaded.recordings)
-    for error in measured.errors:
+    for error in measured.effects:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
     table = question.deployed.continued(again.table)
@@ -104,24 +105,17 @@ def _explains_residuals(question: Question, corrected: Corrected) -> bool:
 
 
 def _excess(evidence: Evidence) -> float:
-    """Mean excess of the squared standardised residuals over 1; each square counts at most 25."""
-    return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
+    """Mean excess of the squared standardised residuals over 1; a square counts at most that of a gross error."""
+    return float(np.mean(np.minimum(evidence.z**2, GROSS**2))) - 1.0
 
 
-def _bias_of(forces: WrenchFinding) -> MeasurementFinding | None:
-    """A bias of the force sensor as a measurement error, though it is found on the wrench channel; None without one."""
-    found = [each for each in (*forces.effects, forces.zero) if each is not None and each.mechanism == WRENCH_BIAS]
-    if not found:
-        return None
-    first = found[0]
-    size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
-    error = MeasurementFault(
-        first.mechanism, first.parameters, first.p_value, first.rivals, size, first.covariate, first.basis
-    )
-    return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)
+def _bias_of(forces: ChannelFinding) -> ChannelEffect | None:
+    """A bias of the force sensor: a measurement error, though it is found on the wrench channel."""
+    found = (each for each in (*forces.effects, forces.zero) if each is not None and each.mechanism == WRENCH_BIAS)
+    return next(found, None)
 
 
-def _without_bias(forces: WrenchFinding) -> WrenchFinding:
+def _without_bias(forces: ChannelFinding) -> ChannelFinding:
     return replace(forces, effects=tuple(e for e in forces.effects if e.mechanism != WRENCH_BIAS), zero=None)
 
 

@@ -12,14 +12,12 @@ from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import LOCAL
-from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
-from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
+from push_predictor.residuals.evidence.input_shift import ShiftedInput, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.loading import LoadedData
-from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES, held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.types import BoolArray
 
-FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
 
 

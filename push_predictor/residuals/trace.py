@@ -26,20 +26,19 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
+from push_predictor.residuals.channels.contrast import ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.motion import MotionFinding
-from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding
+from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.by_the_clock import along, by_the_clock
-from push_predictor.residuals.extension.effect_size import size_of
-from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
 from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
-from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict
+from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict, size_of
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
 from push_predictor.watch import Watch, no_watch
@@ -115,17 +114,13 @@ class _Extension:
 def _of_measurement(question: Question, corrected: Corrected) -> Trace:
     """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
     model, measured = question.model, corrected.finding
-    first, cut = measured.errors[0], corrected.evidence is not None
+    first, cut = measured.effects[0], corrected.evidence is not None
     refit = held_out_windows(refit_base(model, question.evidence.table)).calibrated()
     return Trace(
         verdict="measurement",
         kind="mean",
         model=question.deployed,
-        effects=tuple(
-            FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "measurement"), 0.0)
-            for e in measured.errors
-            for parameter in map(Sized.with_errors_of_mechanics, e.parameters)
-        ),
+        effects=_of_channel(measured.effects, "measurement"),
         terms=(),
         equivalent=(),
         mechanisms=first.rivals,
@@ -205,7 +200,7 @@ def _extension(question: Question, motion: MotionFinding) -> _Extension:
     return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)
 
 
-def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[ShiftedInput]) -> Verdict:
+def _verdict(motion: MotionFinding, forces: ChannelFinding, shifted: Sequence[ShiftedInput]) -> Verdict:
     """The verdict: a mean effect, of the motion or else of the force, before one on the variance.
 
     A force that differs also bends tip and rod differently, which can look like noise that changed a little.
@@ -221,14 +216,14 @@ def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[Shi
     return "input_shift" if shifted else "none"
 
 
-def _rival_covariates(forces: WrenchFinding) -> tuple[str, ...]:
+def _rival_covariates(forces: ChannelFinding) -> tuple[str, ...]:
     """Rivals of the covariate that the force depends on first."""
     first = next(iter(forces.effects), None)
     return () if first is None else tuple(name for name in first.rivals if name != WRENCH_BIAS)
 
 
 def _found_effects(
-    question: Question, motion: MotionFinding, forces: WrenchFinding, effects: Sequence[Effect]
+    question: Question, motion: MotionFinding, forces: ChannelFinding, effects: Sequence[Effect]
 ) -> tuple[FoundEffect, ...]:
     """The effects on the channel that the verdict is about."""
     if motion.terms:
@@ -251,9 +246,14 @@ def _found_effects(
             FoundEffect(None, s.covariate, s.outputs, s.basis.name, None, _of_trace(s.p_value, "motion"), 0.0)
             for s in motion.variance
         )
+    return _of_channel(forces.effects, "wrench")
+
+
+def _of_channel(effects: Sequence[ChannelEffect], channel: str) -> tuple[FoundEffect, ...]:
+    """One effect of the JSON for each parameter."""
     return tuple(
-        FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "wrench"), 0.0)
-        for e in forces.effects
+        FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, channel), 0.0)
+        for e in effects
         for parameter in map(Sized.with_errors_of_mechanics, e.parameters)
     )
 

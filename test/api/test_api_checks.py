@@ -13,19 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mistakes import MISTAKES, tracked
+from mistakes import tracked
 from repository import BAGS
 
 from push_predictor import DataWarning, PushModel, trace, train, validate
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 
 HEXAGON, ROUND = BAGS / "hexagon_delrin", BAGS / "circle_pu"
-MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
 def quiet(stage: str, done: float) -> None:
@@ -41,31 +39,12 @@ def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def in_mm(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording in millimetres."""
-    path = tmp_path_factory.mktemp("mm") / "mm"
-    mistake, *_ = MISTAKES["both in mm"]
-    write_recording(path, mistake(read_recording(HEXAGON)))
-    return path
-
-
-@pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> PushModel:
     """An analytical model of the hexagon, trained on half of its pushes."""
     folder, table, rig = tmp_path_factory.mktemp("half"), load_data([HEXAGON]), read_recording(HEXAGON).rig
     assert rig is not None
     write_table(folder / "half.csv", table.take(np.isin(table.push_id, table.pushes[:5])))
     return train(folder / "half.csv", kind="analytical", rig=rig, watch=quiet)
-
-
-@pytest.fixture
-def narrow(tmp_path: Path) -> Path:
-    """A table of pushes along the normal."""
-    table, rig = load_data([HEXAGON]), read_recording(HEXAGON).rig
-    assert rig is not None
-    write_table(tmp_path / "narrow.csv", replace(table, inputs=table.inputs * [1.0, 1.0, 0.1]))
-    save_rig(rig, tmp_path / "narrow.rig.yaml")
-    return tmp_path / "narrow.csv"
 
 
 @pytest.fixture
@@ -115,16 +94,6 @@ def test_strict_makes_the_warning_an_error(turned: Path, model: PushModel) -> No
             call()
 
 
-def test_a_recording_in_mm_is_an_error_in_any_case(in_mm: Path, model: PushModel) -> None:
-    for call in (
-        lambda: train(in_mm, kind="analytical", watch=quiet),
-        lambda: validate(model, in_mm),
-        lambda: trace(model, in_mm, watch=quiet),
-    ):
-        with pytest.raises(RecordingError, match="probably in mm"):
-            call()
-
-
 def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel, loaded_only: Callable[..., None]) -> None:
     assert warned(lambda: train(ROUND, kind="analytical", watch=quiet, strict=True)) == []
     assert warned(lambda: loaded_only(model, HEXAGON, strict=True)) == []
@@ -155,12 +124,3 @@ def test_a_validation_warns_of_faults_of_the_streams_also_if_strict(model: PushM
     assert any(
         "no wrench was recorded" in text for text in warned(lambda: validate(model, tmp_path / "blind", strict=True))
     )
-
-
-def test_a_trace_of_a_narrow_domain_states_what_that_means(
-    model: PushModel, narrow: Path, loaded_only: Callable[..., None]
-) -> None:
-    (text,) = warned(lambda: loaded_only(model, narrow))
-    assert text.startswith(f"{narrow}: The push angles span ") and text.endswith(MEANING)
-    with pytest.raises(RecordingError, match="push angles span"):
-        trace(model, narrow, watch=quiet, strict=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab_bags import short_recording
-from mistakes import MISTAKES, outline_altered
+from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
@@ -82,14 +82,6 @@ def test_train_fails_with_strict_and_states_the_warning(
     assert line.startswith(f"push_predictor train: {altered['turned']}: The slider is turned by -4.0 degrees")
 
 
-def test_train_warns_of_a_wrong_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rig = read_recording(SMALL).rig
-    assert rig is not None
-    save_rig(outline_altered(rig, size=1.04), tmp_path / "wrong.rig.yaml")
-    assert train(tmp_path, SMALL, "--rig", tmp_path / "wrong.rig.yaml") == 0
-    assert "times as large as its outline" in capsys.readouterr().err
-
-
 def test_a_sound_recording_trains_with_strict_and_without_a_word(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -126,9 +118,7 @@ def test_the_other_commands_check_as_train_does(
 ) -> None:
     def run(name: str, *words: str) -> list[str]:
         path = str(altered[name])
-        main(
-            ["validate", str(model), path, *words] if command == "validate" else ["trace", path, "--model", str(model)]
-        )
+        main(["validate", str(model), path, *words] if command == "validate" else ["trace", str(model), path])
         return lines_of(capsys)
 
     assert any("its positions are probably in mm" in line for line in run("both in mm"))

@@ -13,8 +13,7 @@ from collections.abc import Iterator
 import pytest
 from repository import REPOSITORY
 
-from push_predictor.cli import build_parser, main
-from push_predictor.commands.common.old_spellings import REPLACED, current_spelling
+from push_predictor.cli import build_parser
 
 
 def parsers(parser: argparse.ArgumentParser, words: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -81,61 +80,3 @@ def test_the_command_line_page_has_every_option_of_a_command(words: tuple[str, .
     options = {option for action in parser_of(words)._actions for option in action.option_strings}
     missing = [option for option in options - {"-h", "--help"} if not re.search(rf"`{option}\b(?!-)", known)]
     assert not missing
-
-
-# --- old spellings ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "option"),
-    [
-        ("train d --model gp --out m", "train d --kind gp --out m", "train --model"),
-        ("train d --model=gp --out m", "train d --kind=gp --out m", "train --model"),
-        ("trace a b --model m --alpha 0.1", "trace m a b --alpha 0.1", "trace --model"),
-        ("trace --model m a b", "trace m a b", "trace --model"),
-        ("trace a --model=m", "trace m a", "trace --model"),
-        ("trace --alpha 0.1 --model m a b", "trace m --alpha 0.1 a b", "trace --model"),
-        ("report validation --model a b --out d", "report validation a b --out d", "report --model"),
-        ("report validation --out d --model a b", "report validation a b --out d", "report --model"),
-        ("doctor --model m", "doctor m", "doctor --model"),
-        ("suggest m --speed 0.01 0.02", "suggest m --speed-range 0.01 0.02", "suggest --speed"),
-        ("suggest m --angle -0.5 0.5", "suggest m --angle-range -0.5 0.5", "suggest --angle"),
-    ],
-)
-def test_an_old_spelling_is_read_as_the_new_one_with_a_warning(old: str, new: str, option: str) -> None:
-    words, warnings = current_spelling(old.split())
-    assert words == new.split()
-    (warning,) = warnings
-    assert warning.startswith(f"`{option}` is now `") and warning.endswith("The old spelling still works.")
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        "",
-        "--version",
-        "train d --kind gp",
-        "trace m d",
-        "predict m --angle 0.1",
-        "simulate --speed 0.02",
-        "train d --kind gp --model gp",
-        "trace m -- --model",
-    ],
-)
-def test_other_calls_stay_as_they_are(call: str) -> None:
-    assert current_spelling(call.split()) == (call.split(), [])
-
-
-def test_every_new_spelling_is_known_to_the_parser() -> None:
-    for command, replaced in REPLACED.items():
-        words = next(words for words in CALLS if words[0] == command)
-        known = {option for action in parser_of(words)._actions for option in action.option_strings}
-        for old, new in replaced.items():
-            assert old not in known and (new in known or "MODEL" in new)
-
-
-def test_the_command_line_warns_of_an_old_spelling_and_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trace", "absent.csv", "--model", "absent.pushmodel"]) == 1
-    first, *_, last = capsys.readouterr().err.splitlines()
-    assert first == "warning: `trace --model` is now `trace MODEL`. The old spelling still works."
-    assert last.startswith("push_predictor trace: absent.csv")

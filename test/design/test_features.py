@@ -20,11 +20,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import DIFFERENCE, FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.predictors import (
-    ExtendedPredictor,
-    GaussianProcessPredictor,
-    MechanicsPredictor,
-)
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model

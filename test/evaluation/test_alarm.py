@@ -15,7 +15,7 @@ from scipy.stats import binom
 from synthetic import square_rig
 
 from push_predictor.errors import RequestError
-from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_json, alarm_sentence, with_alarm
+from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_json, with_alarm
 from push_predictor.evaluation.alarm.scores import (
     FOLDS,
     AlarmMonitor,
@@ -326,28 +326,3 @@ def test_model_with_too_few_pushes_has_no_alarm():
     model = train_model(made_up(9, 0), square_rig(), "analytical", name="few")
     with pytest.raises(RequestError, match=r"training pushes of the model: 9 .* at least 10"):
         calibrate(model)
-
-
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"off": "3 training pushes are too few"}, "No alarm was computed: 3 training pushes are too few"),
-        (
-            {"fired": False, "pushes": 96, "log10_evidence": -0.5},
-            "No alarm after 96 pushes: no change detected (evidence of a change 0.316 : 1; the alarm needs 100 : 1).",
-        ),
-        (
-            {"score": "size of the residual", "log10_evidence": 2.14},
-            "The model no longer fits: errors are too large (detected after 8 pushes, at p-7; "
-            "evidence of a change 138 : 1; false-alarm rate at most 1 %).",
-        ),
-        (
-            {"score": "dx", "log10_evidence": 5.2},
-            "The model no longer fits: errors are biased (dx) (detected after 8 pushes, at p-7; "
-            "evidence of a change 10^5 : 1; false-alarm rate at most 1 %).",
-        ),
-    ],
-)
-def test_alarm_sentence_states_the_answer_first_then_the_evidence(change: dict[str, object], sentence: str):
-    alarm = {"fired": True, "push_id": "p-7", "pushes": 8, "false_alarm_rate": 0.01, "threshold": 2.0}
-    assert alarm_sentence(alarm | change) == sentence

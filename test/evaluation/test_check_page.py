@@ -14,8 +14,14 @@ from mistakes import another_body, tracked
 from repository import REPOSITORY
 
 from push_predictor.evaluation.check_page.answer import answer_of, contact_sentence, with_minus
-from push_predictor.evaluation.check_page.figures import Correction, contact_chart, correction_of, track_chart
-from push_predictor.evaluation.check_page.page import check_json, write_check_page
+from push_predictor.evaluation.check_page.page import (
+    Correction,
+    check_json,
+    contact_chart,
+    correction_of,
+    track_chart,
+    write_check_page,
+)
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording

@@ -14,7 +14,7 @@ import pytest
 from synthetic import square_rig
 
 from push_predictor.evaluation.ladder.ladder_page import write_ladder_page
-from push_predictor.evaluation.ladder.ladder_text import ladder_answer, ladder_json, ladder_lines
+from push_predictor.evaluation.ladder.ladder_text import ladder_answer, ladder_json
 from push_predictor.evaluation.ladder.scored_ladder import ScoredLadder, changed, score_ladder
 from push_predictor.models.mechanics.fit import FitRows, JointFit
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -70,23 +70,6 @@ def test_gain_is_per_push(ladder: ScoredLadder) -> None:
     gain = ladder.steps[1].gain
     assert ladder.steps[0].gain is None and gain is not None
     assert [gain.value, gain.low, gain.high] == pytest.approx([6.0, 6.0 - 0.98, 6.0 + 0.98])
-
-
-def test_text_shows_steps_and_parameters(ladder: ScoredLadder) -> None:
-    lines = ladder_lines(ladder)
-    assert tuple(lines[:3]) == ladder_answer(ladder) and not lines[3]
-    lines = lines[4:]
-    assert lines[1].startswith("0     textbook") and lines[2].startswith("1     + body_anisotropy")
-    assert any(line.strip().startswith("body_anisotropy  0.1 (0.09") for line in lines)
-    assert "40 windows of 10 pushes" in lines[3]
-
-
-def test_answer_states_gain_evidence_and_action(ladder: ScoredLadder) -> None:
-    gain, evidence, action = ladder_answer(ladder)
-    share = 100.0 * (1.0 - ladder.steps[1].nmse.value / ladder.steps[0].nmse.value)
-    assert gain == f"1 fitted parameter reduces the squared error of held-out pushes by {share:.0f} %."
-    assert evidence.startswith("Their NMSE falls from 3.") and evidence.endswith("from 40 windows of 10 pushes.")
-    assert action == "Use this model. Score it on other pushes with `push_predictor evaluate`."
 
 
 def test_answer_of_few_pushes_asks_for_more() -> None:

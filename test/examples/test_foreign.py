@@ -19,7 +19,7 @@ pytest.importorskip("rosbags.typesys")
 
 from benchmarks.blind.recordings import MODEL
 from benchmarks.foreign import __main__ as command
-from benchmarks.foreign import engine, make, messages, recording
+from benchmarks.foreign import engine, messages, recording
 from benchmarks.foreign.bag import write_bag
 from benchmarks.foreign.change import Change
 from benchmarks.foreign.drivers import Driver
@@ -113,13 +113,6 @@ def test_a_truth_file_has_all_keys_and_a_bag_its_rig(made: tuple[Path, Path]) ->
     assert {"shape", "outline", "pusher_radius", "surface", "object_mass"} <= set(rig_record)
 
 
-def test_making_again_keeps_existing_recordings(made: tuple[Path, Path]) -> None:
-    bag = made[0] / "000/new/new_0.mcap"
-    before = bag.stat().st_mtime_ns
-    _make(made[0].parent)
-    assert bag.stat().st_mtime_ns == before
-
-
 def test_contact_forces_lie_in_the_friction_cone(rig: Rig, inputs: SessionInputs) -> None:
     noiseless = inputs.noise.scaled(0.0)
     motion = engine.simulate(rig, inputs.plan, inputs.facts, noiseless, ())
@@ -161,11 +154,6 @@ def test_clean_ratio_is_zero_without_a_change_and_large_with_one(rig: Rig, input
     assert recording.clean_ratio(rng, engine.simulate, rig, inputs, unchanged, Change("library", (idle,))) < 0.01
 
 
-def test_data_and_truth_must_not_contain_each_other(tmp_path: Path) -> None:
-    options = f"make --out {tmp_path} --truth {tmp_path / 'truth'} --seed 1 --count 1"
-    assert command.main(options.split()) == 2
-
-
 def test_bags_contain_the_samples_that_were_written(rig: Rig, tmp_path: Path) -> None:
     """As the project's own reader, which shares no code with the writer, decodes them."""
     time = np.array([0.0, 0.25, 0.5])
@@ -195,16 +183,6 @@ def test_only_the_module_that_trains_uses_the_project() -> None:
             if any(name.split(".")[0] == "push_predictor" or name.startswith("benchmarks.blind") for name in names):
                 users.add(path.name)
     assert users == {"train.py"}
-
-
-def test_engines_that_are_not_installed_are_refused_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(make, "find_spec", lambda name: None)
-    options = f"make --out {tmp_path / 'data'} --truth {tmp_path / 'truth'} --seed 1 --count 1 --engine mixed"
-    assert command.main(options.split()) == 2
-    assert "pip install '.[foreign]'" in capsys.readouterr().err
-    assert not (tmp_path / "data").exists()
 
 
 @pytest.mark.long

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,31 +57,6 @@ def test_extension_that_beats_both_models_on_later_pushes_is_called_better(recor
     assert to_text(found).startswith("mlab one to two. The extended model is better on the later pushes.")
     values = to_json(found)["differences"]["extended − refit"]["nlpd"]
     assert values["low"] <= values["value"] <= values["high"] < 0.0
-
-
-def test_gain_over_one_model_only_is_named(recording: Recording) -> None:
-    text = to_text(outcome(recording, {DEPLOYED: 0.5, REFIT: 0.1, EXTENDED: 0.1}))
-    assert "only this gain is certain: extended − deployed." in text
-
-
-def test_extension_without_gain_is_called_so(recording: Recording) -> None:
-    text = to_text(outcome(recording, {DEPLOYED: 0.1, REFIT: 0.1, EXTENDED: 0.3}))
-    assert "The extended model has no certain gain on the later pushes." in text
-
-
-def test_report_has_split_alarm_and_effect_with_its_interval(recording: Recording) -> None:
-    text = to_text(outcome(recording, {DEPLOYED: 0.5, REFIT: 0.4}))
-    assert "training 50 pushes (1000 windows), traced 1 push (15 windows), later 20 pushes (60 windows)" in text
-    assert "did not fire in 30 pushes (evidence 10^0.9)" in text
-    assert "mechanism only: pressure spread, constant, −0.7 (95 % CI −0.8 to −0.5)" in text
-    assert "The trace extended no model" in text
-
-
-def test_fired_and_disabled_alarm_are_reported(recording: Recording) -> None:
-    found = outcome(recording, {DEPLOYED: 0.5})
-    fired = {"fired": True, "pushes": 28, "log10_evidence": 2.2, "off": None}
-    assert "fired after 28 pushes (evidence 10^2.2)." in to_text(replace(found, alarm=fired))
-    assert "off: 2 training pushes." in to_text(replace(found, alarm={**fired, "off": "2 training pushes"}))
 
 
 def test_refused_trace_is_the_answer_and_its_reason_is_given(recording: Recording) -> None:

@@ -17,10 +17,11 @@ from random import Random
 
 import pytest
 import zstandard
+from hosted_nodes import hosted_node
 from mcap.writer import CompressionType, Writer
 from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
 from repository import REPOSITORY
-from ros_harness import free_domain, node_process
+from ros_harness import free_domain
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
@@ -28,7 +29,7 @@ from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording
 
 KINDS, FORMS = 15, 9  # of damage, of bags; copy n has kind n % KINDS, and the form after KINDS copies is the next one
-COPIES = [KINDS * ((kind + 2 * turn) % FORMS) + kind for turn in range(2) for kind in range(KINDS)]
+COPIES = [KINDS * (kind % FORMS) + kind for kind in range(KINDS)]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
 
 @pytest.mark.slow
 def test_damaged_copies_are_read_as_far_as_they_are_intact() -> None:
-    """Every kind of damage in two forms of bag, which the mcap package wrote.
+    """Every kind of damage, each in another form of bag, which the mcap package wrote.
 
     The long form: 2000 copies.
     """
@@ -127,15 +128,7 @@ print(most() - before)
 """
 
 
-@pytest.mark.parametrize(
-    ("compression", "noise"),
-    [
-        (CompressionType.ZSTD, 4000),
-        (CompressionType.ZSTD, 500),
-        (CompressionType.LZ4, 500),
-        (CompressionType.NONE, 4000),
-    ],
-)
+@pytest.mark.parametrize(("compression", "noise"), [(CompressionType.ZSTD, 4000), (CompressionType.LZ4, 500)])
 def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:
@@ -319,13 +312,9 @@ def test_commands_on_damaged_bags_exit_with_0_or_1_and_one_line(bag: Path, capsy
                 assert status == 0 and "bag.mcap at byte" in out
 
 
-def test_replay_plays_intact_messages_and_rejects_unreadable_bags(bag: Path) -> None:
+def test_replay_plays_intact_messages(bag: Path) -> None:
     bag.write_bytes(bag.read_bytes()[:20_000])
-    params = {"recording": bag, "exit_when_finished": True, "play.rate": 20.0, "wait_for_subscribers": 0.0}
-    with node_process("push_replay", domain=free_domain(), params=params) as process:
-        assert process.wait(30.0) == 0, process.text()
-        assert "Traceback" not in process.text() and "damaged" in process.text()
-    bag.write_bytes(b"")
-    with node_process("push_replay", domain=free_domain(), params=params) as process:
-        assert process.wait(30.0) == 1
-        assert process.text().strip() == f"push_replay: {bag}: the file is empty, give an MCAP recording"
+    params = {"recording": bag, "play.rate": 20.0, "wait_for_subscribers": 0.0}
+    with hosted_node("push_replay", domain=free_domain(), params=params) as replay:
+        text = replay.wait_for_text("finished: published")
+    assert "Traceback" not in text and "damaged" in text

@@ -45,7 +45,7 @@ def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 # --- many clients ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_clients_are_answered_in_spite_of_a_deaf_and_a_stopped_one():
     """The long form: 50 clients, 10 minutes."""
     done = benchmark("load", "--clients", "6", "--minutes", "0.05", "--every", "1")

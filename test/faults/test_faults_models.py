@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from drifting_models import pushes
-from server_bench import GOOD, server_of
+from server_bench import GOOD, hosted_server_of
 from synthetic import square_rig
 
 from benchmarks.models.damaged_models import KINDS, damage, equal, predict_probes, undamaged_bytes, write_models
@@ -306,7 +306,7 @@ def test_unusable_path_is_reported_and_blocks_nothing(
 def test_overwritten_file_has_no_effect_until_it_is_loaded_completely(files: dict[str, Path], tmp_path: Path) -> None:
     path, new = tmp_path / "served.model", files["analytical"].read_bytes()
     path.write_bytes(files["gp"].read_bytes())
-    with server_of([path]) as server:
+    with hosted_server_of([path]) as server:
         before = list(server.push().mean)
         for written in (0, 40, len(new) // 2, len(new) - 1):  # in place, as an unfinished copy
             path.write_bytes(new[:written])

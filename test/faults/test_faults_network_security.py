@@ -23,25 +23,17 @@ import numpy as np
 import pytest
 import ros_harness
 from diagnostic_msgs.msg import DiagnosticArray
-from hosted_nodes import hosted_node
+from hosted_nodes import hosted_node, refused_start
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from replay_bags import push_messages, write_bag
-from ros_harness import (
-    REPOSITORY,
-    acquaint,
-    call,
-    free_domain,
-    node_environment,
-    ros_context,
-    wait_until,
-)
+from ros_harness import REPOSITORY, acquaint, call, free_domain, node_environment, ros_context, wait_until
 from validator_bench import HEXAGON
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes import predict_server, push_replay, push_validator, runtime
+from push_predictor.nodes import predict_server, push_replay, push_validator
 from push_predictor.nodes.network_security import DISCOVERY, RANGE, limit_discovery
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.srv import Resume
@@ -71,12 +63,8 @@ def refused(executable: str, **environment: str) -> str:
         timeout=30.0,
     )
     assert (done.returncode, done.stdout) == (1, ""), done.stderr
-    return one_line_of(executable, done.stderr)
-
-
-def one_line_of(executable: str, printed: str) -> str:
-    assert printed.count("\n") == 1 and printed.startswith(f"{executable}: "), printed
-    return printed
+    assert done.stderr.count("\n") == 1 and done.stderr.startswith(f"{executable}: "), done.stderr
+    return done.stderr
 
 
 ENFORCED = {"ROS_SECURITY_STRATEGY": "Enforce", "ROS_SECURITY_KEYSTORE": str(REPOSITORY)}
@@ -99,17 +87,10 @@ def test_a_node_refuses_to_start_without_the_requested_security():
 def test_security_that_is_not_enforced_is_refused_too(
     executable: str, value: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
-    """rcl alone would start an unprotected node without a warning: it enforces nothing, and accepts only `true`.
-
-    In this process, whose signal handlers are kept.
-    """
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
-    for name, text in node_environment(free_domain()).items():
-        monkeypatch.setenv(name, text)
+    """rcl alone would start an unprotected node without a warning: it enforces nothing, and accepts only `true`."""
     monkeypatch.setenv("ROS_SECURITY_ENABLE", value)
-    assert MAIN[executable]([]) == 1
-    printed = one_line_of(executable, capfd.readouterr().err)
-    assert all(word in printed for word in words), printed
+    line = refused_start(MAIN[executable], monkeypatch, capfd)
+    assert line.startswith(f"{executable}: ") and all(word in line for word in words), line
 
 
 # --- discovery -------------------------------------------------------------------------------------------------------

@@ -61,10 +61,7 @@ def models() -> dict[str, PushModel]:
         kind: train_model(rows, rig, kind, name=kind, options=TrainingOptions(mean="zero"))
         for kind in ("analytical", "vhgp")
     }
-    return {
-        **found,
-        "drifting": replace(extended(found["vhgp"], slippery(0.1, 0.05)), name="drifting"),
-    }
+    return {**found, "drifting": replace(extended(found["vhgp"], slippery(0.1, 0.05)), name="drifting")}
 
 
 @pytest.fixture(scope="module")

@@ -44,8 +44,7 @@ def clean(start: float) -> Recording:
     assert recording.wrench is not None
     streams = {name: getattr(recording, name) for name in TOPICS}
     return replace(
-        recording,
-        **{n: replace(stream, stamp=stream.stamp + round(start * SECOND)) for n, stream in streams.items()},
+        recording, **{n: replace(stream, stamp=stream.stamp + round(start * SECOND)) for n, stream in streams.items()}
     )
 
 

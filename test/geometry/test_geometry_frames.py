@@ -11,14 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from push_predictor.geometry.frames import (
-    quaternion_of_yaw,
-    rotate,
-    to_body,
-    to_world,
-    wrap_angle,
-    yaw_of_quaternion,
-)
+from push_predictor.geometry.frames import quaternion_of_yaw, rotate, to_body, to_world, wrap_angle, yaw_of_quaternion
 
 angles = st.floats(-50.0, 50.0)
 points = arrays(np.float64, (5, 2), elements=st.floats(-2.0, 2.0))

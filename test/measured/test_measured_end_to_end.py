@@ -22,7 +22,7 @@ from hosted_nodes import hosted_node
 from mit_square_fits import Scores, fit_scaled, load_square
 from mit_square_fits import split_by_push as expected_split_by_push
 from ros_harness import free_domain, wait_until
-from synthetic import Push, pose_stream, stamps, translating_push
+from synthetic import Push, pose_stream, stamps, translating_push, windows_of
 from validator_bench import hosting_replay, hosting_validator
 
 from benchmarks.measured.scores import pooled, total
@@ -312,10 +312,6 @@ def beginning_near(still: float = 0.5, preload: float = 0.0) -> Recording:
         pusher=pose_stream(time, np.column_stack([drawn_out(tip.x) - off, drawn_out(tip.y)]), np.zeros_like(time)),
         wrench=WrenchStream(stamps(time), drawn_out(wrench.fx) - resting, drawn_out(wrench.fy) + 1.0, 0.0 * time),
     )
-
-
-def windows_of(recording: Recording) -> list[PushWindow]:
-    return find_windows(recording, require_rig(recording))
 
 
 def gapless(windows: list[PushWindow]) -> bool:

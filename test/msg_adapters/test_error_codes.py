@@ -25,11 +25,7 @@ from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.model_services import handle_load_model
-from push_predictor.nodes.server.prediction_services import (
-    MAX_PUSHES,
-    handle_predict_push,
-    handle_predict_push_batch,
-)
+from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
 from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
@@ -126,11 +122,7 @@ BAD = [
     (PredictSliderPose, pose(frame="camera"), "INVALID_FRAME"),
     (PredictSliderPose, pose(pusher=Point(x=-0.2)), "NO_CONTACT"),
     (PredictSliderPose, pose(pusher_velocity=Vector3(x=-0.02)), "NO_CONTACT"),
-    (
-        PredictSliderPose,
-        pose(covariate_names=["slider_x"], covariate_values=[1.0]),
-        "INVALID_COVARIATES",
-    ),
+    (PredictSliderPose, pose(covariate_names=["slider_x"], covariate_values=[1.0]), "INVALID_COVARIATES"),
     (RolloutPushes, steps({"contact": 1.0}), "INVALID_REQUEST"),
     (RolloutPushes, steps({}, model="nobody"), "UNKNOWN_MODEL"),
     (RolloutPushes, steps({}, frame=""), "INVALID_FRAME"),

@@ -173,11 +173,7 @@ def window_of(covariance: np.ndarray, difference: np.ndarray) -> ValidatedWindow
     )
 
 
-@given(
-    st.lists(SPREADS, min_size=3, max_size=3),
-    CORRELATIONS,
-    st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
-)
+@given(st.lists(SPREADS, min_size=3, max_size=3), CORRELATIONS, st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
 def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlation, units):
     correlations = np.eye(3)
     correlations[0, 1] = correlations[1, 0] = correlation
@@ -234,12 +230,7 @@ def test_a_status_names_its_values():
 
 
 def test_levels_are_those_of_diagnostic_msgs():
-    assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [
-        b"\0",
-        b"\1",
-        b"\2",
-        b"\3",
-    ]
+    assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [b"\0", b"\1", b"\2", b"\3"]
 
 
 # --- markers ----------------------------------------------------------------------------------------------------

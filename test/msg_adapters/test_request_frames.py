@@ -256,10 +256,7 @@ def test_a_request_in_another_frame_is_the_same_push_with_the_same_response(fram
     for name in ("slider", "pusher", "velocity"):
         np.testing.assert_allclose(getattr(there, name), getattr(here, name), atol=1e-12)
     after = SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True)
-    in_world, in_frame = (
-        answered(asked, after).slider_after,
-        answered(elsewhere, after, frame).slider_after,
-    )
+    in_world, in_frame = (answered(asked, after).slider_after, answered(elsewhere, after, frame).slider_after)
     assert in_frame.header.frame_id == "elsewhere"
     assert_same_pose(frame @ pose_of(in_frame), pose_of(in_world))
     world, own = (np.array(a.pose.covariance).reshape(6, 6) for a in (in_world, in_frame))

@@ -117,13 +117,13 @@ def test_without_rviz_nothing_is_started_and_the_message_states_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
-    found = refusal(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+    found = refusal(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
     assert "sudo apt install ros-jazzy-rviz2" in found and "rviz:=true" in found
-    assert "rviz2" not in executables(run(MAIN, monkeypatch, "rviz:=false", "bag:=b"))
+    assert "rviz2" not in executables(run(MAIN, monkeypatch, "rviz:=false", "recording:=b"))
     install_fake_rviz(tmp_path, monkeypatch)
-    assert "rviz2" in executables(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+    assert "rviz2" in executables(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
     (tmp_path / "lib/rviz2/rviz2").unlink()  # its files without its program
-    assert "ros-jazzy-rviz2" in refusal(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+    assert "ros-jazzy-rviz2" in refusal(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
 
 
 def test_rviz_is_a_dependency_of_the_package() -> None:
@@ -172,7 +172,7 @@ def test_a_failure_at_the_end_is_shown_too(status: int) -> None:
 
 def test_each_node_has_the_end_that_suits_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install_fake_rviz(tmp_path, monkeypatch)
-    found = {node.kwargs["executable"]: node.kwargs for node in run(MAIN, monkeypatch, "bag:=b", "rviz:=true")}
+    found = {node.kwargs["executable"]: node.kwargs for node in run(MAIN, monkeypatch, "recording:=b", "rviz:=true")}
     (recorder,) = run(RECORD, monkeypatch, "bag:=b")
     assert "on_exit" not in found.pop("rviz2")  # its window may be closed
     for node in (found["predict_server"], found["push_validator"], recorder.kwargs):
@@ -192,10 +192,10 @@ def validator(monkeypatch: pytest.MonkeyPatch, *words: str) -> dict[str, Any]:
 
 
 def test_covariates_are_a_list_of_topics(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = validator(monkeypatch, "scalar_topics:=surface/temperature, /room/humidity,")
-    assert given == {"scalar_topics": ["surface/temperature", "/room/humidity"]}
-    (row,) = (row for row in PARAMETERS if row.name == "scalar_topics")
-    assert row.allows(given["scalar_topics"])
+    given = validator(monkeypatch, "covariate_topics:=surface/temperature, /room/humidity,")
+    assert given == {"covariate_topics": ["surface/temperature", "/room/humidity"]}
+    (row,) = (row for row in PARAMETERS if row.name == "covariate_topics")
+    assert row.allows(given["covariate_topics"])
     assert validator(monkeypatch) == {}
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from validator_bench import HEXAGON, Status, beginning
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
+from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.write import write_recording
@@ -32,7 +34,8 @@ def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> 
     save_model(model, tmp_path / "analytical.pushmodel")
     domain = free_domain()
     params = {"model": tmp_path / "analytical.pushmodel", "diagnostics_period": 0.2, "strict": True}
-    with ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params):
+    without_alarm = patch.object(AlarmProcess, "prepare")
+    with without_alarm, ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params):
         received, played = Status(node), Status(node, "push_replay")
         received.wait_for_first()
         played_wrong = {"recording": tmp_path / "wrong", "play.rate": 10.0, "wait_for_subscribers": 60.0}

@@ -9,6 +9,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
@@ -18,12 +19,12 @@ from lab_bags import LABORATORY, Lab, laboratory, pose_rows, robot_in_tf, short_
 from ros_harness import free_domain, node_process, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from standard_interfaces import provide_interfaces
-from turning_sensor import MOUNT, add_wrench, measured_at
+from turning_sensor import MOUNT, add_tip, add_wrench, measured_at
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.recordings.fields.pose_rows import poses_at
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, poses_at
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.topics import STREAMS, Topics, save_topics
 from push_predictor.recordings.windows.finder import find_windows
@@ -32,7 +33,9 @@ pytestmark = pytest.mark.slow
 
 SECONDS = 6.0  # of the recording: three pushes
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
-IN_TF = Topics("/tf:block", "/tf:tip", "/force_torque_sensor_broadcaster/wrench", wrench_frame="ft")
+FORCE = "/force_torque_sensor_broadcaster/wrench"
+IN_TF = Topics("/tracker/block", "/tf:tip", FORCE, world="world", wrench_frame="ft")
+BASE = normalised(np.array([[-0.6, 0.1, 0.05, 0.1, -0.05, 0.5, 0.8]]))  # of the robot in the world
 
 
 @dataclass(frozen=True)
@@ -54,19 +57,23 @@ def recorded(folder: Path, lab: Lab, topics: Topics) -> Rig:
 
 
 def robot_with_force() -> Lab:
-    """Block and tip below moving frames of tf, and a force sensor that is mounted askew on the tip."""
+    """A block seen from the robot's base, a tip below moving frames of tf, and a force sensor askew on the tip."""
     recording = short_recording(SECONDS)
     assert recording.wrench is not None
     lab, stamp = robot_in_tf(recording), recording.wrench.stamp
     mounted = measured_at(recording.wrench, poses_at(stamp, recording.pusher.stamp, pose_rows(recording.pusher)))
     lab.transform("/tf_static", "tip", "ft", stamp[:1], MOUNT)
+    lab.transform("/tf_static", "world", "base_link", stamp[:1], BASE)
+    seen = composed(inverted(np.repeat(BASE, len(recording.slider), axis=0)), pose_rows(recording.slider))
+    lab.frame = "base_link"
+    add_tip(lab, IN_TF.slider, recording.slider.stamp, seen)
     add_wrench(lab, IN_TF.wrench, stamp, mounted, "ft")
     return lab
 
 
 def parameters(rig: Rig, output: Path) -> dict[str, object]:
     topics = {f"{name}_topic": getattr(rig.topics, name) for name in STREAMS}
-    topics["wrench_frame"] = rig.topics.wrench_frame
+    topics |= {"wrench_frame": rig.topics.wrench_frame, "world_frame": rig.topics.world}
     return {**topics, "model": rig.model, "output": output, "report": False, "diagnostics_period": 0.2}
 
 
@@ -77,9 +84,7 @@ def tf_installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.long
-def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_recording(
-    tmp_path: Path, tf_installed: None
-) -> None:
+def test_a_vicon_and_a_robot_in_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_installed: None) -> None:
     """From .db3 with the topics saved next to it, then from MCAP with the topics as parameters; after a wrong type."""
     rig, domain, output = (
         recorded(tmp_path, laboratory(short_recording(SECONDS)), LABORATORY),
@@ -89,7 +94,6 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
     db3 = write_db3(laboratory(short_recording(SECONDS)), tmp_path / "sqlite", short_recording(SECONDS).rig)
     save_topics(db3, LABORATORY)
     saved = save_topics(rig.bag, LABORATORY)
-    (tmp_path / "qos.yaml").write_text(f"{LABORATORY.slider}: {{reliability: best_effort}}\n")
     with (
         ros_context(domain) as node,
         node_process("predict_server", domain=domain, params={"models": [str(rig.model)]}),
@@ -102,7 +106,7 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
         assert f"slider_topic '{LABORATORY.slider}'" in message and status.all[-1][0] == DiagnosticStatus.ERROR
         node.destroy_publisher(wrong)
         status.wait_for_server()
-        played = {"rate": 2.0, "play.qos_profile_overrides_path": tmp_path / "qos.yaml"}
+        played = {"rate": 2.0}
         with replaying(domain, recording=db3, **played):
             process.wait_for_text(WRITTEN, 60.0)
             replay.wait_for("data_check", "sound")
@@ -116,7 +120,7 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
             assert wait_until(lambda: process.text().count(WRITTEN) == 2), process.text()
             replay.wait_for("recording", str(rig.bag))
             replay.wait_for("data_check", "sound")
-        assert f"slider: {LABORATORY.slider}, {TRANSFORM}, best effort, frame_id 'world', 1" in process.text()
+        assert f"slider: {LABORATORY.slider}, {TRANSFORM}, reliable, frame_id 'world', 1" in process.text()
         lines = [line for line in process.text().splitlines() if "JointState" in line]
         assert len(lines) == 1 and "[ERROR]" in lines[0], "logged once"
         assert f"pusher: {LABORATORY.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
@@ -129,7 +133,10 @@ def test_a_vicon_with_best_effort_and_a_robot_in_tf_give_the_windows_of_the_reco
     assert_windows_of_the_poses(output)
 
 
-def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_installed: None) -> None:
+def test_a_bag_its_validation_and_its_copy_by_the_recorder_have_equal_windows(
+    tmp_path: Path, tf_installed: None
+) -> None:
+    """A slider in the base's frame, which tf turns into the world, a tip that is a frame, a wrench along another."""
     rig, domain, output = recorded(tmp_path, robot_with_force(), IN_TF), free_domain(), tmp_path / "out"
     with (
         ros_context(domain) as node,
@@ -141,11 +148,39 @@ def test_frames_of_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_insta
         status.wait_for_server()
         with replaying(domain, recording=rig.bag, rate=3.0):
             process.wait_for_text(WRITTEN, 60.0)
-        assert "Its axes are turned from 'ft' by tf." in process.text()
+        turned = "Its axes are turned from 'ft' by tf."
+        assert any(turned in values.get("wrench topic", "") for *_, values in status.all), process.text()
         assert f"pusher: {IN_TF.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
         assert process.stop() == 0, process.text()
     assert_same_as_offline(output, rig.model, rig.bag)
     assert_windows_of_the_poses(output)
+    summary = recorded_again(rig, tmp_path / "copy")
+    bag, validated, copy = (load_data([path]) for path in (rig.bag, output / "pushes.csv", tmp_path / "copy"))
+    assert f"{len(bag)} windows of" in summary
+    for other in (validated, copy):
+        assert other.push_id.tolist() == bag.push_id.tolist()
+        np.testing.assert_allclose(other.inputs, bag.inputs, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(other.outcomes, bag.outcomes, rtol=0.0, atol=1e-9)
+        for name in ("normal_force", "tangential_force"):
+            np.testing.assert_allclose(other.covariates[name], bag.covariates[name], rtol=0.0, atol=1e-9)
+
+
+def recorded_again(rig: Rig, copy: Path) -> str:
+    """Record a replay of the bag; returns what the recorder has logged. One node listens: a replay waits for one."""
+    topics = {f"{name}_topic": getattr(rig.topics, name) for name in STREAMS}
+    params = {**topics, "wrench_frame": rig.topics.wrench_frame, "world_frame": rig.topics.world, "bag": copy}
+    domain = free_domain()
+    with (
+        ros_context(domain) as node,
+        node_process("push_recorder", domain=domain, params=params) as process,
+    ):
+        status, samples = Status(node, "push_recorder"), len(short_recording(SECONDS).slider)
+        status.wait_for_first()
+        with replaying(domain, recording=rig.bag, rate=4.0) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+            status.wait_for("slider samples", str(samples))
+        assert process.stop() == 0, process.text()
+        return process.text()
 
 
 def assert_windows_of_the_poses(output: Path) -> None:

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from coarse import coarse_simulator
 from diagnostic_msgs.msg import DiagnosticStatus
-from hosted_nodes import hosted_node
+from hosted_nodes import hosted_node, refused_start
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_harness import acquaint, free_domain, reserved_domain, ros_context, wait_until
+from ros_harness import acquaint, reserved_domain, ros_context, wait_until
 from synthetic import square_rig
 from validator_bench import WRITTEN, Status, beginning, hosting_replay
 
@@ -29,7 +29,7 @@ from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import push_validator, runtime
+from push_predictor.nodes import push_validator
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
@@ -209,13 +209,8 @@ def test_the_windows_are_saved_with_covariates_and_rig(changed: Outcome, validat
 def test_rejects_a_false_alarm_rate_outside_0_to_1_by_name(
     rate: float, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
-    """In this process, whose signal handlers are kept."""
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    assert push_validator.main(["--ros-args", "-p", f"false_alarm_rate:={rate}"]) == 1
-    printed = capfd.readouterr().err
-    assert "false_alarm_rate" in printed and "above 0 and below 1" in printed
+    line = refused_start(push_validator.main, monkeypatch, capfd, false_alarm_rate=rate)
+    assert "false_alarm_rate" in line and "above 0 and below 1" in line
 
 
 # --- an alarm that cannot be -----------------------------------------------------------------------------------------

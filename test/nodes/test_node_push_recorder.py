@@ -20,14 +20,14 @@ from mcap.reader import make_reader
 from planar_messages import pose_message
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros_harness import REPOSITORY, free_domain, node_environment, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32, Float64, String
 from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.qos import KEPT
+from push_predictor.nodes.qos import DEPTH
 from push_predictor.nodes.recorder.parameters import PARAMETERS, RecorderOptions, read_options
 from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
 from push_predictor.online.recorder.live_recording import LiveRecording
@@ -39,8 +39,11 @@ from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
 
+KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for late subscribers
+
 TEMPERATURE, LOSSY = "/surface/temperature", "/lossy"
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Recorded:
@@ -49,10 +52,7 @@ class Recorded:
     def __init__(self, bag: Path, original: Path) -> None:
         domain, self.bag, self.original = free_domain(), bag, original
         params = {"bag": bag, "covariate_topics": ["surface/temperature", LOSSY], "diagnostics_period": 0.2}
-        with (
-            ros_context(domain) as node,
-            node_process("push_recorder", domain=domain, params=params) as process,
-        ):
+        with ros_context(domain) as node, node_process("push_recorder", domain=domain, params=params) as process:
             status = Status(node, "push_recorder")
             status.wait_for_first()
             publisher = node.create_publisher(Float32, LOSSY, BEST_EFFORT)
@@ -153,10 +153,7 @@ def test_ctrl_c_before_the_first_message_writes_nothing_and_says_so(tmp_path: Pa
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=30.0)
     assert process.returncode == 0 and "Traceback" not in errors
-    assert output.splitlines() == [
-        "No message arrived. No bag was written.",
-        *output.splitlines()[1:],
-    ]
+    assert output.splitlines() == ["No message arrived. No bag was written.", *output.splitlines()[1:]]
     assert "No publisher of /slider/pose." in output and list(tmp_path.iterdir()) == []
 
 
@@ -210,7 +207,7 @@ def test_names_are_resolved_in_the_namespace_of_the_node(tmp_path: Path) -> None
 
 def test_topics_saved_next_to_an_earlier_bag_are_used_again(tmp_path: Path) -> None:
     (tmp_path / "a.recording.yaml").write_text("slider_topic: /block\nwrench_topic: /netft\n")
-    found = options_of(storage__uri=str(tmp_path / "a"), slider_topic="/other")
+    found = options_of(bag=str(tmp_path / "a"), slider_topic="/other")
     assert (found.topics.slider, found.topics.wrench, found.with_wrench) == ("/other", "/netft", True)
 
 
@@ -224,7 +221,6 @@ def test_an_existing_bag_is_replaced_only_with_force(tmp_path: Path) -> None:
     ("values", "problem"),
     [
         ({}, "bag: '' is not accepted"),
-        ({"bag": "a", "storage__uri": "b"}, "bag: 'a, b' is not accepted, give the path of one bag"),
         ({"bag": "/nowhere/a", "slider_topic": "1 block"}, "topic: '1 block' is not accepted"),
         ({"bag": "/nowhere/a", "wrench_topic": "/tf:ft"}, "wrench_topic: '/tf:ft' is not accepted"),
         ({"bag": "/nowhere/a", "duration": -1.0}, "duration: -1.0 is not accepted"),

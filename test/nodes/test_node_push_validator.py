@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
-from hosted_nodes import HostedNode, hosted_node
+from hosted_nodes import HostedNode, hosted_node, refused_start
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -63,8 +63,7 @@ from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import runtime
-from push_predictor.nodes.push_validator import PushValidator
+from push_predictor.nodes import push_validator
 from push_predictor.nodes.validator import publishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.validation_run import ValidationRun
@@ -111,7 +110,7 @@ def domain() -> int:
 def served(models: dict[str, Path]) -> Iterator[int]:
     """A domain with a server of both models, for all tests that leave it as it is."""
     params = {"models": list(map(str, models.values()))}
-    with reserved_domain() as domain, node_process("predict_server", domain=domain, params=params):
+    with reserved_domain() as domain, hosted_node("predict_server", domain=domain, params=params):
         yield domain
 
 
@@ -150,9 +149,9 @@ def watched(
     gp, analytical = models.values()
     with ros_context(served) as node:
         received = Listener(node)
-        with validator(served, model=gp, compare=[str(analytical)], output=out) as process:
+        with hosted(served, model=gp, compare=[str(analytical)], output=out) as process:
             received.status.wait_for_first()
-            with replaying(served, recording=hexagon, rate=10.0):
+            with hosting_replay(served, recording=hexagon, rate=10.0):
                 process.wait_for_text(WRITTEN, 60.0)
             judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
             assert wait_until(lambda: len(received.residuals) >= sum(judged) and len(received.markers) >= judged[0])
@@ -628,26 +627,17 @@ def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyP
 # --- starting --------------------------------------------------------------------------------------------------------
 
 
-def test_a_bad_parameter_ends_the_start_with_one_line(domain: int, models, tmp_path: Path, monkeypatch, capfd):
-    """In this process, whose signal handlers are kept."""
+def test_a_bad_parameter_ends_the_start_with_one_line(models, tmp_path: Path, monkeypatch, capfd):
     blocked, twin = tmp_path / "file", tmp_path / "twin.pushmodel"
     blocked.write_text("no folder")
     twin.write_bytes(models["gp"].read_bytes())
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     cases: list[tuple[dict[str, Any], tuple[str, ...]]] = [
-        ({"output": str(blocked / "in")}, ("output", str(blocked), "folder")),
-        ({"model": str(blocked)}, (str(blocked), "not a model file")),
-        ({"rig": str(tmp_path / "absent.yaml")}, ("absent.yaml", "cannot be read")),
-        ({"model": str(models["gp"]), "compare": [str(twin)]}, ("compare", "gp", "different")),
+        ({"output": blocked / "in"}, ("output", str(blocked), "folder")),
+        ({"model": blocked}, (str(blocked), "not a model file")),
+        ({"rig": tmp_path / "absent.yaml"}, ("absent.yaml", "cannot be read")),
+        ({"model": models["gp"], "compare": [str(twin)]}, ("compare", "gp", "different")),
     ]
     for k, (params, words) in enumerate(cases):
-        given = [word for name, value in params.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
-        assert runtime.run("push_validator", PushValidator, ["--ros-args", "-r", f"__node:=validator_{k}", *given]) == 1
-        assert_one_line(capfd.readouterr().err, words)
-
-
-def assert_one_line(text: str, words: tuple[str, ...]) -> None:
-    (line,) = text.strip().splitlines()
-    assert line.startswith("push_validator: ") and all(word in line for word in words), line
+        named = ("-r", f"__node:=validator_{k}")
+        line = refused_start(push_validator.main, monkeypatch, capfd, *named, **params)
+        assert line.startswith("push_validator: ") and all(word in line for word in words), line

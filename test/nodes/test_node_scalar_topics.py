@@ -34,8 +34,11 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.sensors.scalar_topics import ScalarTopics
+from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import ScalarStream
@@ -106,11 +109,17 @@ def model(recording: Path) -> Path:
 
 
 class Watched:
-    """A replay at rate 8 through a validator with the parameter scalar_topics."""
+    """A replay at rate 8 through a validator with the parameter covariate_topics."""
 
     def __init__(self, recording: Path, model: Path, output: Path) -> None:
         domain = free_domain()
-        params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "scalar_topics": ASKED}
+        params = {
+            "model": model,
+            "output": output,
+            "report": False,
+            "diagnostics_period": 0.2,
+            "covariate_topics": ASKED,
+        }
         with (
             ros_context(domain) as node,
             hosted_node("predict_server", domain=domain, params={"models": [str(model)]}),
@@ -170,19 +179,19 @@ def test_topics_without_samples_are_named(watched: Watched) -> None:
     for topic in (*OURS, "/nowhere"):
         assert f"Scalar topic {topic} has no publisher." in watched.before
     assert "Scalar topic /nowhere has no publisher." in watched.message
-    wrong = "scalar_topics 'rod/name': rod/name is of type 'std_msgs/msg/String'; no field of it is a number"
+    wrong = "covariate_topics 'rod/name': rod/name is of type 'std_msgs/msg/String'; no field of it is a number"
     assert any(wrong in message for message in watched.messages), "while it was published"
     assert not any(f"Scalar topic {topic}" in watched.message for topic in OURS)
     counts = [int(watched.values[f"topic:{topic} samples"]) for topic in OURS]
     assert counts[0] > 100 > counts[1] > counts[2] > 1
-    assert not any("rejected" in key and key.startswith("topic:") for key in watched.values)
+    assert not {key: v for key, v in watched.values.items() if "rejected" in key and key.startswith("topic:")}
 
 
 @pytest.mark.parametrize("names", [["warmth", "/warmth"], ["~/warmth"], ["1 warmth"], ["/tf:tip"], ["warmth."]])
 def test_rejects_invalid_topic_names(names: list[str]) -> None:
     with ros_context(free_domain()) as node, pytest.raises(RequestError, match="is not accepted, give") as raised:
-        ScalarSubscriber(node, names)
-    assert f"scalar_topics: {names[0]!r}" in str(raised.value)
+        SensorSubscriber(node, Topics(covariates=tuple(names)))
+    assert f"covariate_topics: {names[-1]!r}" in str(raised.value)
 
 
 # --- the subscriber alone --------------------------------------------------------------------------------------------
@@ -205,19 +214,32 @@ def talker(domain: int) -> Iterator[Node]:
         yield node
 
 
+class Subscriber:
+    """The scalar topics of a node without the sensors, and their decoder."""
+
+    def __init__(self, node: Node, *names: str) -> None:
+        self.decoder = StreamDecoder(Topics(covariates=names))
+        self.topics = ScalarTopics(node, self.decoder.scalars)
+        self.problems, self.figures = self.topics.problems, self.topics.figures
+
+    def take(self, last: bool = False) -> dict[str, ScalarStream]:
+        self.topics.look()
+        self.topics.move()
+        self.topics.date(last)
+        return self.decoder.take_scalars(last=True)
+
+
 class Gathered:
     """The samples that a subscriber has taken of one topic."""
 
-    def __init__(self, subscriber: ScalarSubscriber, name: str, near: int | None = None) -> None:
-        self._subscriber, self._name, self._near = subscriber, name, near
+    def __init__(self, subscriber: Subscriber, name: str) -> None:
+        self._subscriber, self._name = subscriber, name
         self.stamp: list[int] = []
         self.value: list[float] = []
 
     def has(self, condition: Callable[[Gathered], bool], timeout: float = 60.0) -> bool:
         def found() -> bool:
-            self._subscriber.look()
-            self._subscriber.drain()
-            self._add(self._subscriber.take(self._near))
+            self._add(self._subscriber.take())
             return condition(self)
 
         return wait_until(found, timeout)
@@ -240,12 +262,12 @@ def kept() -> QoSProfile:
 def test_subscribes_to_a_later_topic_with_the_qos_of_its_publisher(
     listener: Node, talker: Node, profile: QoSProfile
 ) -> None:
-    subscriber = ScalarSubscriber(listener, ["warmth"])
-    assert subscriber.names == ["/warmth"] and "no publisher" in subscriber.problems()[0]
+    subscriber = Subscriber(listener, "warmth")
+    assert subscriber.take() == {} and "no publisher" in subscriber.problems()[0]
     gathered = Gathered(subscriber, "/warmth")
     with offered(talker, String, QoSProfile(depth=10)):
         assert gathered.has(lambda _: "std_msgs/msg/String" in subscriber.problems()[0])
-        assert "scalar_topics 'warmth': " in subscriber.problems()[0]
+        assert "covariate_topics 'warmth': " in subscriber.problems()[0]
     message = Temperature(temperature=21.5)
     message.header.stamp.sec = 7
     with offered(talker, Temperature, profile) as publisher:
@@ -278,7 +300,7 @@ def publishing(publisher: Any, message: Any, value: float) -> Callable[[Gathered
 
 
 def test_a_field_of_any_type_is_a_scalar(listener: Node, talker: Node) -> None:
-    subscriber = ScalarSubscriber(listener, ["warmth.position[1]"])
+    subscriber = Subscriber(listener, "warmth.position[1]")
     gathered = Gathered(subscriber, "/warmth.position[1]")
     with offered(talker, Temperature, QoSProfile(depth=10)):
         assert gathered.has(
@@ -292,7 +314,7 @@ def test_a_field_of_any_type_is_a_scalar(listener: Node, talker: Node) -> None:
 
 
 def test_a_field_without_a_header_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
-    subscriber = ScalarSubscriber(listener, ["warmth.data[0]"])
+    subscriber = Subscriber(listener, "warmth.data[0]")
     publisher = talker.create_publisher(Float64MultiArray, "warmth", kept())
     begin = talker.get_clock().now().nanoseconds
     publisher.publish(Float64MultiArray(data=[1.0, 2.0]))
@@ -304,7 +326,7 @@ def test_a_field_without_a_header_is_dated_by_its_sending_time(listener: Node, t
 
 def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
     subscriber, publisher = (
-        ScalarSubscriber(listener, ["/cell/warmth"]),
+        Subscriber(listener, "/cell/warmth"),
         talker.create_publisher(Float64, "warmth", kept()),
     )
     begin = talker.get_clock().now().nanoseconds
@@ -316,7 +338,7 @@ def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, t
 
 
 def test_with_a_clock_a_sample_is_dated_by_the_last_tick(listener: Node, talker: Node) -> None:
-    subscriber = ScalarSubscriber(listener, ["warmth"])
+    subscriber = Subscriber(listener, "warmth")
     clock = talker.create_publisher(Clock, "/clock", kept())
     publisher = talker.create_publisher(Float32, "warmth", kept())
     for second in range(5):
@@ -327,17 +349,21 @@ def test_with_a_clock_a_sample_is_dated_by_the_last_tick(listener: Node, talker:
     gathered = Gathered(subscriber, "/warmth")
     assert gathered.has(lambda so_far: len(so_far.value) == 4)
     assert gathered.stamp == [second * SECOND + 5 for second in range(4)]
-    assert subscriber.take(None, last=True)["/warmth"].value.tolist() == [4.5], "no later tick came"
+    assert subscriber.take(last=True)["/warmth"].value.tolist() == [4.5], "no later tick came"
 
 
 def test_stamps_of_another_clock_and_nan_are_rejected_and_counted(listener: Node, talker: Node) -> None:
-    subscriber = ScalarSubscriber(listener, ["warmth"])
+    subscriber = Subscriber(listener, "warmth")
     publisher = talker.create_publisher(Temperature, "warmth", kept())
     for sec, value in ((100, 1.0), (100_000, 2.0), (101, float("nan"))):
         message: Any = Temperature(temperature=value)
         message.header.stamp.sec = sec
         publisher.publish(message)
-    gathered = Gathered(subscriber, "/warmth", near=90 * SECOND)
+    subscriber.decoder.inputs()["slider"].declare("geometry_msgs/msg/PoseStamped", {})
+    here = stamped(90 * SECOND, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    subscriber.decoder.put(Messages.of("slider/pose", "geometry_msgs/msg/PoseStamped", [0], [here]))
+    subscriber.decoder.take()
+    gathered = Gathered(subscriber, "/warmth")
     assert gathered.has(lambda _: subscriber.figures().get("topic:/warmth samples") == 3)
     assert gathered.value == [1.0]
     assert "/warmth: 2 samples were rejected (not finite 1, another clock 1)." in subscriber.problems()

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from time import time_ns
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -26,6 +27,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.errors import RequestError
+from push_predictor.nodes.validator import sensor_subscriber
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.recordings.topics import Topics
 
@@ -106,7 +108,7 @@ def reliabilities(node: Node, topic: str) -> list[ReliabilityPolicy]:
 
 def test_best_effort_publishers_are_heard_and_reliable_ones_stay_reliable(listener: Node, talker: Node) -> None:
     topic = "/cell/slider/pose"
-    with subscriber(listener, Topics(), "world") as sensors:
+    with subscriber(listener, Topics()) as sensors:
         assert wait_until(lambda: reliabilities(talker, topic) == [ReliabilityPolicy.RELIABLE]), "before any publisher"
         with offered(talker, topic, BEST_EFFORT) as lossy:
             assert received(sensors, lossy, pose_at).x[0] == 0.1
@@ -145,7 +147,7 @@ def marker_at(k: int) -> Marker:
 
 def test_the_type_is_that_of_the_publishers_or_a_named_field_of_it(listener: Node, talker: Node) -> None:
     topics = Topics("/vicon/block", "tip.pose", "ft/sensor")
-    with subscriber(listener, topics, "world") as sensors:
+    with subscriber(listener, topics) as sensors:
         with offered(talker, "/vicon/block", BEST_EFFORT, TransformStamped) as tracker:
             stream = received(sensors, tracker, transform_at)
             assert (stream.x[0], stream.stamp[0] // SECOND) == (0.3, 1)
@@ -173,12 +175,15 @@ def test_the_type_is_that_of_the_publishers_or_a_named_field_of_it(listener: Nod
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        (JointState, "slider_topic '/cell/slider/pose': /cell/slider/pose is of type 'sensor_msgs/msg/JointState'"),
-        (Marker, "give one of its fields: /cell/slider/pose.pose"),
+        (
+            JointState,
+            "/cell/slider/pose: slider_topic 'slider/pose': slider/pose is of type 'sensor_msgs/msg/JointState'",
+        ),
+        (Marker, "give one of its fields: slider/pose.pose"),
     ],
 )
 def test_a_type_without_a_pose_is_refused_by_name(listener: Node, talker: Node, kind: type, words: str) -> None:
-    with subscriber(listener, Topics(), "world") as sensors, offered(talker, "slider/pose", RELIABLE, kind):
+    with subscriber(listener, Topics()) as sensors, offered(talker, "slider/pose", RELIABLE, kind):
 
         def refused() -> bool:
             sensors.look()
@@ -190,17 +195,70 @@ def test_a_type_without_a_pose_is_refused_by_name(listener: Node, talker: Node, 
         assert words in problem
 
 
-def test_another_frame_is_named(listener: Node, talker: Node) -> None:
-    topics = Topics(world="table")
-    with subscriber(listener, topics, "world") as sensors, offered(talker, "slider/pose", RELIABLE) as tracker:
+def test_another_frame_is_named_without_a_given_world(listener: Node, talker: Node) -> None:
+    def elsewhere() -> PoseStamped:
+        message = pose_at(0)
+        message.header.frame_id = "table"
+        return message
+
+    with subscriber(listener, Topics()) as sensors, offered(talker, "slider/pose", RELIABLE) as tracker:
 
         def other_frame() -> bool:
-            tracker.publish(pose_at(0))
+            tracker.publish(elsewhere())
             sensors.look()
             sensors.inspect()
-            return any("frame_id 'world' is not accepted, give 'table'" in text for text in sensors.problems())
+            return any("frame_id 'table' is not accepted, give 'world', or set world" in t for t in sensors.problems())
 
         assert wait_until(other_frame)
+        sensors.take()
+        assert sensors.decoder.of("slider").rejected["frame_id"] > 0
+
+
+def test_a_given_world_takes_its_own_frame_and_waits_for_transforms_of_others(listener: Node, talker: Node) -> None:
+    topics = Topics(world="table")
+    with subscriber(listener, topics) as sensors, offered(talker, "slider/pose", RELIABLE) as tracker:
+
+        def turned(frame: str) -> Callable[[int], PoseStamped]:
+            def message(k: int) -> PoseStamped:
+                made = pose_message(SECOND + k * SECOND // 10, 0.1, -0.2, 0.0, 0.5)
+                made.header.frame_id = frame
+                return made
+
+            return message
+
+        assert received(sensors, tracker, turned("table")).x[0] == 0.1
+        assert sensors.world == "table"
+        turns = iter(range(1000, 10**9))
+
+        def rejected() -> bool:
+            tracker.publish(turned("vicon")(next(turns)))
+            sensors.look()
+            sensors.take()
+            return sensors.decoder.of("slider").rejected["without transform"] > 0
+
+        assert wait_until(rejected), "after two seconds of stamps"
+        sensors.inspect()
+        assert any("in frame 'vicon', and there is no /tf from there to 'table'" in t for t in sensors.problems())
+
+
+def test_no_sample_is_lost_when_one_of_two_publishers_leaves(listener: Node, talker: Node) -> None:
+    with subscriber(listener, Topics()) as sensors, offered(talker, "slider/pose", RELIABLE) as stays:
+        received(sensors, stays, pose_at)
+        with offered(talker, "slider/pose", RELIABLE) as leaves:
+            for k in range(40):  # its numbers are far ahead of those of the other
+                leaves.publish(pose_at(k))
+            received(sensors, leaves, pose_at)
+
+        def alone() -> bool:
+            sensors.look()
+            return talker.count_publishers("slider/pose") == 1
+
+        assert wait_until(alone)
+        for _ in range(3):
+            received(sensors, stays, pose_at)
+        received(sensors, stays, pose_at)
+        assert "slider lost" not in sensors.figures()
+        assert not any("were lost" in text for text in sensors.problems())
 
 
 @pytest.mark.parametrize(
@@ -208,7 +266,7 @@ def test_another_frame_is_named(listener: Node, talker: Node) -> None:
 )
 def test_rejects_what_is_no_source(listener: Node, topics: Topics) -> None:
     with pytest.raises(RequestError, match=r"_topic: .* is not accepted, give a topic"):
-        SensorSubscriber(listener, topics, "world")
+        SensorSubscriber(listener, topics)
 
 
 def test_tf_without_its_package_is_refused_by_name(
@@ -216,14 +274,14 @@ def test_tf_without_its_package_is_refused_by_name(
 ) -> None:
     for name in ("tf2_msgs", "tf2_msgs.msg"):
         monkeypatch.setitem(sys.modules, name, None)
-    with subscriber(listener, Topics(slider="/tf:block", pusher="/tf:tool0"), "world") as sensors:
-        assert sensors._tf["/tf"].buffer.world == "", "the root of the tree"
-    with subscriber(listener, Topics(pusher="/tf:tool0"), "world") as sensors:
-        assert sensors._tf["/tf"].buffer.world == sensors.world == "world", "as the headers of the slider"
+    with subscriber(listener, Topics(slider="/tf:block", pusher="/tf:tool0")) as sensors:
+        assert sensors._tf["tf"].buffer.world == "", "the root of the tree"
+    with subscriber(listener, Topics(pusher="/tf:tool0")) as sensors:
+        assert sensors._tf["tf"].buffer.world == sensors.world == "world", "as the headers of the slider"
         sensors.inspect()
         assert sensors.refused and any("/tf:tool0: type tf2_msgs/msg/TFMessage is not" in t for t in sensors.problems())
     topics = Topics(wrench_frame="ft", wrench_bias="free_motion")
-    with subscriber(listener, topics, "world") as sensors, offered(talker, "pusher/wrench", RELIABLE, WrenchStamped):
+    with subscriber(listener, topics) as sensors, offered(talker, "pusher/wrench", RELIABLE, WrenchStamped):
 
         def refused() -> bool:
             sensors.look()
@@ -233,3 +291,27 @@ def test_tf_without_its_package_is_refused_by_name(
         assert wait_until(refused) and "type tf2_msgs/msg/TFMessage is not" in str(sensors.figures()["wrench topic"])
         assert sensors.world == "world" and not sensors.waits_for_bias
         assert sensors.figures()["wrench bias"] == "not known yet: too few samples"
+
+
+def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(sensor_subscriber, "monotonic", lambda: now[0])
+    slider: list[bytes] = []
+    wrench: list[bytes] = []
+    decoder = SimpleNamespace(poses={"slider": slider}, wrench=SimpleNamespace(messages=wrench))
+    scalars = SimpleNamespace(waiting=lambda: True)
+    sensors: Any = SimpleNamespace(decoder=decoder, _empty=0.0, _settled=True, _scalars=scalars)
+    complete = SensorSubscriber.complete
+    assert not complete(sensors), "no message yet"
+    slider.append(b"pose")
+    now[0] += 0.9
+    assert not complete(sensors)
+    now[0] += 0.2
+    assert complete(sensors), "no wrench for a second"
+    wrench.append(b"force")
+    sensors._empty = now[0]
+    assert complete(sensors), "messages of every topic"
+    sensors._settled = False
+    assert not complete(sensors), "the root of the tree may not be known yet"
+    now[0] += 1.1
+    assert complete(sensors)

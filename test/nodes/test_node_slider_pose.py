@@ -46,11 +46,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @contextlib.contextmanager
-def server_of(folder: Path, start: Any = hosted_node, **params: Any) -> Iterator[Any]:
+def server_of(folder: Path, **params: Any) -> Iterator[Any]:
     """Run the server; yield a function from changes of EXAMPLE to the response."""
     domain = harness.free_domain()
     params = {"models": [str(folder)], "default_model": "gp", **params}
-    running = start("predict_server", domain=domain, params=params)
+    running = hosted_node("predict_server", domain=domain, params=params)
     with running, harness.ros_context(domain) as node:
         client = node.create_client(PredictSliderPose, "predict_slider_pose")
 
@@ -133,6 +133,6 @@ def test_refusal_states_that_tf_is_missing(ask: Any) -> None:
 
 
 def test_world_frame_has_the_name_from_the_parameter(folder: Path) -> None:
-    with server_of(folder, harness.node_process, world_frame="table") as ask:
+    with server_of(folder, world_frame="table") as ask:
         assert ask(header={"frame_id": "table"}).slider_after.header.frame_id == "table"
         assert "give 'table'" in ask(header={"frame_id": "world"}).message

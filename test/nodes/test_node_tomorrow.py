@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Week:
     return Week(folder / "tuesday", folder / "wednesday", deployed, found[0], found[1])
 
 
+@cache
 def nmse(model: PushModel, path: Path) -> float:
     return float(metrics_json(validate_recording(model, path)[1])["nmse"]["total"])  # type: ignore[index]  # of JSON
 

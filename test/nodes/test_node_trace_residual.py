@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 import ros_harness as harness
 from action_msgs.msg import GoalStatus
-from hosted_nodes import hosted_node
+from hosted_nodes import hosted_node, refused_start
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from made_up_traces import made_up_trace, pushes, slippery
@@ -29,17 +29,9 @@ from validator_bench import Status
 
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes import predict_server, runtime
+from push_predictor.nodes import predict_server
 from push_predictor.online import trace_process
-from push_predictor.online.trace_process import (
-    COPIES,
-    EXTENDED,
-    REPORT,
-    VERDICT,
-    Failed,
-    TraceTask,
-    evidence_in,
-)
+from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, Failed, TraceTask, evidence_in
 from push_predictor.recordings.table_file import read_table, write_table
 from push_predictor_interfaces.srv import LoadModel
 
@@ -230,12 +222,8 @@ def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting:
 def test_rejects_alpha_out_of_range_at_start(
     alpha: float, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """In this process, whose signal handlers are kept."""
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(harness.free_domain()))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    assert predict_server.main(["--ros-args", "-p", f"trace_alpha:={alpha}"]) == 1
-    assert f"trace_alpha: {alpha} is not accepted" in capfd.readouterr().err
+    line = refused_start(predict_server.main, monkeypatch, capfd, trace_alpha=alpha)
+    assert f"trace_alpha: {alpha} is not accepted" in line
 
 
 def test_evidence_in_a_folder(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from push_predictor.nodes.replay import controls
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor_interfaces import srv
 
@@ -32,35 +31,17 @@ NAMES = {
 
 
 class FakeNode:
-    """Records the services that are created on it, and what is logged; `~/stop` is remapped."""
+    """Records the services that are created on it, and what is logged."""
 
     def __init__(self) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
         self.logged: list[str] = []
-        self.companion: Any = None
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         self.services[name] = (kind, callback)
 
-    def resolve_service_name(self, name: str) -> str:
-        return "/halt" if name == "~/stop" else name.replace("~", "/replay")
-
     def get_logger(self) -> Any:
         return SimpleNamespace(warning=self.logged.append, error=self.logged.append)
-
-
-class FakeCompanion:
-    """A companion that records whether it answers."""
-
-    def __init__(self, principal: Any, suffix: str) -> None:
-        self.node, self.state = FakeNode(), "made"
-        principal.companion = self
-
-    def start(self) -> None:
-        self.state = "started"
-
-    def close(self) -> None:
-        self.state = "closed"
 
 
 class FakePlayer:
@@ -112,16 +93,16 @@ class BrokenPlayer(FakePlayer):
 class Desk:
     """Controls of a fake player, and a function that calls them."""
 
-    def __init__(self, restamps: bool = False, player: FakePlayer | None = None) -> None:
+    def __init__(self, player: FakePlayer | None = None) -> None:
         self.node, self.player = FakeNode(), player or FakePlayer()
-        self.controls = ReplayControls(self.node, self.player, restamps)  # type: ignore[arg-type]  # fakes
+        ReplayControls(self.node, self.player)  # type: ignore[arg-type]  # fakes
 
     def call(self, name: str, **fields: Any) -> Any:
         return answer(self.node, name, **fields)
 
 
 def answer(node: FakeNode, name: str, **fields: Any) -> Any:
-    kind, callback = node.services[node.resolve_service_name(f"~/{name}")]
+    kind, callback = node.services[f"~/{name}"]
     return callback(kind.Request(**fields), kind.Response())
 
 
@@ -132,13 +113,8 @@ def without_rosbag2(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_service_has_a_private_name() -> None:
-    desk = Desk()
-    assert {name: kind for name, (kind, _) in desk.node.services.items()} == {full_name(n): k for n, k in NAMES.items()}
-    desk.controls.close()  # there is no companion
-
-
-def full_name(name: str) -> str:
-    return FakeNode().resolve_service_name(f"~/{name}")
+    services = Desk().node.services
+    assert {name: kind for name, (kind, _) in services.items()} == {f"~/{name}": kind for name, kind in NAMES.items()}
 
 
 def test_an_accepted_control_has_no_error() -> None:
@@ -150,17 +126,11 @@ def test_an_accepted_control_has_no_error() -> None:
     assert response.actually_burst == 2 and response.error_code == response.NONE
 
 
-@pytest.mark.parametrize(
-    ("restamps", "rate", "message"),
-    [
-        (False, -1.0, "rate: -1.0 is not accepted, give a finite number above 0"),
-        (True, 2.0, "1.0, which restamp requires"),
-    ],
-)
-def test_a_bad_rate_is_refused_with_its_reason(restamps: bool, rate: float, message: str) -> None:
-    desk = Desk(restamps)
-    response = desk.call("set_rate", rate=rate)
-    assert not response.success and message in response.message and response.error_code == response.INVALID_REQUEST
+def test_a_bad_rate_is_refused_with_its_reason() -> None:
+    desk = Desk()
+    response = desk.call("set_rate", rate=-1.0)
+    assert not response.success and response.error_code == response.INVALID_REQUEST
+    assert response.message == "rate: -1.0 is not accepted, give a finite number above 0"
     assert desk.player.rate == 1.0 and desk.node.logged == [response.message]
 
 
@@ -226,35 +196,21 @@ def rosbag2(without_rosbag2: None, monkeypatch: pytest.MonkeyPatch) -> Desk:
         setattr(types, kind.__name__, of_rosbag2(kind))
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces", ModuleType("rosbag2_interfaces"))
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", types)
-    monkeypatch.setattr(controls, "CompanionNode", FakeCompanion)
     return Desk()
 
 
-def test_rosbag2s_types_have_the_same_names_on_a_companion(rosbag2: Desk) -> None:
-    types, companion = sys.modules["rosbag2_interfaces.srv"], rosbag2.node.companion
-    assert companion.state == "started"
-    assert set(companion.node.services) == set(rosbag2.node.services) == {full_name(n) for n in NAMES}
-    for name, kind in NAMES.items():
-        assert companion.node.services[full_name(name)][0] is getattr(types, kind.__name__)
-        assert rosbag2.node.services[full_name(name)][0] is kind
-    rosbag2.controls.close()
-    assert companion.state == "closed"
-
-
-def test_rosbag2s_services_control_the_same_player(rosbag2: Desk) -> None:
-    other = rosbag2.node.companion.node
-    assert answer(other, "set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
-    assert answer(other, "burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
-    assert answer(other, "play_next").success
-    answer(other, "resume")
-    assert not rosbag2.player.paused and not rosbag2.call("is_paused").paused
+def test_the_services_have_rosbag2s_types_where_these_are_installed(rosbag2: Desk) -> None:
+    types = sys.modules["rosbag2_interfaces.srv"]
+    assert all(rosbag2.node.services[f"~/{name}"][0] is getattr(types, kind.__name__) for name, kind in NAMES.items())
+    assert rosbag2.call("set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
+    assert rosbag2.call("burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
+    assert rosbag2.call("play_next").success
 
 
 def test_a_refusal_needs_only_the_fields_of_rosbag2(rosbag2: Desk) -> None:
-    other = rosbag2.node.companion.node
-    assert answer(other, "set_rate", rate=-1.0).success is False
-    assert answer(other, "play").success is False
-    answer(other, "resume")
-    assert answer(other, "burst").actually_burst == 0
-    answer(other, "stop")  # fails, and is logged
+    assert rosbag2.call("set_rate", rate=-1.0).success is False
+    assert rosbag2.call("play").success is False
+    rosbag2.call("resume")
+    assert rosbag2.call("burst").actually_burst == 0
+    rosbag2.call("stop")  # fails, and is logged
     assert "ZeroDivisionError" in rosbag2.node.logged[-1]

@@ -13,10 +13,8 @@ from typing import Any
 
 import pytest
 from replay_bags import START, push_messages, write_bag
-from ros_harness import REPOSITORY, call, free_domain, node_environment, node_process, ros_context
+from ros_harness import REPOSITORY, free_domain, node_environment, node_process
 from standard_interfaces import provide_interfaces
-
-from push_predictor_interfaces.srv import GetRate, IsPaused, Pause, PlayNext, SetRate
 
 PLAYER = "/cell/rosbag2_player"
 LATE = {"sec": START // 10**9 + 4, "nanosec": 0}
@@ -45,28 +43,13 @@ def interfaces(monkeypatch: pytest.MonkeyPatch) -> None:
     provide_interfaces("rosbag2_interfaces", monkeypatch)
 
 
-def test_clients_of_both_types_control_one_player(tmp_path: Path, interfaces: None) -> None:
+def test_a_client_of_rosbag2_controls_the_player(tmp_path: Path, interfaces: None) -> None:
     bag, domain = write_bag(tmp_path / "bag.mcap", push_messages(10.0)), free_domain()
-    params = {"storage.uri": bag, "play.start_paused": True}
+    params = {"recording": bag, "play.start_paused": True}
     renamed = ("-r", "__node:=rosbag2_player")
-    with (
-        ros_context(domain) as node,
-        node_process("push_replay", *renamed, domain=domain, namespace="/cell", params=params) as process,
-    ):
-        own = {kind: node.create_client(kind, f"{PLAYER}/{name}") for kind, name in OWN.items()}
-        assert call(own[SetRate], SetRate.Request(rate=1.0)).message == ""
+    with node_process("push_replay", *renamed, domain=domain, namespace="/cell", params=params) as process:
         assert session(domain) == [expected for _, _, expected in SESSION]
-        assert call(own[GetRate], GetRate.Request()).rate == 2.0
-        refused = call(own[PlayNext], PlayNext.Request())  # the playback has been stopped
-        assert not refused.success and refused.error_code == refused.NOTHING_LEFT
-        assert call(own[IsPaused], IsPaused.Request()).paused
-        assert {PLAYER.rpartition("/")[2]} == {name for name in node.get_node_names() if name[0] != "_"} - {
-            node.get_name()
-        }
         assert process.stop() == 0 and "Traceback" not in process.text(), process.text()
-
-
-OWN = {GetRate: "get_rate", IsPaused: "is_paused", Pause: "pause", PlayNext: "play_next", SetRate: "set_rate"}
 
 
 def session(domain: int) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ import yaml
 from lab_bags import Lab, pose_rows, short_recording
 from mcap.reader import make_reader
 from repository import REPOSITORY
+from turning_sensor import add_tip, add_wrench, measured_at_mount, sensor_tf
 
 from push_predictor.errors import RecordingError
 from push_predictor.online.recorder.live_recording import NO_RIG, LiveRecording
@@ -22,6 +23,7 @@ from push_predictor.online.recorder.progress import Progress
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.bag.writer import LIVE_CHUNK_SIZE, BagWriter
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
@@ -404,3 +406,29 @@ def test_what_readers_do_with_the_wrench_is_saved(messages: list[RawMessage], tm
     recording.close(1.0)
     saved = load_topics(tmp_path / "a")
     assert (saved.wrench_frame, saved.wrench_bias, saved.world) == ("tip", "free_motion", "map")
+
+
+# --- what it finds ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bias", ["none", "free_motion"])
+def test_windows_so_far_are_of_the_frames_and_axes_that_readers_use(tmp_path: Path, bias: str) -> None:
+    """A slider seen by a tracker elsewhere, a tip in tf, and a biased sensor on a frame above it."""
+    whole = short_recording(6.0)
+    assert whole.wrench is not None and whole.rig is not None
+    table = normalised(np.array([[0.4, -0.2, 0.1, 0.0, 0.0, 0.6, 0.8]]))
+    lab = Lab(frame="tracker")
+    seen = composed(inverted(np.repeat(table, len(whole.slider), axis=0)), pose_rows(whole.slider))
+    add_tip(lab, "/slider", whole.slider.stamp, seen)
+    lab.transform("/tf_static", "world", "tracker", whole.slider.stamp[:1], table)
+    sensor_tf(lab, whole.pusher, table)
+    add_wrench(lab, "/ft", whole.wrench.stamp, measured_at_mount(whole.wrench, whole.pusher) + 0.3, "ft")
+    topics = Topics("/slider", "/tf:tool0", "/ft", wrench_frame="ft", wrench_bias=bias, world="world")
+    recording = recorder(tmp_path / "a", topics)
+    recording.set_rig(whole.rig)
+    feed(recording, [RawMessage(topic, lab.kinds[topic], sent, data) for sent, topic, data in lab.in_order()])
+    summary = recording.close(7.0)
+    windows = find_windows(read_recording(tmp_path / "a"), whole.rig)
+    assert not summary.problems and summary.windows is not None and len(windows) > 10
+    # With free motion the bias is that so far, which may change a window.
+    assert abs(summary.windows - len(windows)) <= (bias == "free_motion")

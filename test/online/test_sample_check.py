@@ -21,11 +21,9 @@ from push_predictor.online import check_process
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.online.sample_check import FIRST, MOST, SampleCheck
 from push_predictor.online.stream_sync import Samples
-from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.replay.lateness import Delays
-from push_predictor.replay.report import ReplayReport
+from push_predictor.replay.report import Delays, ReplayReport
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
 SECOND = 1_000_000_000
@@ -34,11 +32,6 @@ SECOND = 1_000_000_000
 @pytest.fixture(scope="module")
 def hexagon() -> Recording:
     return read_recording(HEXAGON)
-
-
-def rig_of(recording: Recording) -> Rig:
-    assert recording.rig is not None
-    return recording.rig
 
 
 def portions(recording: Recording, seconds: float = 1.0) -> Iterator[Samples]:
@@ -63,7 +56,7 @@ def wait(check: CheckProcess, work: object) -> None:
 
 def checked(recording: Recording) -> CheckProcess:
     """The check of a recording."""
-    samples = SampleCheck(rig_of(recording), False)
+    samples = SampleCheck(require_rig(recording), False)
     for portion in portions(recording):
         samples.add(portion)
     samples.work()
@@ -90,7 +83,7 @@ def test_sound_samples_are_sound(hexagon: Recording) -> None:
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_warning_is_an_error_only_if_strict(hexagon: Recording) -> None:
-    check, strict = checked(force_turned(hexagon, np.pi)), SampleCheck(rig_of(hexagon), True).check
+    check, strict = checked(force_turned(hexagon, np.pi)), SampleCheck(require_rig(hexagon), True).check
     assert check.result == "wrench_sign"
     assert "change the sign" in check.problems[0]
     strict.findings = check.findings
@@ -111,7 +104,7 @@ class Started:
 
 
 def test_checks_come_as_the_samples_double(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    started, samples = Started(monkeypatch), SampleCheck(require_rig(hexagon))
     for repeat in range(5):
         for portion in portions(late(hexagon, 0.0) if not repeat else shifted(hexagon, 30.0 * repeat)):
             samples.add(portion)
@@ -122,7 +115,7 @@ def test_checks_come_as_the_samples_double(hexagon: Recording, monkeypatch: pyte
 
 
 def test_old_samples_are_forgotten(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    started, samples = Started(monkeypatch), SampleCheck(require_rig(hexagon))
     for repeat in range(40):
         samples.add(next(portions(shifted(hexagon, 30.0 * repeat), 40.0)))
     samples.work()
@@ -132,7 +125,7 @@ def test_old_samples_are_forgotten(hexagon: Recording, monkeypatch: pytest.Monke
 
 
 def test_a_clock_that_is_set_back_begins_again(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    started, samples = Started(monkeypatch), SampleCheck(require_rig(hexagon))
     samples.add(next(portions(shifted(hexagon, 30.0), 40.0)))
     samples.add(next(portions(hexagon, 40.0)))
     samples.work()
@@ -142,7 +135,7 @@ def test_a_clock_that_is_set_back_begins_again(hexagon: Recording, monkeypatch: 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -> None:
     """And is reported as not checked, with the reason, without them."""
-    bag = laboratory(short_recording(2.0)).mcap(tmp_path / "lab", rig_of(short_recording(2.0)))
+    bag = laboratory(short_recording(2.0)).mcap(tmp_path / "lab", require_rig(short_recording(2.0)))
     named, unnamed = CheckProcess(), CheckProcess()
     named.start(bag, None, LABORATORY)
     unnamed.start(bag, None)
@@ -156,7 +149,7 @@ def test_a_recording_of_other_topics_is_checked_by_those_given(tmp_path: Path) -
 def test_a_replay_reports_what_the_check_found() -> None:
     in_time = Delays(0.0, 0.0, 0.0)
     found = {"problems": ["wrong"], "check": "units_rig"}
-    report = ReplayReport("bag", "playing", 1.0, 0, in_time, in_time, 0.0, 0, None, **found)
+    report = ReplayReport("bag", "playing", 1.0, 0, in_time, 0.0, 0, None, **found)
     assert report.warnings == ["wrong"] and report.values["data_check"] == "units_rig"
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models are trained coarsely: the claims are tested here, training in test/models."""
+"""Models are trained and pushes simulated coarsely: the claims are tested here, both in test/models and simulation."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 
 import pytest
+from coarse import coarse_simulator
 
 from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum
 from push_predictor.types import Array
@@ -29,4 +30,5 @@ def coarse_models(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as coarse:
         if request.module.__name__ != "test_paper_report":
             coarse.setattr(Descent, "run", begun)
-        yield
+        with coarse_simulator(3.0):
+            yield

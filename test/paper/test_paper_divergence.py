@@ -88,12 +88,7 @@ def test_verdicts_on_a_difference(ends: tuple[float, float], below: int, verdict
 
 @pytest.mark.parametrize(
     ("ends", "verdict"),
-    [
-        ((0.1, 0.9), "holds"),
-        ((0.5, 2.0), "holds in part"),
-        ((1.0, 5.0), "not decided"),
-        ((3.0, 5.0), "does not hold"),
-    ],
+    [((0.1, 0.9), "holds"), ((0.5, 2.0), "holds in part"), ((1.0, 5.0), "not decided"), ((3.0, 5.0), "does not hold")],
 )
 def test_verdicts_on_the_median(ends: tuple[float, float], verdict: str) -> None:
     assert good(Estimate(float(np.mean(ends)), *ends)) == verdict

@@ -184,8 +184,7 @@ def test_verdict_on_drawing_together_and_fanning_out(convergent: Estimate, diver
 
 
 @pytest.mark.parametrize(
-    ("p", "power", "verdict"),
-    [(0.01, 0.1, "holds"), (0.4, 0.95, "does not hold"), (0.4, 0.3, "not decided")],
+    ("p", "power", "verdict"), [(0.01, 0.1, "holds"), (0.4, 0.95, "does not hold"), (0.4, 0.3, "not decided")]
 )
 def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
     """Finding no modes is evidence only where they would have been found."""

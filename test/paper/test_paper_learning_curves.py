@@ -120,8 +120,7 @@ def falling(per_doubling: float, nats: float, sizes=(500, 1000)) -> Curves:
 
 
 @pytest.mark.parametrize(
-    ("share", "nats", "verdict"),
-    [(0.02, 0.01, "holds"), (0.3, 0.5, "does not hold"), (0.02, 0.5, "holds in part")],
+    ("share", "nats", "verdict"), [(0.02, 0.01, "holds"), (0.3, 0.5, "does not hold"), (0.02, 0.5, "holds in part")]
 )
 def test_saturated_means_that_a_doubling_gains_next_to_nothing(share, nats, verdict):
     assert saturation(CORPUS, falling(share, nats), PAIRS).verdict == verdict

@@ -203,13 +203,7 @@ def kept_results(out: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in (out / "work").rglob("output.pkl")}
 
 
-@pytest.mark.parametrize(
-    "options, named",
-    [
-        (["--jobs", "0"], "--jobs"),
-        (["--data", "no/such/folder"], "--data"),
-    ],
-)
+@pytest.mark.parametrize("options, named", [(["--jobs", "0"], "--jobs"), (["--data", "no/such/folder"], "--data")])
 def test_names_a_wrong_option(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], named: str
 ) -> None:

@@ -55,8 +55,7 @@ def curve(held: HeldOut) -> SpeedCurve:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("nmse", "verdict"),
-    [((0.01, 0.1, 0.5, 1.0), "holds"), ((1.0, 0.5, 0.1, 0.01), "does not hold")],
+    ("nmse", "verdict"), [((0.01, 0.1, 0.5, 1.0), "holds"), ((1.0, 0.5, 0.1, 0.01), "does not hold")]
 )
 def test_unreliable_at_speed_means_that_error_and_speed_are_ranked_alike(nmse, verdict):
     held = windows(nmse)

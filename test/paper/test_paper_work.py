@@ -201,7 +201,7 @@ MATTER = (
 )
 LAYOUT = (
     "push_predictor/reporting/html.py",
-    "push_predictor/evaluation/report/figures/slider.py",
+    "push_predictor/evaluation/report/figures/gallery.py",
     "push_predictor/evaluation/report/page.py",
     "push_predictor_paper/claims/data.py",
     "push_predictor_paper/figures/__init__.py",

@@ -416,10 +416,7 @@ def test_given_covariates_apply_to_all_windows_of_their_step() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (
-            {},
-            r"^steps\[0\]\.covariate elapsed_time: 'missing' is not accepted, give a finite number",
-        ),
+        ({}, r"^steps\[0\]\.covariate elapsed_time: 'missing' is not accepted, give a finite number"),
         ({"elapsed_time": [1.0, np.nan]}, r"^steps\[1\]\.covariate elapsed_time: nan is not accepted"),
         (
             {"elapsed_time": [1.0, 1.0], "slider_heading": [0.1, 0.1]},

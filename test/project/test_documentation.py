@@ -26,7 +26,7 @@ from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
-from push_predictor.nodes.validator.scalar_subscriber import CLOCK
+from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.topics import DEFAULT_TOPICS
@@ -49,7 +49,7 @@ PYTHON_FILES = [
     for path in (REPOSITORY / room).rglob("*.py")
 ]
 NOT_THERE_YET = {  # what the reader is asked to write
-    "push_predictor/recordings/importers/NAME.py",
+    "push_predictor/recordings/importers/NAME.py"
 }
 SERVICES = (
     "predict_push",

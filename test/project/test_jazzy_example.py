@@ -47,10 +47,7 @@ def test_the_shell_parses_it_and_every_tool_is_one_that_jazzy_has():
 def test_rosdep_is_given_the_folders_of_the_packages_that_are_built():
     """It stops descending at a package, and the root is one."""
     words = words_after("rosdep", "install")
-    assert set(words[: words.index("--from-paths")]) == {
-        "-y",
-        "--ignore-src",
-    }
+    assert set(words[: words.index("--from-paths")]) == {"-y", "--ignore-src"}
     folders = words[words.index("--from-paths") + 1 :]
     assert folders == [".", "push_predictor_interfaces"]
     assert all((REPOSITORY / folder / "package.xml").is_file() for folder in folders)

@@ -15,6 +15,7 @@ import pytest
 from mistakes import BAGS, force_of_another_time
 from repository import REPOSITORY
 
+from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.checks.check import check_table
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of
@@ -158,6 +159,13 @@ def test_clockwise_contacts_and_angles_are_named() -> None:
     assert "dy_sign" in [each.name for each in check_table(changed(table, angle=-1.0))]
     seen_from_below = clockwise_contacts(changed(table, -1.0, -1.0, -1.0))
     assert check_table(seen_from_below, rig) == ()  # consistent in itself, and the square is symmetric
+
+
+def test_a_rotation_is_judged_about_the_centroid_wherever_the_origin_of_the_outline_is() -> None:
+    table, rig = table_of("square_abs_test"), rig_of("square_abs_test")
+    shifted = replace(rig, outline=transformed(rig.outline, shift=(0.3, -0.2)))
+    assert check_table(table, shifted) == ()
+    assert [each.name for each in check_table(changed(table, dtheta=-1.0), shifted)] == ["dtheta_sign"]
 
 
 def test_few_rows_or_rows_in_the_friction_cone_decide_nothing() -> None:

@@ -23,6 +23,7 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
 from push_predictor.recordings.checks.outline.findings import half_size
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.rigs.estimate import estimate_rig
 from push_predictor.recordings.streams import Recording
@@ -47,11 +48,6 @@ def scalene() -> Recording:
     return simulate(SimulationSpec(slider, "abs", plan, seed=1))
 
 
-def rig_of(recording: Recording) -> Rig:
-    assert recording.rig is not None
-    return recording.rig
-
-
 def wrong(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), more: float = 0.0) -> Rig:
     """The rig with its outline turned, shifted, and larger by `more` m a side."""
     return replace(rig, outline=transformed(rig.outline, yaw, shift, 1.0 + more / half_size(rig)))
@@ -63,27 +59,27 @@ def found(recording: Recording, rig: Rig) -> dict[str, Mapping[str, Value]]:
 
 @pytest.mark.parametrize("name", DETAILED)
 def test_an_outline_turned_by_two_degrees_is_found(name: str) -> None:
-    values = found(bag(name), wrong(rig_of(bag(name)), yaw=TWO_DEGREES))["outline_turned"]
+    values = found(bag(name), wrong(require_rig(bag(name)), yaw=TWO_DEGREES))["outline_turned"]
     assert values["yaw"].value == pytest.approx(-TWO_DEGREES, abs=0.002)
 
 
 @pytest.mark.parametrize("name", [*DETAILED, ONE_SIDE])
 def test_an_outline_shifted_by_a_millimetre_is_found(name: str) -> None:
     shift = (MILLIMETRE, 0.0) if name == ONE_SIDE else (0.0, MILLIMETRE)  # along its side no contact shows a shift
-    values = found(bag(name), wrong(rig_of(bag(name)), shift=shift))["outline_shifted"]
+    values = found(bag(name), wrong(require_rig(bag(name)), shift=shift))["outline_shifted"]
     assert (values["x"].value, values["y"].value) == pytest.approx((-shift[0], -shift[1]), abs=1e-4)
 
 
 @pytest.mark.parametrize(("name", "more"), zip(DETAILED, (MILLIMETRE, -MILLIMETRE), strict=True))
 def test_an_outline_too_large_or_too_small_by_a_millimetre_a_side_is_found(name: str, more: float) -> None:
-    rig = rig_of(bag(name))
+    rig = require_rig(bag(name))
     values = found(bag(name), wrong(rig, more=more))["outline_size"]
     assert (1.0 + more / half_size(rig)) * values["scale"].value == pytest.approx(1.0, abs=0.004)
 
 
 @pytest.mark.parametrize("name", BAGS)
 def test_the_corrected_rig_gives_no_finding(name: str) -> None:
-    rig = rig_of(bag(name))
+    rig = require_rig(bag(name))
     altered = wrong(rig, -0.1, (0.003, -0.002), 0.0 if name == ONE_SIDE else 0.002)
     corrected = corrected_rig(altered, check_recording(bag(name), altered))
     assert check_recording(bag(name), corrected) == ()
@@ -99,14 +95,14 @@ def test_a_tracked_frame_off_the_centre_is_in_the_corrected_outline(name: str) -
     move = rotate(np.array([0.004, -0.003]), slider.heading)
     turned = wrap_angle(slider.heading + 0.08)
     off = replace(bag(name), slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=turned))
-    corrected = corrected_rig(rig_of(off), check_recording(off, rig_of(off)))
+    corrected = corrected_rig(require_rig(off), check_recording(off, require_rig(off)))
     expected = rotate(np.array([-0.004, 0.003]), np.array(-0.08))
     assert corrected.outline.centroid == pytest.approx(expected, abs=1e-4)
     assert check_recording(off, corrected) == ()
 
 
 def test_a_mirrored_outline_is_found_and_corrected() -> None:
-    rig = rig_of(scalene())
+    rig = require_rig(scalene())
     assert found(scalene(), rig) == {}
     altered = replace(rig, outline=mirror_image(rig.outline))
     findings = check_recording(scalene(), altered)
@@ -119,21 +115,21 @@ def test_a_mirrored_outline_is_found_and_corrected() -> None:
 
 def test_few_pushes_show_no_mirrored_outline() -> None:
     few = replace(scalene(), slider=stream_part(scalene().slider, 0.0, 0.4), wrench=None)
-    rig = rig_of(few)
+    rig = require_rig(few)
     altered = replace(rig, outline=mirror_image(rig.outline))
     assert list(found(few, altered)) == ["outline_unchecked"]
 
 
 @pytest.mark.parametrize("more", [2e-5, -2e-5])
 def test_an_almost_square_outline_is_not_turned_by_a_quarter(more: float) -> None:
-    rig = rig_of(bag("square_abs_test"))
+    rig = require_rig(bag("square_abs_test"))
     measured = replace(rig, outline=Outline(rig.outline.vertices * [1.0 + more, 1.0 - more]))
     assert measured.outline.rotational_symmetry == 2
     assert found(bag("square_abs_test"), measured) == {}
 
 
 def test_an_outline_mirrored_and_turned_is_corrected() -> None:
-    rig = rig_of(scalene())
+    rig = require_rig(scalene())
     altered = replace(rig, outline=transformed(mirror_image(rig.outline), 0.2, (0.002, 0.0)))
     estimate = estimate_rig(scalene(), altered)
     assert {"outline_mirrored", "outline_turned"} <= {finding.name for finding in estimate.findings}
@@ -142,11 +138,11 @@ def test_an_outline_mirrored_and_turned_is_corrected() -> None:
 
 
 def test_a_mirrored_frame_of_a_slider_without_symmetry_is_no_mirrored_outline() -> None:
-    assert "frame_mirrored" in found(mirrored(scalene(), -1.0, -1.0), rig_of(scalene()))
+    assert "frame_mirrored" in found(mirrored(scalene(), -1.0, -1.0), require_rig(scalene()))
 
 
 def test_a_wrong_tip_is_separated_from_a_wrong_size_on_an_ellipse() -> None:
-    rig = rig_of(bag("ellipse_plywood"))
+    rig = require_rig(bag("ellipse_plywood"))
     altered = replace(rig, pusher_radius=rig.pusher_radius + 0.0015)
     findings = check_recording(bag("ellipse_plywood"), altered)
     assert [finding.name for finding in findings] == ["tip_radius"]
@@ -158,8 +154,8 @@ def test_a_wrong_tip_is_separated_from_a_wrong_size_on_an_ellipse() -> None:
 def test_the_clocks_are_no_part_of_the_rig() -> None:
     slider = bag("square_abs_test").slider
     late = replace(bag("square_abs_test"), slider=replace(slider, stamp=slider.stamp + 50_000_000))
-    estimate = estimate_rig(late, rig_of(late))
-    assert estimate.corrected is rig_of(late)
+    estimate = estimate_rig(late, require_rig(late))
+    assert estimate.corrected is require_rig(late)
     (lag,) = (line for line in estimate.lines if "lag of the slider" in line)
     assert "not part of the rig: correct the clocks" in lag
     assert 45.0 < float(lag.split()[4]) < 55.0
@@ -181,7 +177,7 @@ def test_a_correction_scales_and_turns_about_the_centroid_and_moves_the_feet() -
 
 
 def test_a_shift_that_ends_near_the_origin_ends_at_the_origin() -> None:
-    rig = wrong(rig_of(bag("square_abs_test")), shift=(0.003, 0.0))
+    rig = wrong(require_rig(bag("square_abs_test")), shift=(0.003, 0.0))
     near = corrected_rig(rig, [finding_of("outline_shifted", x=-0.0031, y=0.0001)])
     assert near.outline.centroid == pytest.approx([0.0, 0.0], abs=1e-15)
     far = corrected_rig(rig, [finding_of("outline_shifted", x=-0.0035, y=0.0)])
@@ -189,13 +185,13 @@ def test_a_shift_that_ends_near_the_origin_ends_at_the_origin() -> None:
 
 
 def test_without_a_finding_the_rig_is_the_same() -> None:
-    rig = rig_of(bag(ROUND))
+    rig = require_rig(bag(ROUND))
     assert corrected_rig(rig, []) is rig
     assert corrected_rig(rig, [finding_of("clocks_apart", lag=0.1)]) is rig
 
 
 def test_a_mistake_that_hides_the_outline_prevents_an_estimate() -> None:
-    rig = rig_of(bag(ROUND))
+    rig = require_rig(bag(ROUND))
     assert prevents_correction(check_recording(mirrored(bag(ROUND), -1.0, -1.0), rig)) == ["frame_mirrored"]
     with pytest.raises(RecordingError, match=r"no rig can be estimated \(topics_swapped\): Slider and pusher"):
         estimate_rig(swapped(bag(ROUND)), rig)
@@ -207,7 +203,7 @@ def test_an_outline_that_no_correction_fits_prevents_an_estimate() -> None:
 
 
 def test_an_estimate_states_what_the_contacts_do_not_show() -> None:
-    estimate = estimate_rig(bag(ONE_SIDE), rig_of(bag(ONE_SIDE)))
+    estimate = estimate_rig(bag(ONE_SIDE), require_rig(bag(ONE_SIDE)))
     lines = {line[2:20].strip(): line[20:].strip() for line in estimate.lines[1:]}
     assert lines["shift along y"] == "not determined by these contacts"
     assert lines["size"] == lines["tip radius"] == "not determined by these contacts"

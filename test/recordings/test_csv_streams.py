@@ -57,11 +57,20 @@ def test_csv_streams_give_the_windows_of_the_original(tmp_path: Path, planar: bo
 
 def test_columns_of_further_files_are_scalars_and_empty_cells_are_discarded(tmp_path: Path) -> None:
     path = write(tmp_path / "lab", planar=True)
-    (path / "table.csv").write_text("time,heat,damp\n1.5,20,0.5\n2.5,,0.6\n")
+    second = int(original().slider.stamp[0]) // 10**9
+    (path / "table.csv").write_text(f"time,heat,damp\n{second}.5,20,0.5\n{second + 1}.5,,0.6\n")
     found = read_recording(path)
     assert found.scalars["/table/heat"].value.tolist() == [20.0]
-    assert found.scalars["/table/damp"].stamp.tolist() == [1_500_000_000, 2_500_000_000]
+    assert found.scalars["/table/damp"].stamp.tolist() == [second * 10**9 + 500_000_000, second * 10**9 + 1_500_000_000]
     assert "/table/heat: 1 samples contain NaN or infinity; discarded" in found.notes
+
+
+def test_scalars_of_another_clock_than_the_poses_are_discarded(tmp_path: Path) -> None:
+    path = write(tmp_path / "lab", planar=True)
+    (path / "table.csv").write_text("time,heat\n1.5,20\n")
+    found = read_recording(path)
+    assert found.scalars == {}
+    assert "/table/heat: 1 samples have a stamp over an hour from those of the poses; discarded" in found.notes
 
 
 @pytest.mark.parametrize(

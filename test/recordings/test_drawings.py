@@ -260,10 +260,7 @@ def test_the_unit_of_a_dxf_drawing_is_read_or_given(tmp_path: Path) -> None:
     ("parts", "message"),
     [
         ([("lwpolyline", [UP], {})], "1 x LWPOLYLINE that is not closed"),
-        (
-            [("lwpolyline", [[(0, 0, 0, 0, 0.5), (9, 0, 0, 0, 0), (9, 9, 0, 0, 0)]], CLOSED)],
-            "1 x LWPOLYLINE with arcs",
-        ),
+        ([("lwpolyline", [[(0, 0, 0, 0, 0.5), (9, 0, 0, 0, 0), (9, 9, 0, 0, 0)]], CLOSED)], "1 x LWPOLYLINE with arcs"),
         ([("line", [UP[k], UP[k + 1]], {}) for k in range(4)], "4 x LINE in no closed chain"),
         ([("circle", [(0, 0), 9.0], {}), ("circle", [(0, 0), 3.0], {})], "2 x circle or ellipse"),
         ([("lwpolyline", [UP], CLOSED), ("arc", [(0, 0), 3.0, 0.0, 90.0], {})], "1 x closed polygon, 1 x ARC"),

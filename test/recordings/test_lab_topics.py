@@ -16,13 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
+from decoding import input_of
 from lab_bags import LATENCY, Lab, pose_rows, robot_in_tf, short_recording
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.fields.message_text import STANDARD, parse_definitions
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.fields.pose_rows import composed, interpolated, inverted, normalised
-from push_predictor.recordings.fields.sources import POSE_TARGET, messages_as
+from push_predictor.recordings.fields.sources import POSE_TARGET, TF_TYPES, FieldReader, definitions_of
 from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_tree
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
@@ -237,7 +239,9 @@ def test_composition_through_a_random_tree_is_that_of_matrices(
     }
     one = data.draw(st.integers(1, len(rows)))
     other = data.draw(st.integers(0, len(rows)).filter(lambda frame: frame != one))
-    found, rows_found, without = TransformTree(edges).poses(f"f{one}", f"f{other}")
+    tree = TransformTree(edges)
+    leader = next(iter(tree.moving(f"f{one}", f"f{other}")))
+    found, rows_found, without = tree.poses(f"f{one}", f"f{other}", leader)
     assert found.tolist() == [5] and without == 0
     np.testing.assert_allclose(matrix(rows_found[0]), np.linalg.inv(matrices[other]) @ matrices[one], atol=1e-9)
 
@@ -298,14 +302,15 @@ def test_damaged_messages_are_discarded_with_a_note(tmp_path: Path) -> None:
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_message_and_no_exception(data: bytes) -> None:
     for message in (data, b"\0\1\0\0" + data):
-        messages_as(POSE_TARGET, [message], [0], "nav_msgs/msg/Odometry", "pose.pose", STANDARD)
-        read_tree([([message], "tf2_msgs/msg/TFMessage", False)])
+        input_of(StreamDecoder(Topics()).inputs()["slider"], "nav_msgs/msg/Odometry", message).take()
+        read_tree([(Messages.of("/tf", TF_TYPES[0], [0], [message]), False)])
 
 
 def test_a_type_that_contains_itself_has_no_readable_message() -> None:
-    definitions = parse_definitions("a_msgs/msg/Loop", "Loop loop\ngeometry_msgs/Pose pose\n")
-    message = [b"\0\1\0\0" + bytes(80)]
-    assert messages_as(POSE_TARGET, message, [0], "a_msgs/msg/Loop", "pose", {**definitions, **STANDARD}) == [b""]
+    kind = "a_msgs/msg/Loop"
+    definitions = definitions_of(kind, {kind: "Loop loop\ngeometry_msgs/Pose pose\n"})
+    message = Messages.of("/tip", kind, [0], [b"\0\1\0\0" + bytes(80)])
+    assert not FieldReader(POSE_TARGET, kind, "pose", definitions).read(message).valid.any()
 
 
 # --- saved topics, command line -------------------------------------------------------------------------------------
@@ -333,13 +338,6 @@ def test_saved_topics_come_back(tmp_path: Path, topics: Topics) -> None:
     assert topics_path(tmp_path / "a.b.mcap").name == "a.b.recording.yaml"
 
 
-def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
-    (tmp_path / "lab.recording.yaml").write_text("frames: {slider: block, pusher: tip, world: base}\n")
-    assert load_topics(tmp_path / "lab.mcap") == Topics("/tf:block", "/tf:tip", world="base")
-    (tmp_path / "lab.recording.yaml").write_text("world_frame: base\n")
-    assert load_topics(tmp_path / "lab.mcap") == Topics(world="base")
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -347,9 +345,6 @@ def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
         ("slider_topic: 3", "slider_topic is 3, give a name"),
         ("slider_topic: ''", "slider_topic is '', give a name"),
         ("covariate_topics: /a", "covariate_topics is '/a', give a list of topics"),
-        ("frames: {tip: a}", "frames is {'tip': 'a'}, give a mapping with the keys slider, pusher, world"),
-        ("frames: {world: a}\nworld_frame: b", "gives both world_frame and frames world, give one of them"),
-        ("frames: {slider: a}\nslider_topic: /b", "gives both slider_topic and frames slider, give one of them"),
         ("- a", r"contains \['a'\], give the keys slider_topic"),
         ("a: [", "cannot be read"),
     ],

@@ -52,12 +52,7 @@ TURN, SHIFT, BOTH = (np.radians(3.0), NOWHERE), (0.0, (0.0012, 0.0)), (np.radian
 
 
 @pytest.mark.parametrize(
-    ("name", "yaw", "shift"),
-    [
-        *((name, *TURN) for name in (ROUND, OVAL)),
-        *((name, *SHIFT) for name in (ROUND, HEXAGON, ONE_SIDE)),
-        (HEXAGON, *BOTH),
-    ],
+    ("name", "yaw", "shift"), [(OVAL, *TURN), *((name, *SHIFT) for name in (ROUND, ONE_SIDE)), (HEXAGON, *BOTH)]
 )
 def test_world_frames_apart_are_named_with_yaw_and_shift(name: str, yaw: float, shift: tuple[float, float]) -> None:
     apart = other_world(bag(name), yaw, shift)
@@ -127,9 +122,7 @@ def test_mirrored_or_exchanged_axes_are_named(name: str, mistake: str) -> None:
 # --- tip radius and size ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "more"), [(ROUND, -0.0011), (OVAL, 0.0011), (OVAL, -0.0011), (HEXAGON, 0.0011), (SQUARE, -0.0011)]
-)
+@pytest.mark.parametrize(("name", "more"), [(ROUND, -0.0011), (OVAL, 0.0011), (HEXAGON, 0.0011)])
 def test_a_wrong_tip_radius_is_found_with_both_readings(name: str, more: float) -> None:
     rig = rig_of(name)
     altered = replace(rig, pusher_radius=rig.pusher_radius + more)
@@ -210,7 +203,7 @@ def with_vertex_off(name: str, vertex: int, more: float = 0.003) -> Rig:
     return replace(rig_of(name), outline=Outline(vertices))
 
 
-@pytest.mark.parametrize(("name", "vertex"), [(HEXAGON, 0), (HEXAGON, 2), (HEXAGON, 4), (SQUARE, 0)])
+@pytest.mark.parametrize(("name", "vertex"), [(HEXAGON, 2), (SQUARE, 0)])
 def test_a_wrong_vertex_is_a_wrong_shape_and_no_turn(name: str, vertex: int) -> None:
     """The sixth vertex of the hexagon was pushed nowhere near."""
     findings = found(bag(name), with_vertex_off(name, vertex))
@@ -241,7 +234,7 @@ def disturbed(recording: Recording, seed: int) -> Recording:
 
 @pytest.mark.parametrize("name", [ROUND, HEXAGON])
 def test_a_tracker_with_noise_and_offsets_gives_no_finding(name: str) -> None:
-    for seed in range(6):
+    for seed in range(3):
         assert check_recording(disturbed(bag(name), seed), rig_of(name)) == ()
 
 

@@ -14,12 +14,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from decoding import input_of
+from geometry_msgs.msg import PoseStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_messages import pose_message, wrench_message
 from rclpy.serialization import serialize_message
-from synthetic import Push, moved, translating_push
+from synthetic import Push, moved, translating_push, windows_of
 
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
@@ -27,22 +28,13 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.planning.slider_pose import WorldPush, slider_after
+from push_predictor.recordings.bag.definitions import POSE, WRENCH
+from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.samples import (
-    PUSHER,
-    SLIDER,
-    WRENCH,
-    SampleRules,
-    pusher_stream,
-    slider_stream,
-    wrench_stream,
-)
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.finder import find_windows
-from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.topics import Topics
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.types import Array
@@ -55,11 +47,6 @@ MODELS = [(shape, kind) for shape, *kinds in (
 METRES, TURNS = st.floats(-2.0, 2.0), st.floats(-20.0, 20.0)
 
 
-def windows_of(recording: Recording) -> list[PushWindow]:
-    assert recording.rig is not None
-    return find_windows(recording, recording.rig)
-
-
 # --- adapters: a whole recording through messages --------------------------------------------------------------------
 
 
@@ -68,24 +55,18 @@ def through_messages(recording: Recording) -> Recording:
     wrench = recording.wrench
     assert wrench is not None
     forces = zip(wrench.stamp.tolist(), wrench.fx, wrench.fy, wrench.torque, strict=True)
-    return replace(
-        recording,
-        slider=slider_stream(*received(SLIDER, poses(recording.slider))),
-        pusher=pusher_stream(*received(PUSHER, poses(recording.pusher))),
-        wrench=wrench_stream(*received(WRENCH, [wrench_message(*row) for row in forces])),
-    )
+    decoder = StreamDecoder(Topics(), expected="world")
+    messages = {"slider": poses(recording.slider), "pusher": poses(recording.pusher)}
+    for name, own in decoder.inputs().items():
+        sent = messages.get(name) or [wrench_message(*row) for row in forces]
+        input_of(own, (POSE if name in messages else WRENCH).name, *map(serialize_message, sent))
+    found = decoder.take(last=True)
+    return replace(recording, slider=found.slider, pusher=found.pusher, wrench=found.wrench)
 
 
 def poses(stream: PoseStream) -> list[PoseStamped]:
     columns = zip(stream.stamp.tolist(), stream.x, stream.y, stream.z, stream.heading, strict=True)
     return [pose_message(*row) for row in columns]
-
-
-def received(kind: SampleRules, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
-    buffer = MessageBuffer(kind, "world")
-    for message in messages:
-        buffer.put(serialize_message(message))
-    return buffer.take()
 
 
 @settings(max_examples=8, deadline=None)

@@ -82,11 +82,7 @@ def test_metadata_yaml_has_the_format_of_rosbag2_jazzy(tmp_path: Path, recording
     """The keys are those that rosbag2_storage/yaml.hpp reads; custom_data must be text throughout."""
     write_recording(tmp_path / "a", recording)
     info = yaml.safe_load((tmp_path / "a" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert (info["version"], info["storage_identifier"], info["ros_distro"]) == (
-        9,
-        "mcap",
-        "jazzy",
-    )
+    assert (info["version"], info["storage_identifier"], info["ros_distro"]) == (9, "mcap", "jazzy")
     counts = {t["topic_metadata"]["name"]: t["message_count"] for t in info["topics_with_message_count"]}
     assert counts == {"/slider/pose": 250, "/pusher/pose": 250, "/pusher/wrench": 250, "/table/temperature": 10}
     assert info["message_count"] == info["files"][0]["message_count"] == 760

@@ -10,15 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from decoding import input_of
 from replay_bags import stamped
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
-from push_predictor.online import scalar_buffer, stream_sync
-from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
-from push_predictor.online.stream_sync import Samples, StreamSync
-from push_predictor.recordings.fields.message_text import STANDARD
-from push_predictor.recordings.fields.sources import SCALAR_TARGET, FieldReader
+from push_predictor.online import stream_sync
+from push_predictor.online.clock_history import DELAY, STALE, ClockHistory
+from push_predictor.online.stream_sync import StreamSync
+from push_predictor.recordings.bag.definitions import POSE
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
+from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.streams import Recording, ScalarStream
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.scalar_track import ScalarTrack
@@ -155,6 +158,7 @@ def tick(seconds: int, rest: int, order: str = "<") -> bytes:
 
 def test_message_gets_the_time_of_the_last_clock_message_before_it() -> None:
     times = ClockHistory()
+    times.published = True
     times.put(tick(7, 5), 100)
     times.put(tick(8, 6, ">"), 200)
     assert [times.at(sent) for sent in (99, 100, 199, 200, 300)] == [
@@ -163,56 +167,81 @@ def test_message_gets_the_time_of_the_last_clock_message_before_it() -> None:
         7 * SECOND + 5,
         *[8 * SECOND + 6] * 2,
     ]
-    assert times.newest == 200
+    assert times.known_until(10 * SECOND) == 200
+
+
+def test_without_a_clock_a_message_has_the_time_of_its_sending_once_none_can_come_any_more() -> None:
+    times = ClockHistory()
+    assert times.at(5) == 5 and times.known_until(10 * SECOND) == 10 * SECOND - DELAY
+
+
+def test_the_time_of_a_clock_that_ended_expires() -> None:
+    times = ClockHistory()
+    times.put(tick(7, 5), 100)
+    assert [times.at(sent) for sent in (99, 100 + STALE, 101 + STALE)] == [None, 7 * SECOND + 5, 101 + STALE]
 
 
 def float64(value: float) -> bytes:
     return b"\0\1\0\0" + struct.pack("<d", value)
 
 
-def test_messages_wait_until_their_time_is_known() -> None:
-    buffer = ScalarBuffer("std_msgs/msg/Float64")
-    for k in range(4):
-        buffer.put(float64(k), 10 * k)
-    taken = buffer.take(20, lambda sent: 1000 + sent if sent else None, None)
-    assert (taken.stamp.tolist(), taken.value.tolist()) == ([1010], [1.0])
-    assert dict(buffer.rejected) == {"without time": 1} and len(buffer) == 2
-    assert buffer.take(10**9, lambda sent: sent, None).value.tolist() == [2.0, 3.0]
-    assert len(buffer.take(10**9, lambda sent: sent, None)) == 0
+def decoder_of(text: str) -> tuple[StreamDecoder, TopicInput]:
+    """A decoder of a scalar and poses; the scalar's input."""
+    decoder = StreamDecoder(Topics(covariates=(text,)))
+    for name in ("slider", "pusher"):
+        decoder.inputs()[name].declare(POSE.name, {})
+    return decoder, decoder.scalars[f"/{text.strip('/')}"]
+
+
+def taken(text: str, kind: str, *messages: bytes) -> tuple[ScalarStream, TopicInput]:
+    """The samples of messages of a scalar; its input."""
+    decoder, own = decoder_of(text)
+    input_of(own, kind, *messages)
+    return decoder.take(last=True).scalars[f"/{text.strip('/')}"], own
+
+
+def test_a_number_without_a_header_is_dated_by_its_sending() -> None:
+    stream, own = taken("warmth", "std_msgs/msg/Float64", *map(float64, range(4)))
+    assert (stream.stamp.tolist(), stream.value.tolist()) == ([0, 1, 2, 3], [0.0, 1.0, 2.0, 3.0])
+    assert own.received == 4 and not own.timed
 
 
 @pytest.mark.parametrize("kind", ["geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/Wrench"])
 def test_a_field_of_another_type_has_the_stamp_of_its_header_or_the_time_of_its_sending(kind: str) -> None:
     field = "wrench.torque.y" if kind.endswith("Stamped") else "torque.y"
-    buffer = ScalarBuffer(kind, FieldReader(SCALAR_TARGET, kind, field, STANDARD))
     numbers = [0.0, 0.0, 0.0, 0.0, 5.0, 0.0]
-    plain = b"\0\1\0\0" + struct.pack("<6d", *numbers)
-    for sent in (10, 30):
-        buffer.put(stamped(7 * SECOND, numbers) if buffer.timed else plain, sent)
-    taken = buffer.take(20, lambda sent: 1000 + sent, None)
-    assert (taken.stamp.tolist(), taken.value.tolist()) == (
-        ([7 * SECOND] * 2, [5.0] * 2) if buffer.timed else ([1010], [5.0])
-    )
-    buffer.put(b"\0\1", 31)
-    buffer.take(40, lambda sent: sent, None)
-    assert dict(buffer.rejected) == {"unreadable": 1}
+    timed = kind.endswith("Stamped")
+    message = stamped(7 * SECOND, numbers) if timed else b"\0\1\0\0" + struct.pack("<6d", *numbers)
+    stream, own = taken(f"/load.{field}", kind, message, b"\0\1", message)
+    assert (stream.stamp.tolist(), stream.value.tolist()) == ([7 * SECOND] * 2 if timed else [0, 2], [5.0] * 2)
+    assert dict(own.rejected) == {"unreadable": 1} and own.timed is timed
 
 
 def test_unusable_messages_are_counted_by_kind() -> None:
-    buffer = ScalarBuffer("std_msgs/msg/Float32")
-    for data in (b"\0\1\0\0" + struct.pack("<f", 0.5), b"\0\1", b"\0\1\0\0" + struct.pack("<f", np.inf)):
-        buffer.put(data, 5)
-    assert buffer.take(9, lambda sent: sent, None).value.tolist() == [0.5]
-    assert dict(buffer.rejected) == {"unreadable": 1, "not finite": 1}
+    numbers = [b"\0\1\0\0" + struct.pack("<f", value) for value in (0.5, np.inf)]
+    stream, own = taken("warmth", "std_msgs/msg/Float32", numbers[0], b"\0\1", numbers[1])
+    assert stream.value.tolist() == [0.5]
+    assert dict(own.rejected) == {"unreadable": 1, "not finite": 1}
 
 
-def test_full_buffer_drops_the_oldest_messages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scalar_buffer, "LIMIT", 100)
-    buffer = ScalarBuffer("std_msgs/msg/Float64")
-    for k in range(305):
-        buffer.put(float64(k), k)
-    taken = buffer.take(1000, lambda sent: sent, None)
-    assert len(taken) <= 100 and len(taken) + buffer.rejected["dropped"] == 305 and taken.value[-1] == 304.0
+def test_samples_wait_for_the_first_pose_or_the_end() -> None:
+    decoder, own = decoder_of("warmth")
+    input_of(own, "std_msgs/msg/Float64", float64(1.0))
+    assert decoder.take().scalars == {} and decoder.take_scalars() == {} and len(own) == 1
+    assert decoder.take_scalars(last=True)["/warmth"].value.tolist() == [1.0]
+
+
+def test_a_time_over_an_hour_from_the_poses_is_of_another_clock() -> None:
+    decoder, own = decoder_of("load.wrench.torque.y")
+    pose = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    for name, seconds in (("slider", 10_000), ("pusher", 10_005)):
+        input_of(decoder.inputs()[name], POSE.name, stamped(seconds * SECOND, pose))
+    hour = 3600
+    seconds = [10_000 - hour - 1, 10_000 - hour + 6, 10_005 + hour - 6, 10_005 + hour + 1]
+    loads = [stamped(second * SECOND, [0.0] * 6) for second in seconds]
+    input_of(own, "geometry_msgs/msg/WrenchStamped", *loads)
+    assert decoder.take().scalars["/load.wrench.torque.y"].stamp.tolist() == [s * SECOND for s in seconds[1:3]]
+    assert dict(own.rejected) == {"another clock": 2}
 
 
 def samples(recording: Recording, end: float, **named: float) -> Samples:

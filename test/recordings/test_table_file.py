@@ -50,7 +50,7 @@ def tables(draw: st.DrawFn) -> PushTable:
     return PushTable(np.stack(inputs, axis=1), column(above), outcomes, ids, {"warmth, mean": column(finite)})
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(tables(), st.sampled_from(["a.csv", "a.csv.gz"]))
 def test_table_reads_back_to_the_same_numbers(table: PushTable, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

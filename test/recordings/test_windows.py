@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, wrench_rows
+from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.contact import ContactSample
-from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_segmenter import TARE_SAMPLES, PushSegmenter
-from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
-
-
-def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:
-    assert recording.rig is not None
-    return find_windows(recording, recording.rig, options)
+from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 
 
 def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
@@ -36,7 +31,9 @@ def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
 
 
 def test_translating_slider_moves_only_along_the_push() -> None:
-    for window in windows_of(translating_push(Push(speed=0.03), contact=0.4)):
+    windows = windows_of(translating_push(Push(speed=0.03), contact=0.4))
+    assert len(windows) == 5
+    for window in windows:
         assert window.displacement == pytest.approx([0.006, 0.0, 0.0], abs=1e-12)
         assert (window.velocity, window.contact) == pytest.approx((0.03, 0.4), abs=1e-9)
         assert window.angle == pytest.approx(0.0, abs=1e-9)
@@ -44,7 +41,9 @@ def test_translating_slider_moves_only_along_the_push() -> None:
 
 
 def test_force_on_the_slider_is_opposite_to_the_measured_wrench() -> None:
-    for window in windows_of(translating_push()):
+    windows = windows_of(translating_push())
+    assert len(windows) == 5
+    for window in windows:
         assert window.covariates["normal_force"] == pytest.approx(2.0, abs=0.2)
         assert window.covariates["tangential_force"] == pytest.approx(0.0, abs=1e-9)
 
@@ -68,7 +67,9 @@ def test_windows_state_what_the_sensor_read_in_free_motion_and_do_not_contain_it
 def test_windows_do_not_depend_on_the_world_frame(shift: tuple[float, float], turn: float, contact: float) -> None:
     here = translating_push(contact=contact)
     there = moved(here, np.array(shift), turn)
-    for a, b in zip(windows_of(here), windows_of(there), strict=True):
+    windows = windows_of(here)
+    assert len(windows) == 5
+    for a, b in zip(windows, windows_of(there), strict=True):
         assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-9)
         assert a.displacement == pytest.approx(b.displacement, abs=1e-9)
 
@@ -197,6 +198,15 @@ def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> No
     segmenter.step(pushing._replace(stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
     assert segmenter.push is not None and segmenter.push.tare is not None
     np.testing.assert_allclose(segmenter.push.tare, [1.5, 0.0])
+
+
+def test_a_window_may_end_with_the_last_sample_of_a_push() -> None:
+    segmenter, period, found = PushSegmenter(WindowOptions(duration=0.2)), 10_000_000, []
+    free = ContactSample(0, 0.0, 0.1, 0.0, 0.0, np.zeros(2), 0.0, False, False, False, False)
+    for k in range(26):  # five in free motion, then a window of 20 periods from the sixth to the last
+        sample = free if k < 5 else free._replace(gap=0.0, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
+        found += segmenter.step(sample._replace(stamp=k * period, time=1e-9 * k * period))
+    assert found == [(5 * period, 25 * period)]
 
 
 def test_two_contacts_are_two_pushes() -> None:

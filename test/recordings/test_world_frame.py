@@ -12,16 +12,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
+from decoding import decoded, decoder_of, in_portions, put
 from lab_bags import Lab, pose_rows, pose_values
 from test_lab_topics import assert_same_windows, original
 from turning_sensor import add_tip, add_wrench, wrench_rows
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, decode, encode
+from push_predictor.recordings.decoder.rules import NO_TRANSFORM
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
-from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree
-from push_predictor.recordings.fields.world_frame import poses_in_world
 from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
@@ -63,31 +62,65 @@ def assert_same_poses(found: Recording) -> None:
             np.testing.assert_allclose(getattr(one, column), getattr(other, column), rtol=0.0, atol=1e-9)
 
 
-# --- pure functions ---------------------------------------------------------------------------------------------------
+# --- the decoder -----------------------------------------------------------------------------------------------------
+
+HALF = np.sqrt(0.5)
+MS = 1_000_000
 
 
-def test_messages_in_the_world_or_without_a_frame_stay_as_they_are() -> None:
-    stamp = np.array([5, 6], np.int64)
-    rows = np.zeros((2, 7))
-    messages = [*encode(stamp, rows, POSE_STAMPED, "table"), *encode(stamp, rows, POSE_STAMPED, ""), b"damaged"]
-    found, known = poses_in_world(messages, "table", None)
-    assert found == messages and known.all()
+def seen_from_cart(stamps: np.ndarray, cart: np.ndarray, frame: str = "cart") -> Lab:
+    """A slider at rest in a frame; a cart moves at 1 m/s along x, its axes a quarter of a turn from the table's."""
+    lab, slider = Lab(frame="table"), np.tile([0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
+    lab.frame = frame
+    add_tip(lab, "/slider", stamps, slider)
+    rows = [[1e-9 * at, 0.0, 0.0, 0.0, 0.0, HALF, HALF] for at in cart]
+    lab.transform("/tf", "table", "cart", cart, rows)
+    return lab
+
+
+@pytest.mark.parametrize("frame", ["table", "/table", ""])
+def test_poses_in_the_world_or_without_a_frame_stay_as_they_are(frame: str) -> None:
+    lab = seen_from_cart(np.array([5, 6]), np.array([0, 100 * MS]), frame)
+    decoder = decoder_of(lab, NAMES)
+    put(decoder, lab, lab.in_order())
+    assert decoder.take().slider.x.tolist() == [0.5, 0.5]
 
 
 def test_a_pose_is_turned_by_the_transform_at_its_stamp() -> None:
-    """A cart moves at 1 m/s along x; its axes are a quarter of a turn from the table's."""
-    stamp = np.array([0, 100], np.int64) * 1_000_000
-    half = np.sqrt(0.5)
-    cart = np.array([[x, 0.0, 0.0, 0.0, 0.0, half, half] for x in (0.0, 0.1)])
-    tree = TransformTree({"cart": Edge("table", stamp, cart, static=False)})
-    seen = encode(np.array([25_000_000, 200_000_000]), np.tile([0.5, 0, 0, 0, 0, 0, 1.0], (2, 1)), POSE_STAMPED, "cart")
-    found, known = poses_in_world(seen, "table", tree)
-    assert known.tolist() == [True, False]
-    columns = decode(found[:1], POSE_STAMPED)
-    assert columns.frames == {"table"} and columns.stamp.tolist() == [25_000_000]
-    np.testing.assert_allclose(columns.values, [[0.025, 0.5, 0.0, 0.0, 0.0, half, half]], atol=1e-12)
-    with pytest.raises(TransformError, match="no frame 'cart'"):
-        poses_in_world(seen, "table", TransformTree({}))
+    lab = seen_from_cart(np.array([25 * MS, 200 * MS]), np.array([0, 100 * MS]))
+    decoder = decoder_of(lab, NAMES)
+    found = decoded(decoder, lab, [lab.in_order()]).slider
+    assert found.stamp.tolist() == [25 * MS] and decoder.of("slider").rejected == {NO_TRANSFORM: 1}
+    np.testing.assert_allclose([found.x, found.y, found.heading], [[0.025], [0.5], [0.5 * np.pi]], atol=1e-12)
+
+
+def test_a_pose_waits_for_its_transform_and_later_ones_wait_behind_it() -> None:
+    stamps = np.arange(0, 1000 * MS, 10 * MS)
+    lab = seen_from_cart(stamps, np.arange(0, 1001 * MS, 20 * MS))
+    add_tip(other := Lab(frame="table"), "/slider", stamps[-1:] + MS, np.array([[0.0] * 6 + [1.0]]))
+    decoder = decoder_of(lab, NAMES)
+    poses, transforms = ([m for m in lab.in_order() if (m[1] == "/tf") is tf] for tf in (False, True))
+    put(decoder, lab, [*poses, *other.messages], live=True)
+    assert len(decoder.take().slider) == 0 and len(decoder) == len(stamps) + 1
+    put(decoder, lab, transforms[:26], live=True)
+    assert decoder.take().slider.stamp.tolist() == stamps[:51].tolist()
+    put(decoder, lab, transforms[26:], live=True)
+    assert decoder.take().slider.stamp.tolist() == [*stamps[51:].tolist(), int(stamps[-1]) + MS]
+    assert not decoder.of("slider").rejected and len(decoder) == 0
+
+
+@pytest.mark.parametrize("portion", [1, 50, 10_000])
+def test_a_pose_without_a_transform_within_two_seconds_is_rejected(portion: int) -> None:
+    stamps = np.arange(0, 6000 * MS, 20 * MS)
+    lab = seen_from_cart(stamps, np.arange(0, 2001 * MS, 20 * MS))
+    decoder = decoder_of(lab, NAMES)
+    for each in in_portions(lab.in_order(), portion):
+        put(decoder, lab, each, live=True)
+        decoder.take()
+    late = int(np.sum((stamps > 2000 * MS) & (stamps < stamps[-1] - 2000 * MS)))
+    assert decoder.of("slider").rejected == {NO_TRANSFORM: late} and len(decoder) == 100 + 1
+    decoder.take(last=True)
+    assert decoder.of("slider").rejected == {NO_TRANSFORM: late + 101} and len(decoder) == 0
 
 
 # --- recordings -------------------------------------------------------------------------------------------------------
@@ -159,10 +192,7 @@ def test_a_wrench_is_turned_into_the_chosen_world(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("world", "message"),
     [
-        (
-            "desk",
-            r"slider_topic '/slider' .*: no frame 'desk'; .*world_frame 'desk' \(option --w",
-        ),
+        ("desk", r"slider_topic '/slider' .*: no frame 'desk'; .*world_frame 'desk' \(option --w"),
         (
             "moon",
             r"slider_topic '/slider' .*: no transforms connect frame 'vicon' .* with 'moon'; .*world_frame 'moon'",
@@ -182,7 +212,7 @@ def test_without_tf_another_frame_is_refused(tmp_path: Path) -> None:
     lab.messages = [message for message in lab.messages if message[1] != "/tf_static"]
     path = lab.mcap(tmp_path / "lab")
     expected = (
-        r"slider_topic '/slider' \(option --slider-topic\): the poses are in frame 'vicon', and the bag has no /tf"
+        r"slider_topic '/slider' \(option --slider-topic\): the poses are in frame 'vicon', and there is no /tf from"
     )
     with pytest.raises(RecordingError, match=expected):
         read_recording(path, topics=NAMES)

@@ -238,7 +238,9 @@ def test_a_planar_sensor_without_the_other_numbers_has_its_bias_subtracted(tmp_p
 def test_without_a_rig_the_bias_stays_and_a_note_says_so(tmp_path: Path) -> None:
     found = read_recording(lab_with_bias().mcap(tmp_path / "lab"), topics=NAMES)
     assert found.wrench_bias is None
-    assert any("the bias is not subtracted: free motion is found with a rig" in note for note in found.notes)
+    assert any(
+        "the bias of the wrench is not subtracted: free motion is found with a rig" in note for note in found.notes
+    )
     given = read_recording(tmp_path / "lab", topics=NAMES, rig=original().rig)
     assert_unbiased(given, atol=0.02)
 

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.replay.clock import COARSE, SECOND, PlayerClock, SystemClock
-from push_predictor.replay.lateness import Lateness
 
 
 class FakeClock:
@@ -66,28 +65,6 @@ class TickingClock(FakeClock):
     def now(self) -> int:
         self.time += 100
         return self.time
-
-
-@pytest.mark.parametrize(
-    ("spin", "wait", "slept"),
-    [
-        (60_000, 4_000_000, 3_940_000),
-        (60_000, 80_000, 40_000),
-        (60_000, 50_000, 20_000),
-        (60_000, 25_000, None),
-        (60_000, 0, None),
-        (0, 4_000_000, 4_000_000),
-        (0, 25_000, 25_000),
-    ],
-)
-def test_a_wait_ends_actively_for_at_most_half_of_it_unless_it_is_short(
-    spin: int, wait: int, slept: int | None
-) -> None:
-    wall = TickingClock()
-    clock = PlayerClock(wall, spin=spin)
-    assert clock.sleep_until(wait, clock.generation)
-    assert wall.sleeps == ([] if slept is None else [pytest.approx(slept, abs=1000)])
-    assert wall.time == pytest.approx(clock.deadline(wait), abs=1000)
 
 
 def test_paused_clock_stops_and_resumes_at_the_same_time() -> None:
@@ -145,36 +122,3 @@ def test_control_wakes_a_long_sleep(control: str) -> None:
     assert not clock.sleep_until(60 * SECOND, clock.generation)
     assert time.monotonic() - begin < 5.0
     timer.join()
-
-
-def test_spinning_ends_no_earlier_than_the_deadline() -> None:
-    wall = SystemClock()
-    clock = PlayerClock(wall, spin=500_000)
-    begin = wall.now()
-    assert clock.sleep_until(clock.now() + 5_000_000, clock.generation)
-    assert wall.now() - begin >= 4_900_000
-
-
-@given(st.lists(st.integers(0, 10**11), min_size=1, max_size=200), st.sampled_from([0.5, 0.9, 0.99, 1.0]))
-def test_percentiles_of_lateness_are_accurate_to_a_bin(values: list[int], share: float) -> None:
-    lateness = Lateness()
-    for value in values:
-        lateness.add(value)
-    exact = sorted(values)[max(0, -(-round(share * 1000) * len(values) // 1000) - 1)]
-    assert exact <= max(2, lateness.percentile(share)) <= max(2.0, 1.045 * exact)
-    assert lateness.maximum == max(values)
-
-
-def test_percentile_without_values_is_zero() -> None:
-    assert Lateness().percentile(0.99) == 0.0
-
-
-def test_delays_are_the_percentiles_in_microseconds() -> None:
-    lateness = Lateness()
-    for late in [10_000] * 98 + [300_000, 2_000_000]:
-        lateness.add(late)
-    delays = lateness.delays()
-    assert delays.p50 == pytest.approx(10.0, rel=0.045)
-    assert delays.p99 == pytest.approx(300.0, rel=0.045)
-    assert delays.maximum == 2000.0
-    assert delays.to_text() == f"p50 {delays.p50:.0f} us, p99 {delays.p99:.0f} us, max 2000 us"

@@ -121,8 +121,7 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     stage.cost = round(0.15 * SECOND)
     assert stage.run() == TENTHS
     assert stage.player.lateness.maximum == pytest.approx(0.45 * SECOND, rel=0.01)
-    assert stage.player.lateness_after.maximum == pytest.approx(0.6 * SECOND, rel=0.01)
-    assert stage.player.lateness.count == stage.player.lateness_after.count == stage.player.published == 10
+    assert stage.player.published == 10
 
 
 def test_each_message_is_prepared_while_the_player_waits_for_it() -> None:
@@ -163,10 +162,7 @@ def test_messages_of_equal_time_keep_their_order() -> None:
         (PlayRange(duration=SECOND // 5), TENTHS[:3]),
         (PlayRange(until=START + SECOND // 10), TENTHS[:2]),
         (PlayRange(offset=SECOND // 2, duration=SECOND // 10), TENTHS[5:7]),
-        (
-            PlayRange(duration=SECOND // 10, until=START + SECOND // 2),
-            TENTHS[:6],
-        ),  # the later of the two
+        (PlayRange(duration=SECOND // 10, until=START + SECOND // 2), TENTHS[:6]),  # the later of the two
         (PlayRange(offset=20 * SECOND), []),
     ],
 )

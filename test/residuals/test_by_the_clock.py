@@ -23,7 +23,7 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.loading import load_evidence
-from push_predictor.residuals.extension.by_the_clock import by_the_clock
+from push_predictor.residuals.extension.extended_model import by_the_clock
 
 TABLE = pushes(20, 0)  # a push every 1000 / 19 s
 STEP = DriverBasis("step", ("push_index",), place=7.5)

@@ -13,7 +13,7 @@ import pytest
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.streams import Recording
-from push_predictor.residuals.channels.corrections import CORRECTIONS, correct
+from push_predictor.residuals.channels.measurement import CORRECTIONS, correct
 
 
 def late(r: Recording) -> Recording:

@@ -19,7 +19,6 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import held_out_gain
 from push_predictor.residuals.extension.recalibration import (
@@ -28,7 +27,7 @@ from push_predictor.residuals.extension.recalibration import (
     uncertainty_of_effects,
 )
 from push_predictor.residuals.extension.refit import refit_base, spread_rows
-from push_predictor.residuals.outcome import Sized
+from push_predictor.residuals.outcome import Sized, size_of
 
 CONSTANT = DriverBasis("constant")
 ANALYSIS, HELD_OUT = (pushes(count, seed, slippery(0.0)) for count, seed in ((120, 3), (60, 4)))

@@ -17,7 +17,8 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.motion import MotionTerm, motion_effects
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.channels.motion import MotionTerm, _separable, motion_effects
 from push_predictor.residuals.evidence.standardised import evidence_of
 
 ALWAYS = DriverBasis("constant")
@@ -92,3 +93,14 @@ def test_a_constant_effect_lies_in_the_inputs_of_a_learnt_base_alone(deployed: P
 
 def test_a_model_without_a_change_has_no_terms(deployed: PushModel) -> None:
     assert found(deployed, pushes(120, 6)) == ()
+
+
+def test_among_extrapolated_pushes_the_speed_is_tried_only_if_most_lie_inside(deployed: PushModel) -> None:
+    """Where few do, an error of extrapolation depends on the speed, too."""
+    evidence = evidence_of(deployed, pushes(20, 5))
+    speed, place = (DriverBasis("linear", (name,), (0.0,), (1.0,)) for name in ("velocity", "slider_x"))
+    evidence.table.covariates.setdefault("velocity", evidence.table.inputs[:, 0])
+    along = candidate(evidence, "contact_friction", "velocity", speed)
+    assert _separable(along, 0.6) and not _separable(along, 0.4)
+    assert _separable(candidate(evidence, "contact_friction", "slider_x", place), 0.4)
+    assert not _separable(candidate(evidence, "contact_friction", "model_inputs", ALWAYS), 0.6)

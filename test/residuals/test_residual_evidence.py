@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a search may trust: inputs inside training."""
+"""What a search may trust: inputs inside training, blocks of pushes that share a disturbance, held-out pushes."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
-from push_predictor.residuals.evidence.input_shift import input_shift
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.drivers import screening_bases
+from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of
 from push_predictor.types import Array
 
 
@@ -152,3 +154,39 @@ def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_
     assert about_mechanics(analytical) is analytical
     informed = about_mechanics(learned)
     assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)
+
+
+@pytest.mark.parametrize(("pushes", "together"), [(90, 10), (27, 3), (5, 1)])
+def test_every_third_block_of_pushes_is_held_out_and_few_pushes_have_smaller_blocks(pushes: int, together: int) -> None:
+    held = held_out_rows(in_order(pushes))
+    assert held.tolist() == [(k // together) % 3 == 2 for k in range(pushes)]
+
+
+@pytest.mark.parametrize(("pushes", "together"), [(800, 4), (250, 2), (60, 1)])
+def test_neighbouring_pushes_share_a_block_where_there_are_enough(pushes: int, together: int) -> None:
+    assert blocks_of(in_order(pushes)).tolist() == [k // together for k in range(pushes)]
+
+
+def in_order(count: int) -> PushTable:
+    """A window of each of these pushes."""
+    nothing = np.zeros((count, 3))
+    return PushTable(nothing, np.full(count, 0.2), nothing, np.arange(count).astype(np.str_))
+
+
+def test_a_contact_is_far_from_training_beyond_the_margin_and_the_gaps_of_training() -> None:
+    dense, sparse = np.linspace(0.0, 0.5, 101), np.linspace(0.0, 1.0, 9)[:-1]
+    assert _apart(1, np.array([0.52, 0.55]), dense).tolist() == [False, True]
+    assert _apart(1, np.array([0.5625]), sparse).tolist() == [False]
+
+
+def test_speeds_that_hardly_vary_are_one_speed(known: PushTable) -> None:
+    jitter = 1.0 + 1e-3 * np.random.default_rng(0).standard_normal(len(known))
+    basis = inputs_basis(trained(known), with_inputs(known, 0, 0.02 * jitter))
+    assert np.array_equal(basis.columns, basis.without_speed)
+
+
+@pytest.mark.parametrize(("levels", "tried"), [(12, True), (13, False)])
+def test_a_category_of_many_levels_is_not_tried(levels: int, tried: bool) -> None:
+    recording = np.arange(60.0) % levels
+    names = [name for name, _ in screening_bases(replace(in_order(60), covariates={"recording": recording}))]
+    assert ("recording" in names) == tried

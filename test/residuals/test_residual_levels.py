@@ -74,6 +74,14 @@ def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushMode
     assert found.terms[0].p_value < 0.002
 
 
+@pytest.mark.usefixtures("a_library_of_three")
+def test_an_obvious_effect_in_two_dozen_pushes_is_found(deployed: PushModel) -> None:
+    """Against the gate's noise, which contains the effect, it would pass in one of five such recordings."""
+    for seed in (2, 3, 4):
+        found = searched(deployed, pushes(24, seed, slippery(0.2)), ["elapsed_time", "slider_x"], alpha=0.004)
+        assert found.terms[0].mechanism == "contact_friction"
+
+
 def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
     """Two pushes with an outlying covariate and outlying outcomes gain much, and prove little."""
     table = pushes(60, 3)

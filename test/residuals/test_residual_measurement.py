@@ -12,12 +12,19 @@ import numpy as np
 import pytest
 
 from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.channels.corrections import correct
-from push_predictor.residuals.channels.measurement import MeasurementFinding, gap_responses, measurement_errors
+from push_predictor.residuals.channels.contrast import ChannelFinding
+from push_predictor.residuals.channels.measurement import (
+    _geometry,
+    _off_corners,
+    correct,
+    gap_responses,
+    measurement_errors,
+)
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.simulation.spec import simulated_rig
 
@@ -25,9 +32,7 @@ PUSHES = 40
 PLANTED = [
     ("clock_offset", (0.005,)),
     ("clock_offset", (-0.02,)),
-    ("frame_rotation", (np.deg2rad(1.0),)),
     ("frame_rotation", (-np.deg2rad(2.0),)),
-    ("frame_shift", (0.0005, 0.0)),
     ("frame_shift", (0.0006, -0.0008)),
 ]
 UNIT = {"clock_offset": 0.0025, "frame_rotation": 0.002, "frame_shift": 0.00025}  # how near an estimate must come
@@ -69,14 +74,14 @@ def with_error(mechanism: str, values: tuple[float, ...], seed: int = 2) -> Push
     return windows(planted(recorded(seed), mechanism, values))
 
 
-def judged(table: PushTable, baseline: PushTable | None) -> MeasurementFinding:
+def judged(table: PushTable, baseline: PushTable | None) -> ChannelFinding:
     finding = measurement_errors(table, baseline, RIG)
     assert finding is not None
     return finding
 
 
-def assert_found(finding: MeasurementFinding, mechanism: str, values: tuple[float, ...]) -> None:
-    strongest = finding.errors[0]
+def assert_found(finding: ChannelFinding, mechanism: str, values: tuple[float, ...]) -> None:
+    strongest = finding.effects[0]
     assert strongest.mechanism == mechanism
     assert np.allclose(strongest.values, values, atol=UNIT[mechanism])
     assert all(parameter.low < parameter.value < parameter.high for parameter in strongest.parameters)
@@ -89,57 +94,80 @@ def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, .
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[3], PLANTED[5]])
+@pytest.mark.parametrize(("mechanism", "values"), PLANTED[1:])
 def test_planted_error_is_found_without_training_windows(mechanism: str, values: tuple[float, ...]) -> None:
     """A shift of half a millimetre needs more pushes than these."""
     assert_found(judged(with_error(mechanism, values), None), mechanism, values)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[5]])
+@pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[3]])
 def test_no_error_remains_after_correction(mechanism: str, values: tuple[float, ...]) -> None:
     right = planted(recorded(2), mechanism, values)
-    for error in judged(with_error(mechanism, values), training()).errors:
+    for error in judged(with_error(mechanism, values), training()).effects:
         right = correct(right, error.mechanism, error.values)
-    assert judged(windows(right), training()).errors == ()
+    assert judged(windows(right), training()).effects == ()
     assert "corrected for" in right.notes[-1]
 
 
 def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
     finding = judged(with_error("tool_offset", (0.0, 0.0008)), training())
-    assert finding.errors[0].mechanism == "frame_shift"
-    assert "tool_offset" in finding.errors[0].rivals
-    assert np.allclose(finding.errors[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
+    assert finding.effects[0].mechanism == "frame_shift"
+    assert "tool_offset" in finding.effects[0].rivals
+    assert np.allclose(finding.effects[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_clean_recording_has_no_error(seed: int) -> None:
-    assert judged(clean(seed), training()).errors == ()
-    assert judged(clean(seed), None).errors == ()
+    assert judged(clean(seed), training()).effects == ()
+    assert judged(clean(seed), None).effects == ()
 
 
 @pytest.mark.slow
 def test_change_of_contact_friction_is_not_a_measurement_error() -> None:
-    assert judged(windows(recorded(4, contact_friction=0.5)), training()).errors == ()
+    assert judged(windows(recorded(4, contact_friction=0.5)), training()).effects == ()
 
 
 def test_error_that_training_has_too_is_not_reported() -> None:
     both = [windows(planted(recorded(seed), "frame_shift", (0.001, 0.0))) for seed in (1, 2)]
     by_itself, as_before = ({t.mechanism: t.p_value for t in judged(both[1], base).tested} for base in (None, both[0]))
     assert by_itself["frame_shift"] < 0.05 < as_before["frame_shift"]  # 40 pushes alone do not reach a percent
-    assert judged(both[1], both[0]).errors == ()
+    assert judged(both[1], both[0]).effects == ()
 
 
 def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
     table = clean(2)
     gap = table.covariates["contact_gap"] - 0.001
     worn = replace(table, covariates={**table.covariates, "contact_gap": gap})
-    assert judged(worn, training()).errors == ()
+    assert judged(worn, training()).effects == ()
 
 
 def test_error_below_the_tracker_noise_is_not_reported() -> None:
-    assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).errors == ()
+    assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).effects == ()
+
+
+def test_error_that_is_certain_but_smaller_than_the_noise_of_a_window_is_not_reported() -> None:
+    table = concatenate([replace(clean(2), push_id=np.char.add(f"{k}-", clean(2).push_id)) for k in range(6)])
+    response = gap_responses(table, RIG.outline)["frame_shift"][:, 0]
+    noise = 0.0004 * np.random.default_rng(1).standard_normal(len(table))
+    for shift, reported in ((0.0004, False), (0.001, True)):
+        off = {**table.covariates, "contact_gap": shift * response + noise}
+        finding = judged(replace(table, covariates=off), None)
+        assert {t.mechanism: t.p_value for t in finding.tested}["frame_shift"] <= 0.01
+        assert bool(finding.effects) == reported
+
+
+def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none() -> None:
+    table, near = clean(2), 0.0015 / RIG.outline.perimeter
+    inputs = table.inputs.copy()
+    inputs[:, 1] = np.where(np.arange(len(table)) % 2, 0.25 + near, 0.25 + 3.0 * near)
+    moved = replace(table, inputs=inputs)
+    assert len(_off_corners(moved, RIG.outline)) == -(-len(table) // 2)
+    assert len(_off_corners(table, shape_outline("ellip2"))) == len(table)
+    around = _geometry(table, shape_outline("ellip2"))  # three waves along the outline, rather than a line
+    waves = np.cos(6.0 * np.pi * table.inputs[:, 1])
+    np.testing.assert_allclose(around @ np.linalg.lstsq(around, waves, rcond=None)[0], waves, atol=1e-9)
 
 
 def test_reports_every_candidate_tested() -> None:

@@ -30,7 +30,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
+from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.screening import Controlled, screen
 
 WEAK = 0.02
@@ -137,7 +137,7 @@ class TestNoEffect:
         table = pushes(COUNT, 103)
         gate = gate_of(learnt(), seen(learnt(), table), DRIVERS, baseline=baseline(learnt()))
         sizes = minimum_detectable(search_with(learnt(), gate), gate.evidence, gate.inputs, 0.01, gate.baseline)
-        size = detectable_json(sizes)["contact_friction"]["driven"]
+        size = sizes["contact_friction"]["driven"]
         assert size["unit"] == "1"
         small, large = (
             with_effect(table, "contact_friction", linear(table, size["covariate"]), share * size["value"])

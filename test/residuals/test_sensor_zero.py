@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, ZeroShift, zero_shift
+from push_predictor.residuals.channels.contrast import ChannelEffect
+from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, zero_shift
 from push_predictor.residuals.evidence.drivers import screening_bases
 from push_predictor.types import Array
 
@@ -49,7 +50,7 @@ def without_zero(table: PushTable) -> PushTable:
     return replace(table, covariates={"push_index": table.covariates["push_index"]})
 
 
-def found(windows: PushTable, baseline: PushTable | None) -> ZeroShift:
+def found(windows: PushTable, baseline: PushTable | None) -> ChannelEffect:
     shift = zero_shift(windows, baseline)
     assert shift is not None
     return shift

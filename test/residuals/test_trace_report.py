@@ -21,20 +21,20 @@ from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
 from push_predictor.residuals import outcome
-from push_predictor.residuals.channels.corrections import CORRECTIONS
+from push_predictor.residuals.channels.measurement import CORRECTIONS
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting import page as report
-from push_predictor.residuals.reporting.figures.driver_basis import bins_of
-from push_predictor.residuals.reporting.figures.maps import halves_of, reach_of
-from push_predictor.residuals.reporting.figures.partial import (
+from push_predictor.residuals.reporting.figures.driver_basis import (
     analysis_rows,
     binned,
+    bins_of,
     held_out_rows,
     per_push,
     responses,
     shift_of,
     strength_of,
 )
+from push_predictor.residuals.reporting.figures.maps import halves_of, reach_of
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval
 from push_predictor.residuals.reporting.rivals import separating_words

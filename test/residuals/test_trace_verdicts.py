@@ -24,10 +24,10 @@ from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, MotionTerm
 from push_predictor.residuals.channels.variance import VarianceEffect
-from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
-from push_predictor.residuals.evidence.extrapolation import about_mechanics
+from push_predictor.residuals.evidence.input_shift import about_mechanics
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace
@@ -108,14 +108,14 @@ def test_constant_bias_of_the_force_sensor_is_found_in_free_motion_and_changes_n
 
 def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     lower = Sized("relative change of the force since training", -0.4, -0.42, -0.38, "1")
-    effect = WrenchEffect("surface_friction", "model_inputs", "constant", (lower,), 0.0005, ())
+    effect = ChannelEffect("surface_friction", "model_inputs", "constant", (lower,), 0.0005, ())
     noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
     motion = replace(NO_MOTION, variance=(noise,), equivalent=("dwell_time",))
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: motion)
     alone = trace(learnt(), faultless())
     assert (alone.verdict, alone.kind, alone.equivalent) == ("variance", "variance", ("dwell_time",))
     monkeypatch.setattr(
-        "push_predictor.residuals.channel_search.wrench_effects", lambda *_: WrenchFinding((effect,), (), 0.1, True)
+        "push_predictor.residuals.channel_search.wrench_effects", lambda *_: ChannelFinding((effect,), ())
     )
     both = trace(learnt(), faultless())
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
@@ -161,9 +161,8 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     faster = np.isin(data.table.push_id, data.table.pushes[::2])
     inputs[faster, 0] *= 5.0
     shifted = replace(data, table=replace(data.table, inputs=inputs), recordings=None)
-    monkeypatch.setattr(
-        "push_predictor.residuals.channel_search.wrench_effects", lambda table, *_: judged.append(table) or NO_WRENCH
-    )
+    searched = "push_predictor.residuals.channel_search.wrench_effects"
+    monkeypatch.setattr(searched, lambda table, *_: judged.append(table) or NOTHING_FOUND)
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
     found = trace(learnt(), shifted)
     assert "velocity" in [each.covariate for each in found.input_shift]
@@ -175,7 +174,7 @@ def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytes
     """The model was trained there, too. About the other sides the new pushes show nothing."""
     data = faultless()
     one_side = replace(data, table=data.table.take(data.table.inputs[:, 1] < 0.35), recordings=None)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: NO_WRENCH)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: NOTHING_FOUND)
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
     found = trace(learnt(), one_side)
     assert [each.covariate for each in found.input_shift] == ["contact"]
@@ -187,7 +186,7 @@ def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytes
 
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
     zero = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
-    found = WrenchFinding((), (), 0.1, True, WrenchEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
+    found = ChannelFinding((), (), ChannelEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
     noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
     monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: found)
     monkeypatch.setattr(
@@ -230,10 +229,10 @@ def test_force_bias_of_a_push_table_is_harmless_for_nothing_can_be_corrected(mon
     assert found.verdict == "none" and len(found.harmless) == 2
 
 
-def pulled() -> WrenchFinding:
+def pulled() -> ChannelFinding:
     """A bias of the force sensor during contact."""
     pulls = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
-    return WrenchFinding((WrenchEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ()),), (), 0.1, True)
+    return ChannelFinding((ChannelEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ()),), ())
 
 
 def turned(angle: float, share: float = 1.0) -> Callable[..., LoadedData]:

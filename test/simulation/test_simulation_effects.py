@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from coarse import coarse_simulator
 from sensed_motion import sensed
 
 from push_predictor.geometry.frames import rotate, wrap_angle
@@ -29,6 +30,14 @@ from push_predictor.simulation.surface import Surface
 from push_predictor.types import Array
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarsely() -> Iterator[None]:
+    """The errors are far below these tests' tolerances."""
+    with coarse_simulator(3.0):
+        yield
+
 
 GLASS = Surface("glass", 0.2, 0.0, 0.02, 0.0, 0.0)  # uniform and without noise
 QUIET = Sensors(tracker_noise=0.0, heading_noise=0.0, tip_noise=0.0, dropout_interval=0.0)

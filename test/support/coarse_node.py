@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`python coarse_node.py EXECUTABLE --ros-args ...` runs a node whose reports have coarse pictures.
+"""`python coarse_node.py EXECUTABLE --ros-args ...` runs a node whose reports have charts, but empty pictures.
 
 So it is in the processes that it starts: multiprocessing runs this file in each of them, but for its end.
 """
@@ -11,13 +11,13 @@ from __future__ import annotations
 import sys
 from contextlib import ExitStack
 from importlib import import_module
-
-from coarse_pictures import coarse_pictures
+from unittest.mock import patch
 
 from push_predictor.nodes.entry import install_handlers
+from push_predictor.reporting import canvas
 
 ALL_THE_TIME = ExitStack()
-ALL_THE_TIME.enter_context(coarse_pictures())
+ALL_THE_TIME.enter_context(patch.object(canvas, "draw", lambda path, *_: path.write_bytes(b"")))
 
 if __name__ == "__main__":
     install_handlers()

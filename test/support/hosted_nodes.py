@@ -11,21 +11,24 @@ from __future__ import annotations
 
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import pytest
 from rclpy import utilities
 from rclpy.context import Context
-from ros_harness import START_TIMEOUT, keep_tables, node_arguments, wait_until
+from ros_harness import START_TIMEOUT, free_domain, keep_tables, node_arguments, wait_until
 
+from push_predictor.nodes import runtime
 from push_predictor.nodes.predict_server import PredictServer, start_server
 from push_predictor.nodes.push_recorder import PushRecorder
 from push_predictor.nodes.push_replay import PushReplay
 from push_predictor.nodes.push_validator import PushValidator
-from push_predictor.nodes.runtime import Stop, _Life
+from push_predictor.nodes.runtime import Life, Stop
 from push_predictor.resources import share_path
 
 # As main() of a replay. Fast DDS reads it once: it counts only where no other node came first in this process.
@@ -34,7 +37,7 @@ NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = 
     "predict_server": (lambda stop: PredictServer(), start_server, {}),
     "push_recorder": (PushRecorder, None, {}),
     "push_replay": (PushReplay, None, PROFILES),
-    "push_validator": (PushValidator, None, {}),
+    "push_validator": (lambda stop: PushValidator(), None, {}),
 }
 _LOGS: list[Path] = []  # of the nodes hosted now; one that is hosted meanwhile logs where the other does
 
@@ -42,14 +45,14 @@ _LOGS: list[Path] = []  # of the nodes hosted now; one that is hosted meanwhile 
 class HostedNode:
     """A node that a thread of this process spins; what ROS logs goes to a file."""
 
-    def __init__(self, life: _Life, stop: Stop, log: Path) -> None:
+    def __init__(self, life: Life, stop: Stop, log: Path, context: Context) -> None:
         self._life, self._stop, self._log = life, stop, log
         self._status: int | None = None
-        self._begin, self._context = log.stat().st_size, Context()
+        self._begin, self._thread = log.stat().st_size, threading.Thread(target=life.spin, name="executor")
         self.pid = os.getpid()
-        with _default(self._context):
-            life.begin()
-            wait_until(lambda: life._spinning.is_set() or not life._thread.is_alive(), 10.0 * START_TIMEOUT)
+        with _default(context):
+            self._thread.start()
+            wait_until(lambda: life.spinning or not self._thread.is_alive(), 10.0 * START_TIMEOUT)
 
     def text(self) -> str:
         """Everything logged since its start, also by nodes that are hosted meanwhile.
@@ -67,18 +70,14 @@ class HostedNode:
         """End the node as by its own request; returns the status that its process would have."""
         if self._status is None:
             self._stop.request()
-            with _default(self._context):
-                self._status = self._life.end()
+            self._thread.join()
+            self._status = self._life.end()
         return self._status
 
 
 @contextmanager
 def hosted_node(
-    executable: str,
-    *ros_args: str,
-    domain: int,
-    namespace: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    executable: str, *ros_args: str, domain: int, namespace: str | None = None, params: Mapping[str, Any] | None = None
 ) -> Iterator[HostedNode]:
     """As `node_process`. Leaving ends the node, and raises what made it fail. It is ready when the block begins."""
     make_node, start, environment = NODES[executable]
@@ -87,11 +86,35 @@ def hosted_node(
     environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **environment}
     stop, arguments = Stop(), ["--ros-args", *node_arguments(*ros_args, namespace=namespace, params=params)]
     with _stderr_in_file() as log, patch.dict(os.environ, environment):
-        node = HostedNode(_Life(executable, make_node, stop, arguments, start), stop, log)
+        context = Context()
+        node = HostedNode(Life(executable, make_node, stop, arguments, start, context), stop, log, context)
         try:
             yield node
         finally:
             assert node.stop() == 0, log.read_text()
+
+
+def refused_start(
+    start: Callable[[list[str]], int],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    *ros_args: str,
+    **params: Any,
+) -> str:
+    """The one line on stderr of a node that does not start, with status 1. This process keeps its signal handlers.
+
+    start: as main() of a node, from its arguments. params: names with `__` for a dot.
+    """
+    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    given = {name.replace("__", "."): value for name, value in params.items()}
+    capfd.readouterr()
+    assert start(["--ros-args", *node_arguments(*ros_args, params=given)]) == 1
+    printed = capfd.readouterr().err
+    lines = [line for line in printed.splitlines() if not line.startswith("[")]  # what other nodes of this process log
+    assert len(lines) == 1, printed
+    return lines[0]
 
 
 @contextmanager

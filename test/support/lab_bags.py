@@ -126,7 +126,8 @@ class Lab:
             if rig is not None:
                 writer.add_metadata(RECORD_NAME, rig.to_record())
             for topic, kind in self.kinds.items():
-                writer.add_topic(topic, kind, self.definition(kind))
+                kept = "transient_local" if topic.endswith("_static") else "volatile"
+                writer.add_topic(topic, kind, self.definition(kind), durability=kept)
             for stamp, topic, data in self.in_order():
                 writer.write(topic, stamp, data)
         return path

@@ -15,9 +15,9 @@ from repository import REPOSITORY
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.samples import slider_stream
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.types import Array
 

@@ -22,15 +22,14 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from push_predictor.nodes.replay.topics import message_class
-from push_predictor.nodes.runtime import Stop
+from push_predictor.nodes.message_types import message_class
 
 
 def main(output: str, depth: str, *topics: str) -> None:
     """Subscribe; depth 0 keeps all messages."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    stop = Stop()
-    signal.signal(signal.SIGINT, lambda number, frame: stop.request())
+    ended = threading.Event()
+    signal.signal(signal.SIGINT, lambda number, frame: ended.set())
     node = Node("listener")
     history = HistoryPolicy.KEEP_LAST if int(depth) else HistoryPolicy.KEEP_ALL
     heard: dict[str, list[bytes]] = {}
@@ -44,7 +43,8 @@ def main(output: str, depth: str, *topics: str) -> None:
     executor.add_node(node)
     spinner = threading.Thread(target=executor.spin)
     spinner.start()
-    stop.wait()
+    while not ended.is_set():  # a handler may not interrupt a wait on its own event
+        time.sleep(0.05)
     while _still_receiving(heard):
         pass
     executor.shutdown()

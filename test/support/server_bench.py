@@ -17,11 +17,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.qos import QoSProfile
 
-from msg_adapters.predictions import (
-    PushQuery,
-    query_to_batch_request,
-    query_to_request,
-)
+from msg_adapters.predictions import PushQuery, query_to_batch_request, query_to_request
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 SERVICES = {

@@ -13,9 +13,12 @@ from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array, IntArray
 
 START = 1_600_000_000_000_000_000  # ns
@@ -119,6 +122,11 @@ def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
 def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
     """The wrench samples selected by `keep`."""
     return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
+
+
+def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:
+    """The windows of a recording with a rig."""
+    return find_windows(recording, require_rig(recording), options)
 
 
 def triangle() -> Outline:

@@ -15,11 +15,10 @@ from push_predictor.evaluation.ladder.ladder_text import COLUMNS, count, interva
 from push_predictor.evaluation.ladder.scored_ladder import FittedParameter, ScoredLadder
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
-from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, Picture, draw, grid
+from push_predictor.reporting.canvas import NEARBY, OBSERVED, Picture, draw, grid
 from push_predictor.reporting.chart import Bars, Chart, limits_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PARAMETER_HEAD = ("Meaning", "Value", "Unit", "Textbook", "Parameter")
@@ -37,6 +36,7 @@ ERROR = (
     "Total NMSE of held-out pushes after each step, with 95 % intervals. Step 0 has the textbook values. Hover over a "
     "point to see what its step adds."
 )
+PARAMETERS = "Fitted parameters in prior standard deviations from the textbook value, with 95 % intervals."
 
 
 def write_ladder_page(path: Path, ladder: ScoredLadder) -> Path:
@@ -53,7 +53,7 @@ def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
     parts = [
         html.opening(ladder_answer(ladder), _label(ladder), html.charts([error_chart(ladder)], ERROR)),
         html.heading("Fitted parameters"),
-        html.figure(_picture(folder, ladder)),
+        html.figure(_picture(folder, ladder.final)),
         html.folded_table(
             "Fitted parameters. Values with 95 % intervals from the variation between pushes.",
             PARAMETER_HEAD,
@@ -102,50 +102,23 @@ def _parameter_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:
     ]
 
 
-def _picture(folder: Path, ladder: ScoredLadder) -> Picture:
-    height = 1.2 + 0.36 * max(len(ladder.steps), len(ladder.final), 3)
-    path = draw(folder / "ladder.png", (9.5, height), lambda figure: _paint(figure, ladder))
-    caption = (
-        "Left and middle: total NMSE and NLPD of held-out pushes after each step, with 95 % intervals. "
-        "Right: fitted parameters in prior standard deviations from the textbook value."
-    )
-    return Picture(path, "Held-out scores by step of the ladder, and the fitted parameters", caption)
+def _picture(folder: Path, parameters: list[FittedParameter]) -> Picture:
+    size = (6.0, 1.2 + 0.36 * max(len(parameters), 3))
+    path = draw(folder / "ladder.png", size, lambda figure: _paint(figure, parameters))
+    return Picture(path, "The fitted parameters and their 95 % intervals", PARAMETERS)
 
 
-def _paint(figure: Figure, ladder: ScoredLadder) -> None:
-    nmse, nlpd, fitted = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
-    steps = [
-        f"{k}  {row[1]}".replace(" in place of ", "\n   in place of ") for k, row in enumerate(ladder_rows(ladder))
-    ]
-    for axes, name in ((nmse, "nmse"), (nlpd, "nlpd")):
-        estimates = [getattr(step, name) for step in ladder.steps]
-        _intervals(axes, np.array([[e.value, e.low, e.high] for e in estimates]), PREDICTED)
-        axes.set_yticks(range(len(steps)), steps if axes is nmse else [""] * len(steps))
-        axes.set_ylim(len(steps) - 0.5, -0.5)
-        axes.locator_params(axis="x", nbins=4)
-        axes.set_xlabel(f"Held-out {name.upper()}" + (" (nats)" if name == "nlpd" else ""))
-    _paint_parameters(fitted, ladder.final)
-
-
-def _paint_parameters(axes: Axes, parameters: list[FittedParameter]) -> None:
+def _paint(figure: Figure, parameters: list[FittedParameter]) -> None:
+    axes, place = figure.subplots(), range(len(parameters))
     axes.axvline(0.0, color=NEARBY, linewidth=0.8)
-    if parameters:
-        scaled = [
-            [
-                (end - p.parameter.textbook) / p.parameter.spread
-                for end in (p.estimate.value, p.estimate.low, p.estimate.high)
-            ]
-            for p in parameters
-        ]
-        _intervals(axes, np.array(scaled), OBSERVED)
-    axes.set_yticks(range(len(parameters)), [p.parameter.name for p in parameters])
+    for k, p in enumerate(parameters):
+        value, low, high = (
+            (end - p.parameter.textbook) / p.parameter.spread
+            for end in (p.estimate.value, p.estimate.low, p.estimate.high)
+        )
+        axes.plot([low, high], [k, k], color=OBSERVED, linewidth=1.6)
+        axes.plot(value, k, "o", color=OBSERVED, markersize=4.5)
+    axes.set_yticks(place, [p.parameter.name for p in parameters])
     axes.set_ylim(max(len(parameters), 1) - 0.5, -0.5)
     axes.set_xlabel("Prior standard deviations")
-
-
-def _intervals(axes: Axes, ends: np.ndarray, colour: str) -> None:
-    """Draw values with intervals (k, 3: value, low, high), one per line."""
-    place = np.arange(len(ends))
-    axes.hlines(place, ends[:, 1], ends[:, 2], color=colour, linewidth=1.6)
-    axes.plot(ends[:, 0], place, "o", color=colour, markersize=4.5)
     grid(axes)

@@ -12,7 +12,7 @@ from typing import Any
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.judgement import count_pushes, judged
-from push_predictor.evaluation.report.figures.coverage import coverage_chart
+from push_predictor.evaluation.report.figures.calibration import coverage_chart
 from push_predictor.evaluation.report.figures.gallery import (
     Validation,
     calibration_pictures,
@@ -122,4 +122,6 @@ def _pictures(out: Path, shown: Validation) -> list[str]:
         return parts
     for name, draw_section in SECTIONS:
         parts += [html.heading(name), *map(html.figure, draw_section(out, shown))]
+        if draw_section is calibration_pictures and (others := shown.comparisons[1:]):  # the first opens the page
+            parts.append(html.charts([coverage_chart(other) for other in others], COVERAGE))
     return parts

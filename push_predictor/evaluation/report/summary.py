@@ -15,7 +15,7 @@ import numpy as np
 
 from push_predictor.evaluation.judgement import judged
 from push_predictor.evaluation.metrics import nmse_reference
-from push_predictor.evaluation.report.figures.coverage import SYMBOLS
+from push_predictor.evaluation.report.figures.calibration import NAMES
 from push_predictor.evaluation.report.tables import interval_of, paired_difference
 from push_predictor.evaluation.validation import Comparison, trained_on
 from push_predictor.models.push_model import PushModel
@@ -46,7 +46,7 @@ def calibration_sentence(comparison: Comparison) -> str:
     """Whether the predicted 95 % intervals contain 95 % of the outcomes, by output."""
     inside = comparison.covered([LEVEL])[..., 0]
     shares = ", ".join(
-        f"{100.0 * share:.0f} % of {name}" for name, share in zip(SYMBOLS, inside.mean(axis=0), strict=True)
+        f"{100.0 * share:.0f} % of {name}" for name, share in zip(NAMES, inside.mean(axis=0), strict=True)
     )
     verdicts = _verdicts(interval_of(comparison, inside.astype(np.float64)))
     return f"Its 95 % intervals contain {shares}{verdicts}."
@@ -91,8 +91,8 @@ def _listed(names: Sequence[str]) -> str:
 def _verdicts(ends: Array) -> str:
     """For each output that is miscalibrated beyond chance: too narrow or too wide; ends (2, 3)."""
     low, high = ends
-    narrow = [name for name, end in zip(SYMBOLS, high, strict=True) if end < LEVEL]
-    wide = [name for name, end in zip(SYMBOLS, low, strict=True) if end > LEVEL]
+    narrow = [name for name, end in zip(NAMES, high, strict=True) if end < LEVEL]
+    wide = [name for name, end in zip(NAMES, low, strict=True) if end > LEVEL]
     found = (("too narrow", narrow), ("too wide", wide))
     if parts := [f"{verdict} for {_listed(names)}" for verdict, names in found if names]:
         return f": they are {' and '.join(parts)}"

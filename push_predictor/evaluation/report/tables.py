@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd, nmse_reference
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, joint_nlpd, nmse_reference
 from push_predictor.evaluation.push_scores import push_scores, resampled_means
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import OUTPUTS
@@ -54,7 +54,13 @@ def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
         counts = [str(m[name]) for name in ("n_train", "n_test", "n_pushes")]
-        rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c))])
+        rows.append(
+            [
+                c.model,
+                *counts,
+                *_cells([m["nmse"][name] for name in COLUMNS], _with_total(push_scores(c).resampled().nmse)),
+            ]
+        )
     reference = nmse_reference(max(c.n_train for c, _ in pairs))
     caption = (
         f"Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than {reference}. "
@@ -66,10 +72,10 @@ def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
 def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
-        each = gaussian_nlpd(c.mean, c.variance, c.observed)
-        scores = np.column_stack([each, each.sum(axis=1), joint_nlpd(c.mean, c.covariance, c.observed)])
+        joint = resampled_means(c.push_id, joint_nlpd(c.mean, c.covariance, c.observed)[:, None])
         values = [*(m["nlpd"][name] for name in COLUMNS), m["joint_nlpd"]]
-        rows.append([c.model, *_cells(values, resampled_means(c.push_id, scores))])
+        draws = np.column_stack([_with_total(push_scores(c).resampled().nlpd), joint])
+        rows.append([c.model, *_cells(values, draws)])
     caption = (
         f"Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
         f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
@@ -80,8 +86,7 @@ def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
 def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
-        each = np.zeros((0, 3)) if c.exact_log_density is None else -c.exact_log_density
-        draws = resampled_means(c.push_id, np.column_stack([each, each.sum(axis=1)]))
+        draws = _with_total(push_scores(c).resampled().exact_nlpd)
         rows.append([c.model, *_cells([m["exact_nlpd"][name] for name in COLUMNS], draws)])
     caption = (
         "NLPD of the model's own predictive density: a Student t, or the exact density of a VHGP. For models without "
@@ -94,11 +99,10 @@ def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     head = ("model, output", *(f"{100.0 * level:.0f} % interval" for level in COVERAGE_LEVELS))
     rows = []
     for c, m in pairs:
-        covered = c.covered(COVERAGE_LEVELS).astype(np.float64)
+        covered = push_scores(c).resampled().coverage
         levels = [m["coverage"][str(level)] or dict.fromkeys(OUTPUTS) for level in COVERAGE_LEVELS]
         for k, name in enumerate(OUTPUTS):
-            draws = resampled_means(c.push_id, covered[:, k])
-            rows.append([f"{c.model}, {name}", *_cells([found[name] for found in levels], draws, digits=3)])
+            rows.append([f"{c.model}, {name}", *_cells([found[name] for found in levels], covered[:, k], digits=3)])
         draws = resampled_means(c.push_id, c.joint_covered(COVERAGE_LEVELS).astype(np.float64))
         rows.append([f"{c.model}, joint", *_cells(list(m["joint_coverage"].values()), draws, digits=3)])
     caption = (
@@ -119,9 +123,9 @@ def _difference_table(comparisons: Sequence[Comparison]) -> str:
     return html.folded_table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)
 
 
-def _nmse_draws(c: Comparison) -> Array:
-    each = push_scores(c).resampled().nmse
-    return np.column_stack([each, each.sum(axis=1)])
+def _with_total(draws: Array) -> Array:
+    """Draws (d, 3) of the outputs, and of their sum."""
+    return np.column_stack([draws, draws.sum(axis=1)])
 
 
 def _ends(draws: Array) -> Array:

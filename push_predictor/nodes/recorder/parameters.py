@@ -15,14 +15,12 @@ from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.parameters import Param, declare, values_of
-from push_predictor.online.recorder.recorded_topics import resolved
-from push_predictor.recordings.select import STREAMS
+from push_predictor.nodes.parameters import Param, declare, topics_of, values_of
+from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.topics import Topics, load_topics
 
 PARAMETERS = (
-    Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required, unless storage.uri is given."),
-    Param("storage.uri", "", "Another name of the parameter bag, as rosbag2 has it."),
+    Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required."),
     Param("force", False, "Replace a bag that exists."),
     Param("rig", "", "Rig file (YAML, a push_rig record) to record. Empty: the record on topic rig."),
     Param("slider_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the slider's pose. Empty: slider/pose."),
@@ -61,9 +59,7 @@ def read_options(node: Node) -> RecorderOptions:
     declare(node, PARAMETERS)
     values = values_of(node, PARAMETERS)
     bag = _bag(values)
-    slider, pusher, wrench = (values[f"{name}_topic"] for name in STREAMS)
-    covariates, axes, bias = tuple(values["covariate_topics"]), values["wrench_frame"], values["wrench_bias"]
-    given = Topics(slider, pusher, wrench, covariates, values["world_frame"], axes, bias).over(load_topics(bag))
+    given = topics_of(values).over(load_topics(bag))
     topics = resolved(given, lambda topic: _full_name(node, topic))
     return RecorderOptions(
         bag, topics, values["rig"], values["duration"], values["diagnostics_period"], bool(given.wrench)
@@ -71,10 +67,9 @@ def read_options(node: Node) -> RecorderOptions:
 
 
 def _bag(values: Mapping[str, Any]) -> Path:
-    names = {values["bag"], values["storage.uri"]} - {""}
-    if len(names) != 1:
-        raise RequestError("bag", ", ".join(sorted(names)), "the path of one bag: a folder, or FILE.mcap")
-    path = Path(names.pop()).expanduser()
+    if not values["bag"]:
+        raise RequestError("bag", "", "the path of a bag: a folder, or FILE.mcap")
+    path = Path(values["bag"]).expanduser()
     if path.exists() and not values["force"]:
         raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
     return path

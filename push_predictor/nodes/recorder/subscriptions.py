@@ -17,9 +17,8 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.following import FollowingSubscription
 from push_predictor.nodes.qos import common_profile
 from push_predictor.online.recorder.live_recording import LiveRecording
-from push_predictor.online.recorder.recorded_topics import RecordedTopic
-from push_predictor.online.recorder.sequence_gaps import SequenceGaps
 from push_predictor.recordings.bag.metadata import TopicInfo
+from push_predictor.recordings.decoder.sources import RecordedTopic
 
 DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones
 LOOK = 0.1  # s between two looks at the publishers
@@ -29,7 +28,6 @@ LOOK = 0.1  # s between two looks at the publishers
 class _Subscribed:
     topic: RecordedTopic
     reader: FollowingSubscription
-    gaps: SequenceGaps
 
 
 class RecorderSubscriptions:
@@ -38,8 +36,7 @@ class RecorderSubscriptions:
     def __init__(self, node: Node, recording: LiveRecording) -> None:
         self._node, self._recording = node, recording
         self._topics = [
-            _Subscribed(topic, FollowingSubscription(node, topic.name, DEPTH), SequenceGaps())
-            for topic in recording.wanted
+            _Subscribed(topic, FollowingSubscription(node, topic.name, DEPTH)) for topic in recording.wanted
         ]
         self._looked = 0.0
 
@@ -60,17 +57,18 @@ class RecorderSubscriptions:
             return  # the messages wait for the first time on /clock
         arrived: list[tuple[int, str, bytes, int]] = []
         for subscribed in self._topics:
+            lost = subscribed.reader.lost
             for message in subscribed.reader.taken():
                 at = now or message.received or time_ns()
-                arrived.append((at, subscribed.topic.name, message.message, subscribed.gaps.missing(message.number)))
+                arrived.append((at, subscribed.topic.name, message.message, subscribed.reader.lost - lost))
+                lost = subscribed.reader.lost
         for at, topic, data, missing in sorted(arrived, key=lambda message: message[0]):
             self._recording.write(topic, at, data, missing)
 
     def _follow(self, subscribed: _Subscribed) -> str:
         """Subscribe to a topic as it is published now; returns why that is not possible, '' if it is."""
         topic = subscribed.topic
-        publishers = self._node.get_publishers_info_by_topic(topic.name)
-        subscribed.gaps.set_publishers(len(publishers))
+        publishers = subscribed.reader.publishers()
         kinds = sorted({publisher.topic_type for publisher in publishers})
         known = self._recording.type_of(topic.name)
         self._recording.set_published(topic.name, bool(kinds))

@@ -17,7 +17,6 @@ from rclpy.node import Node
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
-from push_predictor.nodes.replay.companion import CompanionNode
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.player import ReplayPlayer
@@ -27,25 +26,13 @@ from push_predictor_interfaces import srv as own_types
 class ReplayControls:
     """The player services of a node, with private names.
 
-    `~/NAME` has this project's type. Where rosbag2_interfaces is installed, a companion offers rosbag2's there as well.
+    They have rosbag2's types where rosbag2_interfaces is installed, else this project's, which are the same fields and
+    a message.
     """
 
-    def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
-        self._node, self._player, self._restamps = node, player, restamps
-        self._offer(node, own_types)
-        self._companion: CompanionNode | None = None
-        if (rosbag2_types := _imported_rosbag2()) is not None:
-            self._companion = CompanionNode(node, "rosbag2")
-            self._offer(self._companion.node, rosbag2_types)
-            self._companion.start()
-
-    def close(self) -> None:
-        """End the companion."""
-        if self._companion is not None:
-            self._companion.close()
-
-    def _offer(self, server: Node, types: ModuleType) -> None:
-        """Create the services with the types of a package on a node."""
+    def __init__(self, node: Node, player: ReplayPlayer) -> None:
+        self._node, self._player = node, player
+        types = _imported_rosbag2() or own_types
         for kind, name, handler in (
             ("Pause", "pause", self._pause),
             ("Resume", "resume", self._resume),
@@ -59,8 +46,7 @@ class ReplayControls:
             ("Seek", "seek", self._seek),
             ("Stop", "stop", self._stop),
         ):
-            full_name = self._node.resolve_service_name(f"~/{name}")  # of the node, remapped, also on the companion
-            server.create_service(getattr(types, kind), full_name, partial(self._guarded, handler))
+            node.create_service(getattr(types, kind), f"~/{name}", partial(self._guarded, handler))
 
     def _guarded(self, handler: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
         """Turn every exception into a refusal: one that left a callback would end the node."""
@@ -93,8 +79,6 @@ class ReplayControls:
         response.rate = self._player.rate
 
     def _set_rate(self, request: Any, response: Any) -> None:
-        if self._restamps and request.rate != 1.0:
-            raise RequestError("rate", request.rate, "1.0, which restamp requires")
         if not self._player.set_rate(request.rate):
             raise RequestError("rate", request.rate, "a finite number above 0")
 

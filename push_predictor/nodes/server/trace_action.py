@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-import threading
-import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -68,7 +66,6 @@ class TraceAction:
     """One trace at a time. model_of: the model of a name, or raises PushPredictorError; alpha: the present level.
 
     state: the present state of the node; goals are rejected unless it is active.
-    All methods except `close` run in the executor's thread.
     """
 
     def __init__(
@@ -81,23 +78,19 @@ class TraceAction:
         self._node, self._model_of, self._alpha, self._state = node, model_of, alpha, state
         self._job: _Job | None = None
         self._timer: Any = None
-        self._closing = threading.Event()
+        self._closing_until: float | None = None
         self._validator = ValidatorFolder(node)
         self._action = DeferredAction(node, TraceResidual, "trace_residual", self._accepts, self._on_goal)
 
-    def close(self) -> None:
-        """End a running trace; called from another thread while the executor still spins."""
-        self._closing.set()
-        if self._job is None:
-            return
-        deadline = monotonic() + CLOSE_TIMEOUT
-        while not self._all_sent() and monotonic() < deadline:
-            time.sleep(POLL_PERIOD)
-        if (job := self._job) is not None:  # the executor has ended, so no client can get a result
-            _clear(job)
+    def finish(self) -> bool:
+        """End a running trace; whether its client has got the result, or will not be waited for."""
+        self._closing_until = self._closing_until or monotonic() + CLOSE_TIMEOUT
+        return (self._job is None and self._action.result_sent) or monotonic() > self._closing_until
 
-    def _all_sent(self) -> bool:
-        return self._job is None and self._action.result_sent
+    def close(self) -> None:
+        """End what is left of a trace: no client can get a result any more."""
+        if self._job is not None:
+            _clear(self._job)
 
     def abort(self, reason: str) -> None:
         """End a running trace because the node is no longer active; its client gets the reason."""
@@ -151,7 +144,7 @@ class TraceAction:
             return
         if job.goal.is_cancel_requested:
             self._finish(job.goal, job.goal.canceled, _result("cancelled: nothing was written", ErrorCode.CANCELLED))
-        elif self._closing.is_set():
+        elif self._closing_until is not None:
             self._abort(job.goal, "the node ends: nothing was written", ErrorCode.NOT_ACTIVE)
         else:
             self._guarded(job.goal, lambda: self._advance(job))

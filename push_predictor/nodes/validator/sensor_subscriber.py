@@ -1,72 +1,70 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The subscriptions to tracker, robot and force sensor; their samples are taken in portions."""
+"""The subscriptions to tracker, robot, force sensor and scalars; their samples are taken in portions."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from dataclasses import replace
 from time import monotonic
 from typing import TypeAlias
 
-import numpy as np
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.validate_topic_name import validate_topic_name
 
-from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
+from push_predictor.errors import RequestError
 from push_predictor.nodes.validator.sensors.frame_stream import FrameStream, TransformTopics
-from push_predictor.nodes.validator.sensors.stream_source import sources_of
+from push_predictor.nodes.validator.sensors.scalar_topics import ScalarTopics
 from push_predictor.nodes.validator.sensors.topic_stream import TopicStream
-from push_predictor.nodes.validator.sensors.wrench_axes import WrenchAxes
-from push_predictor.online.sensors.live_wrench import LiveWrench
 from push_predictor.online.sensors.topic_report import ReportLog, TopicReport
-from push_predictor.online.stream_sync import Samples
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, name_of
+from push_predictor.recordings.decoder.poses import PoseFrame
+from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
+from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.sources import Source
+from push_predictor.recordings.fields.transforms import WORLD
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.samples import (
-    PUSHER,
-    SLIDER,
-    SPATIAL_WRENCH,
-    WRENCH,
-    pusher_stream,
-    slider_stream,
-)
-from push_predictor.recordings.select import STREAMS, TF
 from push_predictor.recordings.streams import ScalarStream
-from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
 
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last messages only
 LOOK = 0.05  # s between two looks at the publishers
 PATIENCE = 1.0  # s that a run waits for the first message of every topic
-WORLD = "world"
-RULES = {"slider": SLIDER, "pusher": PUSHER, "wrench": WRENCH}
 
 Stream: TypeAlias = TopicStream | FrameStream
 
 
 class SensorSubscriber:
-    """Subscribes to slider, pusher and wrench, as topics of any type with a pose or wrench or as frames of tf.
+    """Subscribes to slider, pusher, wrench and scalars as the topics state, and decodes what arrives.
 
-    topics: where the streams are; slider/pose, pusher/pose and pusher/wrench where they are not given. frame_id: frame
-    that the headers must name, empty for any; topics.world replaces it. scalars: the scalar topics to subscribe to as
-    well. A thread empties the middleware's queues: a fast replay fills them while a portion of samples is processed.
-    Raises RequestError for a source that is not valid.
+    Headers must name the frame `world` where no other is given. A thread empties the middleware's queues: a fast replay
+    fills them while a portion of samples is processed. Raises RequestError for a source that is not valid.
     """
 
-    def __init__(self, node: Node, topics: Topics, frame_id: str, scalars: Sequence[str] = ()) -> None:
-        sources = sources_of(topics)
-        self._scalars = ScalarSubscriber(node, scalars)
-        self._newest: int | None = None  # stamp (ns) of the poses
-        self._frame_id = topics.world or frame_id
-        self._tf = _transform_topics(node, sources, topics, self._frame_id)
-        self._wrench_axes = WrenchAxes(topics, next(iter(self._tf.values()), None))
-        self._wrench = LiveWrench(topics, self._wrench_axes.buffer)
-        self._streams = {name: self._stream(node, name, source) for name, source in sources.items()}
-        self._buffers = {name: stream.buffer for name, stream in self._streams.items()}
+    def __init__(self, node: Node, topics: Topics) -> None:
+        check_sources(topics)
+        self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
+        wanted = topics.world or topics.wrench_tf_frame
+        used = {source.topic.strip("/") for _, source in sources_of(topics) if source.frame}
+        self._tf = {
+            name: TransformTopics(node, f"/{name}", buffer)
+            for name, buffer in decoder.tf.items()
+            if wanted or name in used
+        }
+        self._streams: dict[str, Stream] = {
+            name: FrameStream(node, pose.source, self._tf[pose.source.topic.strip("/")])
+            if isinstance(pose, PoseFrame)
+            else TopicStream(node, pose.messages, pose.expected)
+            for name, pose in decoder.poses.items()
+        }
+        self._streams["wrench"] = TopicStream(node, decoder.wrench.messages, decoder.wrench.expected)
+        self._scalars = ScalarTopics(node, decoder.scalars)
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
         self._empty = monotonic()  # when nothing waited last
-        self._settled = not self._tf or bool(topics.world)  # whether the frame of poses is known from the first message
+        self._settled = bool(topics.world) or not used  # whether the frame of poses is known from the first message
         self._looked = -LOOK
         self._draining, self._ending = threading.Lock(), threading.Event()
         self.look()
@@ -79,7 +77,7 @@ class SensorSubscriber:
         self._thread.join()
 
     def __len__(self) -> int:
-        return sum(map(len, self._buffers.values()))
+        return len(self.decoder)
 
     def complete(self) -> bool:
         """Whether messages of every topic wait, or messages of some topic have waited for PATIENCE.
@@ -87,7 +85,7 @@ class SensorSubscriber:
         Call it often: it measures the time since no message waited. Frames of tf always wait for PATIENCE, unless the
         world is given: only a whole tree has the right root.
         """
-        waiting = [len(buffer) > 0 for buffer in self._buffers.values()]
+        waiting = [len(each) > 0 for each in (*self.decoder.poses.values(), self.decoder.wrench.messages)]
         if not any(waiting):
             self._empty = monotonic()
         early = all(waiting) and self._scalars.waiting() and self._settled
@@ -96,29 +94,28 @@ class SensorSubscriber:
     @property
     def world(self) -> str:
         """The frame in which the poses are."""
-        found = next((topics.buffer.world for topics in self._tf.values()), "")
-        return found or self._frame_id or WORLD
+        return self.decoder.world or WORLD
 
     @property
     def scalar_names(self) -> list[str]:
         """The requested scalar topics, published or not, by their names in a recording."""
-        return self._scalars.names
+        return list(self.decoder.scalars)
 
     def look(self) -> None:
         """Subscribe as the present publishers offer their topics; call often, in the executor's thread."""
-        self._scalars.look()
         if monotonic() - self._looked < LOOK:
             return
         self._looked = monotonic()
         with self._draining:
+            self._scalars.look()
             for stream in self._subscribed():
                 stream.move()
                 stream.look()
 
     def drain(self) -> None:
-        """Move arrived messages from the middleware into the buffers."""
-        self._scalars.drain()
+        """Move arrived messages from the middleware into the decoder."""
         with self._draining:  # one at a time, so that messages stay in order
+            self._scalars.move()
             for stream in self._subscribed():
                 stream.move()
 
@@ -126,46 +123,51 @@ class SensorSubscriber:
         streams = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
         return [*streams, *self._tf.values()]
 
-    def _stream(self, node: Node, name: str, source: Source) -> Stream:
-        if source.frame:
-            return FrameStream(node, name, source, self._tf[source.topic], RULES[name])
-        if name == "wrench" and self._wrench_axes.turned:  # its headers name the sensor's frame
-            return TopicStream(node, name, source, STREAMS[name], SPATIAL_WRENCH, "")
-        return TopicStream(node, name, source, STREAMS[name], RULES[name], self._frame_id)
-
     def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):
             self.drain()
 
     def begin(self, rig: Rig) -> None:
         """Begin a run: the samples that are taken from now on are of this rig."""
-        self._wrench.begin(rig)
+        self.decoder.begin(rig)
 
     @property
     def waits_for_bias(self) -> bool:
         """Whether the wrench is held back because its bias is not known yet."""
-        return self._wrench.waits_for_bias
+        return self.decoder.wrench.waits_for_bias
 
     def take(self) -> Samples:
         """The usable samples since the last call."""
         self._empty = monotonic()
-        slider, pusher, wrench = (self._buffers[name].take() for name in STREAMS)
-        turned = self._wrench.put(wrench, slider, pusher)
-        for stamp, _ in (slider, pusher):
-            self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # a single stamp may be wrong
-        scalars = self._scalars.take(self._newest)
-        return Samples(slider_stream(*slider), pusher_stream(*pusher), turned, scalars)
+        with self._draining:
+            self._scalars.date()
+        return self.decoder.take()
 
     def last_scalars(self) -> dict[str, ScalarStream]:
         """The scalars since the last sample of a sensor."""
-        return self._scalars.take(self._newest, last=True)
+        with self._draining:
+            self._scalars.date(last=True)
+        return self.decoder.take_scalars(last=True)
 
     def inspect(self) -> list[TopicReport]:
         """Make the reports about the topics anew, and return those to log."""
         with self._draining:
-            reports = [stream.report() for stream in self._streams.values()]
-        self._reports = [self._wrench_axes.amended(each) if each.stream == "wrench" else each for each in reports]
+            reports = [stream.report(name) for name, stream in self._streams.items()]
+        self._reports = [self._amended(report) if report.stream == "wrench" else report for report in reports]
         return self._log.news(self._reports)
+
+    def _amended(self, report: TopicReport) -> TopicReport:
+        """The report about the wrench with what is wrong with its frame in tf; as it is without a publisher."""
+        frame, problem = self.decoder.wrench.frame, self.decoder.wrench.problem
+        if not frame or report.problem or report.note:
+            return report
+        tf = next(iter(self._tf.values()))
+        if tf.problem:
+            return replace(report, problem=f"tf: {tf.problem}", refused=tf.refused)
+        if problem:
+            accepted = f"{problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
+            return replace(report, problem=f"wrench_frame {frame!r}: {accepted}.")
+        return replace(report, note=f"Its axes are turned from {frame!r} by tf.")
 
     @property
     def refused(self) -> bool:
@@ -176,56 +178,61 @@ class SensorSubscriber:
         """The report about each topic, counts of its messages, and of rejected ones by the kinds that occurred."""
         found: dict[str, object] = {f"{report.stream} topic": report.line for report in self._reports}
         for name, stream in self._streams.items():
-            buffer = stream.buffer
-            rejected = buffer.rejected
-            found |= {f"{name} samples": buffer.received, f"{name} rejected": rejected.total()}
-            found |= {f"{name} rejected {kind}": count for kind, count in rejected.items()}
-            if buffer.dropped:
-                found[f"{name} dropped"] = buffer.dropped
-            if stream.lost:
-                found[f"{name} lost"] = stream.lost
-        return found | self._wrench.figures() | self._scalars.figures()
+            own = self.decoder.of(name)
+            found |= {f"{name} samples": own.received, f"{name} rejected": own.rejected.total()}
+            found |= {f"{name} rejected {kind}": count for kind, count in own.rejected.items()}
+            found |= {f"{name} {what}": n for what, n in (("dropped", own.dropped), ("lost", stream.lost)) if n}
+        return found | self._wrench_figures() | self._scalars.figures()
+
+    def _wrench_figures(self) -> dict[str, object]:
+        wrench = self.decoder.wrench
+        found: dict[str, object] = {"wrench without pose": wrench.without_pose} if wrench.without_pose else {}
+        if wrench.bias is not None:
+            pending = f"not known yet: {wrench.bias.problem or 'too few samples'}"
+            found["wrench bias"] = pending if wrench.estimate is None else wrench.estimate.to_text()
+        return found
 
     def problems(self) -> list[str]:
         """What keeps pushes from being found, in words; about the topics by the last inspection."""
         found = []
         for report in self._reports:
-            buffer, topic = self._buffers[report.stream], report.topic
-            lost, rejected = self._streams[report.stream].lost, buffer.rejected
+            own, topic, lost = self.decoder.of(report.stream), report.topic, self._streams[report.stream].lost
             if report.problem:
                 found.append(f"{topic}: {report.problem}")
-            if rejected:
-                kinds = ", ".join(f"{kind} {count}" for kind, count in rejected.items())
-                found.append(f"{topic}: {rejected.total()} of {buffer.received} samples were rejected ({kinds}).")
+            if own.rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in own.rejected.items())
+                found.append(f"{topic}: {own.rejected.total()} of {own.received} samples were rejected ({kinds}).")
+            if isinstance(self._streams[report.stream], TopicStream) and own.problem:
+                found.append(f"{topic}: {own.problem}.")
             if lost:
                 found.append(f"{topic}: {lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
-            if buffer.dropped:
-                found.append(f"{topic}: {buffer.dropped} samples were dropped before they could be used.")
-        return found + self._wrench.problems + self._scalars.problems()
+            if own.dropped:
+                found.append(f"{topic}: {own.dropped} samples were dropped before they could be used.")
+        return found + self._wrench_problems() + self._scalars.problems()
+
+    def _wrench_problems(self) -> list[str]:
+        wrench = self.decoder.wrench
+        if wrench.bias is not None and wrench.estimate is not None and wrench.bias.problem:
+            return [f"The bias of the wrench is kept as first estimated: {wrench.bias.problem}."]
+        return [UNKNOWN_BIAS] if wrench.waits_for_bias else []
 
 
-def _transform_topics(
-    node: Node, sources: dict[str, Source], topics: Topics, frame_id: str
-) -> dict[str, TransformTopics]:
-    """The tf topics of all sources that are frames and of the wrench's axes, by their name as given.
+def check_sources(topics: Topics) -> None:
+    """Raise RequestError that names the parameter, its value and what is accepted, for names that are not valid."""
+    scalars: set[str] = set()
+    for name, source in sources_of(topics):
+        frame = ", or a frame as in /tf:tool0" if name not in ("wrench", COVARIATE) else ""
+        accepted = f"a topic, or a topic and a field as in /odom.pose.pose{frame}"
+        try:
+            validate_topic_name(source.topic)
+        except InvalidTopicNameException as error:
+            raise RequestError(source.key, source.text, f"{accepted} ({' '.join(str(error).split())})") from None
+        if source.topic.startswith("~") or source.text.endswith(".") or _has_wrong_frame(source, bool(frame)):
+            raise RequestError(source.key, source.text, accepted)
+        if name == COVARIATE and name_of(source) in scalars:
+            raise RequestError(source.key, source.text, "each topic or field once")
+        scalars |= {name_of(source)} if name == COVARIATE else set()
 
-    Where the other pose comes from a topic, poses from tf are given in the frame that its headers must name. The
-    frame of the wrench is in the first tf topic.
-    """
-    poses = [source for name, source in sources.items() if name != "wrench"]
-    frames = [source for source in poses if source.frame]
-    common = topics.world if len(frames) == len(poses) else frame_id
-    names = [*dict.fromkeys(source.topic for source in frames)]
-    turned = topics.wrench_tf_frame
-    if turned and not names:
-        names = [TF]
-    return {
-        name: TransformTopics(
-            node,
-            name,
-            [source.frame for source in frames if source.topic == name],
-            common,
-            turned if name == names[0] else "",
-        )
-        for name in names
-    }
+
+def _has_wrong_frame(source: Source, may_have: bool) -> bool:
+    return ":" in source.text and not (may_have and source.frame)

@@ -9,12 +9,14 @@ from collections import deque
 
 import numpy as np
 
-from push_predictor.online.recorder.live_streams import LiveStreams
+from push_predictor.errors import RecordingError
 from push_predictor.online.recorder.pace import Pace
 from push_predictor.online.recorder.progress import StreamFigures
-from push_predictor.online.recorder.recorded_topics import COVARIATE, sources_of
-from push_predictor.online.stream_sync import Samples
-from push_predictor.recordings.fields.sources import Source
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
+from push_predictor.recordings.decoder.poses import PoseFrame
+from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STREAMS, sources_of
+from push_predictor.recordings.fields.sources import TF_TYPES, Source
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -31,34 +33,52 @@ class Findings:
 
     def __init__(self, topics: Topics, now: float) -> None:
         self.windows = 0
-        self._streams = LiveStreams(topics)
+        self._decoder = StreamDecoder(topics)
+        self._refused: dict[str, str] = {}
+        self._types: dict[str, str] = {}
+        self._waiting: dict[str, tuple[list[int], list[bytes]]] = {}
         self._paces = [(name, source, Pace(now)) for name, source in sources_of(topics)]
-        self._log_times: dict[str, list[int]] = {}
         self._finder: WindowFinder | None = None
         self._early: deque[Samples] = deque(maxlen=EARLY)
         self._pushes: set[str] = set()
 
     def add_topic(self, topic: str, type_name: str, schema: str) -> None:
-        """State the type of a topic; schema: its definition, '' if unknown."""
-        self._streams.add_topic(topic, type_name, schema)
+        """State the type of a topic; schema: its definition, '' if unknown. One that does not fit becomes a problem."""
+        self._types[topic] = type_name
+        for name, pose in self._decoder.poses.items():
+            if isinstance(pose, PoseFrame) and key_of(pose.source.topic) == key_of(topic) and type_name not in TF_TYPES:
+                refusal = pose.source.error("", f"{topic} is of type {type_name!r}; only {TF_TYPES[0]} has frames")
+                self._refused[name] = str(refusal)
+        for name, each in self._decoder.inputs().items():
+            if name in STREAMS and key_of(each.source.topic) == key_of(topic):
+                try:
+                    each.declare(type_name, {type_name: schema})
+                except RecordingError as error:
+                    self._refused[name] = str(error)
 
     def set_rig(self, rig: Rig) -> None:
         """Find windows of this rig from now on, and in the last EARLY portions."""
+        self._decoder.begin(rig)
         self._finder = WindowFinder(rig)
 
     def put(self, topic: str, log_time: int, data: bytes) -> None:
         """Add a message; log_time in ns."""
-        self._log_times.setdefault(topic, []).append(log_time)
-        self._streams.put(topic, log_time, data)
+        times, messages = self._waiting.setdefault(topic, ([], []))
+        times.append(log_time)
+        messages.append(data)
 
     def work(self, now: float, last: bool = False) -> None:
         """Evaluate the portion of messages since the last call; last: no more will come."""
-        samples = self._streams.take()
+        logged = {topic: np.array(times, np.int64) for topic, (times, _) in self._waiting.items()}
+        for topic, (times, data) in self._waiting.items():
+            if topic in self._types:
+                self._decoder.put(Messages.of(topic, self._types[topic], times, data), logged[topic])
+        self._waiting = {}
+        samples = self._decoder.take(last)
         stamps = {"slider": samples.slider.stamp, "pusher": samples.pusher.stamp, "wrench": samples.wrench.stamp}
         for name, source, pace in self._paces:
-            logged = np.array(self._log_times.get(source.topic, []) if name == COVARIATE else [], np.int64)
-            pace.add(stamps.get(name, logged), now)
-        self._log_times = {}
+            of_topic = logged.get(source.topic, np.empty(0, np.int64))
+            pace.add(of_topic if name == COVARIATE else stamps[name], now)
         self._early.append(samples)
         if self._finder is not None:
             self._feed(self._finder)
@@ -85,7 +105,17 @@ class Findings:
     @property
     def problems(self) -> dict[str, str]:
         """{stream: why it has no samples, or which samples were rejected}."""
-        return self._streams.problems
+        found = {}
+        for name, source in sources_of(self._decoder.topics):
+            if name not in STREAMS:
+                continue
+            own = self._decoder.of(name)
+            if own.rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in own.rejected.items())
+                found[name] = f"{source.text}: {own.rejected.total()} samples were rejected ({kinds})."
+            if own.problem:
+                found[name] = f"{source.error('', own.problem)}."
+        return found | self._refused
 
     def silent(self, now: float) -> dict[str, float]:
         """{stream as it was named: for how long (s)} of those that are silent."""
@@ -94,7 +124,7 @@ class Findings:
 
     def _feed(self, finder: WindowFinder) -> None:
         """Hand the samples to the finder once slider and pusher have been seen; until then it would keep them all."""
-        if not (self._streams.received["slider"] and self._streams.received["pusher"]):
+        if not all(pace.samples for name, _, pace in self._paces if name in POSES):
             return
         while self._early:
             samples = self._early.popleft()

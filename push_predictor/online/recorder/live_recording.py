@@ -12,8 +12,8 @@ from push_predictor.online.recorder.findings import Findings
 from push_predictor.online.recorder.live_bag import LiveBag
 from push_predictor.online.recorder.pace import NANOSECOND
 from push_predictor.online.recorder.progress import Progress
-from push_predictor.online.recorder.recorded_topics import sources_of, topics_to_record
 from push_predictor.recordings.bag.metadata import TopicInfo
+from push_predictor.recordings.decoder.sources import sources_of, topics_to_record
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import Topics
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from push_predictor.recordings.select import STREAMS
+from push_predictor.recordings.decoder.sources import STREAMS
 
 MILLI = 1e3
 

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator
+from array import array
+from collections.abc import Callable, Collection, Iterator
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO, TypeAlias
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import MetadataIndex
 
@@ -35,17 +37,11 @@ from push_predictor.recordings.bag.mcap_summary import (
     read_metadata,
     read_summary,
 )
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
+_Found: TypeAlias = "array[int]"  # of each message: channel, log time, first byte, byte after the last
+_NUMBERS = 4
 MOST_NOTES = 50  # a file can have a million damaged records
-
-
-class RawMessage(NamedTuple):
-    """A message as recorded: topic, type (package/msg/Name), log time in ns, CDR bytes."""
-
-    topic: str
-    type: str
-    log_time: int
-    data: bytes
 
 
 class McapFile:
@@ -81,6 +77,31 @@ class McapFile:
 
         One chunk at a time is in memory.
         """
+        for content, found, wanted, _ in self._contents(topics):
+            view = memoryview(content)
+            for k in range(0, len(found), _NUMBERS):
+                channel, time, start, end = found[k : k + _NUMBERS]
+                yield RawMessage(*wanted[channel], time, view[start:end].tobytes())
+            del view, content, found  # before the next chunk is read
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The same of the given topics, a portion for each topic of a chunk."""
+        single: list[RawMessage] = []
+        for content, found, wanted, is_chunk in self._contents(topics):
+            rows = np.array(found).astype(np.int64).reshape(-1, _NUMBERS)
+            if not is_chunk:  # a portion of one message would be slow
+                single += [RawMessage(*wanted[c], time, bytes(content[a:b])) for c, time, a, b in rows.tolist()]
+                continue
+            yield from gathered(single)
+            single = []
+            for of in dict.fromkeys(wanted[channel] for channel in np.unique(rows[:, 0]).tolist()):
+                own = [channel for channel, other in wanted.items() if other == of]
+                _, time, start, end = rows[np.isin(rows[:, 0], own)].T
+                yield Messages(*of, time, content, start, end - start)
+        yield from gathered(single)
+
+    def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, _Found, Wanted, bool]]:
+        """Consecutive records, the wanted messages among them, of which channels, and whether they are a chunk."""
         wanted = self._descriptions.wanted(topics, self._descriptions.channels.values())
         seen = 0
         chunks: list[int] = []
@@ -91,7 +112,13 @@ class McapFile:
                     break
                 if place.opcode == Opcode.CHUNK:
                     chunks.append(place.offset)
-                seen += yield from self._decoded(self._content(stream, place), place, topics, wanted)
+                content = self._content(stream, place)
+                found, count = self._found(content, place, topics, wanted)
+                seen += count
+                if self._unpack is not None:
+                    content, found = self._unpacked(content, found, place)
+                yield content, found, wanted, place.opcode == Opcode.CHUNK
+                del content, found
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
@@ -109,15 +136,14 @@ class McapFile:
             self._note(place.offset, f"a chunk was skipped: {error or type(error).__name__}")
             return b""
 
-    def _decoded(
+    def _found(
         self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
-    ) -> Generator[RawMessage, None, int]:
-        """Yield the wanted messages of consecutive records and return the number of all messages.
+    ) -> tuple[_Found, int]:
+        """The wanted messages among consecutive records, and the number of all messages.
 
         The channels, schemas and metadata among the records are stored.
         """
-        seen = unpackable = 0
-        view = memoryview(content)
+        seen, found, unwanted = 0, array("Q"), set[int]()
         try:
             for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
@@ -125,29 +151,34 @@ class McapFile:
                         raise ValueError(f"a message has {end - start} bytes, its header alone needs {MESSAGE.size}")
                     seen += 1
                     number, _, log_time, _ = MESSAGE.unpack_from(content, start)
-                    if found := wanted.get(number):
-                        data = self._unpacked(view[start + MESSAGE.size : end])
-                        if data is None:
-                            unpackable += 1
-                        else:
-                            yield RawMessage(*found, log_time, data)
+                    if number in wanted:
+                        found.extend((number, log_time, start + MESSAGE.size, end))
                     else:
-                        self._check_unwanted(number, topics, place.offset)
+                        unwanted.add(number)
                 elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
                     wanted.update(self._descriptions.wanted(topics, [channel]))
         except UNREADABLE as error:
             self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
-        if unpackable:
-            self._note(place.offset, f"{unpackable} messages cannot be decompressed and were skipped")
-        return seen
+        for number in sorted(unwanted):
+            self._check_unwanted(number, topics, place.offset)
+        return found, seen
 
-    def _unpacked(self, data: memoryview) -> bytes | None:
-        if self._unpack is None:
-            return data.tobytes()
-        try:
-            return self._unpack(data.tobytes())
-        except UNREADABLE:
-            return None
+    def _unpacked(self, content: Bytes, found: _Found, place: Place) -> tuple[Bytes, _Found]:
+        """The same with the messages decompressed."""
+        assert self._unpack is not None
+        unpacked, where, undone = bytearray(), array("Q"), 0
+        for k in range(0, len(found), _NUMBERS):
+            channel, time, start, end = found[k : k + _NUMBERS]
+            try:
+                data = self._unpack(bytes(content[start:end]))
+            except UNREADABLE:
+                undone += 1
+            else:
+                where.extend((channel, time, len(unpacked), len(unpacked) + len(data)))
+                unpacked += data
+        if undone:
+            self._note(place.offset, f"{undone} messages cannot be decompressed and were skipped")
+        return unpacked, where
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a message that is wanted but cannot be decoded; others are ignored."""

@@ -13,7 +13,8 @@ from pathlib import Path
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import unpack_file, unpack_message
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
-from push_predictor.recordings.bag.mcap_file import McapFile, RawMessage
+from push_predictor.recordings.bag.mcap_file import McapFile
+from push_predictor.recordings.bag.messages import Messages, RawMessage
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
     BagMetadata,
@@ -93,6 +94,11 @@ class Bag:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
         for file in self.files:
             yield from file.messages(topics)
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The messages of the given topics, those of a topic and type in file order; damage becomes a note."""
+        for file in self.files:
+            yield from file.portions(topics)
 
 
 def open_bag(path: Path) -> Bag:

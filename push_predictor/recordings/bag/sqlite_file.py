@@ -14,8 +14,8 @@ from contextlib import closing
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.mcap_file import RawMessage
 from push_predictor.recordings.bag.mcap_records import UNREADABLE
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 
 MAGIC = b"SQLite format 3\0"
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
@@ -68,6 +68,10 @@ class SqliteFile:
             self._note(f"damaged after {read} messages ({error}); the rest is not read")
         if undone:
             self._note(f"{undone} messages cannot be read or decompressed and were skipped")
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The messages of the given topics."""
+        return gathered(self.messages(topics))
 
     def _opened(self) -> sqlite3.Connection:
         # A recorder that was killed leaves a write-ahead log; without one nothing is written next to the bag.

@@ -4,7 +4,7 @@
 """Columns of fields from CDR messages of any type (XCDR1, either byte order), many messages at a time.
 
 Where a field lies depends only on the lengths of the strings and sequences before it. One message is walked; all
-messages that have the same lengths at the same bytes are then read at once.
+messages that have the same lengths at the same bytes are then read at once, and later ones too.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.message_text import Field, short_name
 from push_predictor.types import Array, IntArray
 
@@ -55,10 +56,17 @@ class Block:
 
     def number(self, path: str) -> Array:
         """The numbers (n,) of a field; 64-bit integers are rounded."""
-        at, code = self.layout.numbers[path]
-        column = np.ascontiguousarray(self.data[:, at : at + int(code[1:])])
+        return self.numbers([path])[:, 0]
+
+    def numbers(self, paths: Sequence[str]) -> Array:
+        """The numbers (n, k) of k fields, at once where they lie side by side."""
+        places = [self.layout.numbers[path] for path in paths]
+        (at, code), size = places[0], int(places[0][1][1:])
+        if places != [(at + size * k, code) for k in range(len(places))]:
+            return np.column_stack([self.number(path) for path in paths])
+        column = np.ascontiguousarray(self.data[:, at : at + size * len(paths)])
         with np.errstate(invalid="ignore"):  # widening a signalling NaN
-            return np.asarray(column.view(f"{self.order}{code}")[:, 0].astype(np.float64))
+            return np.asarray(column.view(f"{self.order}{code}").astype(np.float64))
 
     def text(self, path: str) -> list[str]:
         """The texts (n,) of a field."""
@@ -69,30 +77,37 @@ class Block:
         return [_decoded(row) for row in column]
 
 
-def blocks(
-    messages: Sequence[bytes],
-    type_name: str,
-    definitions: Mapping[str, tuple[Field, ...]],
-    wanted: Sequence[str],
-) -> Iterator[Block]:
-    """The wanted top-level fields of all readable messages; a message that is not readable is in no block."""
-    lengths = np.fromiter(map(len, messages), np.int64, len(messages))
-    for length in np.unique(lengths):
-        rows = np.flatnonzero(lengths == length)
-        data = np.frombuffer(b"".join([messages[i] for i in rows.tolist()]), np.uint8).reshape(len(rows), int(length))
-        while len(rows):
-            try:
-                order, layout = _walked(data[0].tobytes(), short_name(type_name), definitions, wanted)
-            except (ValueError, LookupError, RecursionError):  # also of a type that contains itself
-                rows, data = rows[1:], data[1:]
-                continue
-            same = _same(data, order, layout)
-            yield Block(rows[same], order, data[same], layout)
-            rows, data = rows[~same], data[~same]
+class BlockReader:
+    """Reads the wanted top-level fields of messages of one type."""
+
+    def __init__(self, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]) -> None:
+        self._type, self._definitions, self._wanted = short_name(type_name), definitions, wanted
+        self._known: dict[int, tuple[str, _Layout]] = {}  # the last layout of messages of a length
+
+    def blocks(self, messages: Messages) -> Iterator[Block]:
+        """All readable messages; a message that is not readable is in no block."""
+        for rows, data in messages.of_equal_length():
+            while len(rows):
+                try:
+                    order, layout = self._layout(data[0])
+                except (ValueError, LookupError, RecursionError):  # also of a type that contains itself
+                    rows, data = rows[1:], data[1:]
+                    continue
+                same = _same(data, order, layout)
+                yield Block(rows[same], order, data[same], layout)
+                rows, data = rows[~same], data[~same]
+
+    def _layout(self, message: NDArray[np.uint8]) -> tuple[str, _Layout]:
+        known = self._known.get(len(message))
+        if known is None or not _same(message[None], *known)[0]:
+            known = _walked(message.tobytes(), self._type, self._definitions, self._wanted)
+            self._known[len(message)] = known
+        return known
 
 
 def _same(data: NDArray[np.uint8], order: str, layout: _Layout) -> NDArray[np.bool_]:
-    same = (data[:, :2] == data[0, :2]).all(axis=1)
+    """Which messages (n, length) have a layout."""
+    same = (data[:, 0] == 0) & (data[:, 1] == (order == "<"))
     for at, value in layout.lengths:
         same &= np.ascontiguousarray(data[:, at : at + 4]).view(f"{order}u4")[:, 0] == value
     return np.asarray(same)

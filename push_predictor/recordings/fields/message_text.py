@@ -102,6 +102,11 @@ _STANDARD = {
     "geometry_msgs/WrenchStamped": "Header header\nWrench wrench\n",
     "nav_msgs/Odometry": "Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
     "geometry_msgs/TwistWithCovariance twist\n",
+    "std_msgs/Float64": "float64 data\n",
+    "std_msgs/Float32": "float32 data\n",
+    "sensor_msgs/Temperature": "Header header\nfloat64 temperature\nfloat64 variance\n",
+    "sensor_msgs/RelativeHumidity": "Header header\nfloat64 relative_humidity\nfloat64 variance\n",
+    "sensor_msgs/FluidPressure": "Header header\nfloat64 fluid_pressure\nfloat64 variance\n",
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
 }

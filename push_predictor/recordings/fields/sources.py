@@ -1,19 +1,19 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where a stream is in a bag: a topic, a field of its messages or a frame; its messages in the type of a recording."""
+"""Where a stream is: a topic, a field of its messages or a frame; the numbers in that field."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
-from push_predictor.recordings.fields.columns import NUMBERS, Block, blocks
+from push_predictor.recordings.bag.definitions import POSE, WRENCH
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
 from push_predictor.recordings.fields.message_text import (
     STANDARD,
     Definitions,
@@ -22,11 +22,17 @@ from push_predictor.recordings.fields.message_text import (
     short_name,
     type_at,
 )
-from push_predictor.types import IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 JOINTS = "sensor_msgs/msg/JointState"
-STAMPED_SCALAR = "sensor_msgs/msg/Temperature"  # the type of a scalar that was a field of a message with a header
+SCALAR_FIELDS = {
+    "std_msgs/msg/Float64": "data",
+    "std_msgs/msg/Float32": "data",
+    "sensor_msgs/msg/Temperature": "temperature",
+    "sensor_msgs/msg/RelativeHumidity": "relative_humidity",
+    "sensor_msgs/msg/FluidPressure": "fluid_pressure",
+}
 _NANO = 1_000_000_000
 
 
@@ -34,11 +40,11 @@ _NANO = 1_000_000_000
 class Target:
     """What a stream needs: the type of its messages in a recording, and types (package/Name) of fields that fit.
 
-    known: {message type: field that is read without being named}.
+    count: of its numbers. known: {message type: field that is read without being named}.
     """
 
     type: str
-    layout: Layout
+    count: int
     parts: frozenset[str]
     known: Mapping[str, str]
     what: str
@@ -46,7 +52,7 @@ class Target:
 
 POSE_TARGET = Target(
     POSE.name,
-    POSE_STAMPED,
+    7,
     frozenset({"geometry_msgs/Pose", "geometry_msgs/Transform"}),
     {
         POSE.name: "pose",
@@ -56,10 +62,8 @@ POSE_TARGET = Target(
     },
     "pose",
 )
-WRENCH_TARGET = Target(
-    WRENCH.name, WRENCH_STAMPED, frozenset({"geometry_msgs/Wrench"}), {WRENCH.name: "wrench"}, "wrench"
-)
-SCALAR_TARGET = Target(STAMPED_SCALAR, SCALAR_LAYOUTS[STAMPED_SCALAR], NUMBERS, {}, "number")
+WRENCH_TARGET = Target(WRENCH.name, 6, frozenset({"geometry_msgs/Wrench"}), {WRENCH.name: "wrench"}, "wrench")
+SCALAR_TARGET = Target("", 1, NUMBERS, SCALAR_FIELDS, "number")
 
 
 @dataclass(frozen=True)
@@ -90,27 +94,56 @@ class Source:
 
     def error(self, path: object, problem: str) -> RecordingError:
         """An error that names the bag ('' for live topics), the key, the option and the value."""
-        before, option = f"{path}: " if path else "", f" (option {self.option})" if self.option else ""
+        before, option = (f"{path}: ", f" (option {self.option})") if path else ("", "")
         return RecordingError(f"{before}{self.key} {self.text!r}{option}: {problem}")
 
 
-@dataclass(frozen=True)
-class FieldReader:
-    """Reads a field of messages of one type as messages of a target's type."""
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """n decoded messages.
 
-    target: Target
-    type_name: str
-    field: str
-    definitions: Definitions
+    stamp (n,) in ns: of the nearest header around the field, else when the message was logged or sent. values (n, k).
+    valid (n,): readable. frame (n,): number of the frame that the header names among `frames`.
+    """
+
+    stamp: IntArray
+    values: Array
+    valid: BoolArray
+    frame: IntArray
+    frames: tuple[str, ...]
 
     @property
-    def timed(self) -> bool:
-        """Whether the messages contain their time: a header around the field."""
-        return bool(header_path(self.field, self.type_name, self.definitions))
+    def named(self) -> frozenset[str]:
+        """The frames of readable messages."""
+        return frozenset(self.frames[k] for k in np.unique(self.frame[self.valid]).tolist())
 
-    def read(self, messages: Sequence[bytes], log_times: Sequence[int]) -> list[bytes]:
-        """The messages as `messages_as` gives them."""
-        return messages_as(self.target, messages, log_times, self.type_name, self.field, self.definitions)
+
+class FieldReader:
+    """Reads a field of messages of one type as what a stream needs. timed: whether a header is around the field."""
+
+    def __init__(self, target: Target, type_name: str, field: str, definitions: Definitions) -> None:
+        self._target, self._field = target, field
+        self._header = header_path(field, type_name, definitions)
+        self.timed = bool(self._header)
+        tops = [path.partition(".")[0].partition("[")[0] for path in (field, self._header) if path]
+        self._blocks = BlockReader(type_name, definitions, tops)
+
+    def read(self, messages: Messages) -> Columns:
+        """The columns of n messages; one that is not readable has zeros."""
+        n, frames = len(messages), {"": 0}
+        stamp, values = messages.times.copy(), np.zeros((n, self._target.count))
+        valid, frame = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+        for block in self._blocks.blocks(messages):
+            paths = block.paths(self._field)
+            if len(paths) != self._target.count:  # an index that this message does not have
+                continue
+            rows = block.rows
+            values[rows], valid[rows] = block.numbers(paths), True
+            if self._header:
+                stamp[rows], valid[rows] = header_stamps(block, self._header)
+                names = block.text(f"{self._header}.frame_id")
+                frame[rows] = [frames.setdefault(name, len(frames)) for name in names]
+        return Columns(stamp, values, valid, frame, tuple(frames))
 
 
 def definitions_of(type_name: str, schemas: Mapping[str, str]) -> Definitions:
@@ -132,38 +165,7 @@ def field_to_read(source: Source, type_name: str, target: Target, schemas: Mappi
     raise source.error(path, _refusal(source, type_name, target, definitions))
 
 
-def messages_as(
-    target: Target,
-    messages: Sequence[bytes],
-    log_times: Sequence[int],
-    type_name: str,
-    field: str,
-    definitions: Definitions,
-) -> list[bytes]:
-    """The field of each message as a message of the target's type; b'' where a message is not readable.
-
-    The stamp and frame are those of the nearest header around the field; without one the log time is the stamp.
-    """
-    header = header_path(field, type_name, definitions)
-    converted = [b""] * len(messages)
-    tops = [path.partition(".")[0].partition("[")[0] for path in (field, header) if path]
-    logged = np.array(log_times, np.uint64).astype(np.int64)
-    for block in blocks(messages, type_name, definitions, tops):
-        paths = block.paths(field)
-        if len(paths) != target.layout.count:  # an index that this message does not have
-            continue
-        values = np.stack([block.number(path) for path in paths], axis=1)
-        stamp, valid = header_stamps(block, header) if header else (logged[block.rows], np.ones(len(values), bool))
-        frames = np.array(block.text(f"{header}.frame_id") if header else [""] * len(values))
-        for frame in sorted(set(frames[valid].tolist())):
-            chosen = valid & (frames == frame)
-            encoded = encode(stamp[chosen], values[chosen], target.layout, frame)
-            for row, data in zip(block.rows[chosen].tolist(), encoded, strict=True):
-                converted[row] = data
-    return converted
-
-
-def header_stamps(block: Block, header: str) -> tuple[IntArray, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+def header_stamps(block: Block, header: str) -> tuple[IntArray, BoolArray]:
     """Stamps (n,) in ns of the headers at a path, and which of them are valid."""
     seconds, nanoseconds = (block.number(f"{header}.stamp.{part}") for part in ("sec", "nanosec"))
     return seconds.astype(np.int64) * _NANO + nanoseconds.astype(np.int64), nanoseconds < _NANO

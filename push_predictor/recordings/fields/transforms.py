@@ -11,14 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.recordings.fields.columns import Block, blocks
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.fields.columns import Block, BlockReader
 from push_predictor.recordings.fields.message_text import STANDARD
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, poses_at
-from push_predictor.recordings.fields.sources import header_stamps
+from push_predictor.recordings.fields.sources import TF_TYPES, header_stamps
 from push_predictor.types import Array, IntArray
 
 WORLD = "world"
 _NUMBERS = 9  # of a transform: two of its stamp, three of its translation, four of its rotation
+_READERS = {name: BlockReader(name, STANDARD, ["transforms"]) for name in TF_TYPES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +68,14 @@ class TransformTree:
         names = [name for part in self._chain(frame, world) for name in part]
         return {name: self.edges[name] for name in names if not self.edges[name].static}
 
-    def poses(self, frame: str, world: str, leader: str = "") -> tuple[IntArray, Array, int]:
+    def poses(self, frame: str, world: str, leader: str) -> tuple[IntArray, Array, int]:
         """Stamps (n,) in ns and rows (n, 7) of a frame in another, and the number of stamps without a pose.
 
-        Stamps are those of the edge below `leader`, else of the edge with the most samples, in file order. The other
-        edges are interpolated there; a stamp outside an edge's time, or in a dropout of it, has no pose. Raises
-        TransformError.
+        Stamps are those of the edge below `leader`, in file order. The other edges are interpolated there; a stamp
+        outside an edge's time, or in a dropout of it, has no pose. Raises TransformError.
         """
         up, down = self._chain(frame, world)
-        moving = self.moving(frame, world)
-        finest = moving[leader] if leader else max(moving.values(), key=lambda edge: len(edge.stamp))
+        finest = self.edges[leader]
         rows = self._composed(up, down, finest.stamp, finest)
         inside = ~np.isnan(rows).any(axis=1) | np.isnan(finest.rows).any(axis=1)
         return finest.stamp[inside], rows[inside], int(np.sum(~inside))
@@ -120,21 +120,22 @@ class TransformTree:
         return found
 
 
-def read_tree(recorded: Sequence[tuple[Sequence[bytes], str, bool]]) -> TransformTree:
-    """The tree in messages of tf topics, each with its message type and whether it is the static topic.
+def read_tree(recorded: Sequence[tuple[Messages, bool]]) -> TransformTree:
+    """The tree in messages of tf topics, each with whether it is the static topic.
 
     Raises TransformError for a frame with two parents.
     """
     found: dict[str, list[_Part]] = {}
-    unreadable = 0
-    for messages, type_name, static in recorded:
+    unreadable = begin = 0
+    for messages, static in recorded:
         read = 0
-        for block in blocks(messages, type_name, STANDARD, ["transforms"]):
+        for block in _READERS[messages.type].blocks(messages):
             read += len(block.rows)
             for number in range(len(block.paths("transforms")) // _NUMBERS):
                 for child, part in _parts(block, f"transforms[{number}]", static):
-                    found.setdefault(child, []).append(part)
+                    found.setdefault(child, []).append(part._replace(rows=part.rows + begin))
         unreadable += len(messages) - read
+        begin += len(messages)
     return TransformTree({child: _edge(child, parts) for child, parts in found.items()}, unreadable)
 
 
@@ -161,7 +162,7 @@ class _Part(NamedTuple):
 def _parts(block: Block, path: str, static: bool) -> Iterator[tuple[str, _Part]]:
     """(child frame, samples) of one place in the list of transforms."""
     stamp, valid = header_stamps(block, f"{path}.header")
-    poses = np.stack([block.number(name) for name in block.paths(f"{path}.transform")], axis=1)
+    poses = block.numbers(block.paths(f"{path}.transform"))
     # ROS 1 writes names of frames with a leading slash as well.
     parents, children = (
         np.array([name.strip("/") for name in block.text(f"{path}.{field}")])

@@ -25,7 +25,7 @@ class Candidate:
     """A mechanism (None: the generic polynomial) whose strength depends on a covariate through one basis.
 
     response (n, 3, p): standardised outcome per unit of the parameters. values (n, m): the basis at the windows.
-    nuisance (3 n, q): orthonormal columns that the candidate is projected off, see nuisance.py. own: whether the
+    nuisance (3 n, q): orthonormal columns that the candidate is projected off, see Nuisance. own: whether the
     covariate is a function of the inputs of a learnt base, as the side is where the base folds none.
     """
 

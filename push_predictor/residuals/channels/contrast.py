@@ -17,17 +17,55 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import blocks_of
+from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.selection.screening import Screened, block_scores, screen
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000
 FOLDS = 5
-GROSS = 5.0  # robust standard deviations; windows farther out are rejected
+GROSS = 5.0  # robust standard deviations; guards against gross errors: windows farther out are rejected
 TRIMMING_ROUNDS = 4
-FEWEST_PUSHES = 12  # of a training table that is used
 MAD_TO_SD = 1.4826
 COLLINEAR = 1e-6  # share of a column's square that the controls do not explain; less counts as collinear
+
+
+@dataclass(frozen=True)
+class ChannelEffect:
+    """An effect on a recorded quantity, with its family-wise p value; rivals: what fits equally well.
+
+    parameters: of a measurement error, the slider's stream against the robot's; of surface_friction, the relative
+    change of the force from the 5th to the 95th percentile of the covariate, or since training where it is constant; of
+    wrench_bias, what the force reads too much (N, N) along the world's axes.
+    """
+
+    mechanism: str
+    covariate: str
+    basis: str
+    parameters: tuple[Sized, ...]
+    p_value: float
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The parameters' estimates, as measurement.correct takes them."""
+        return tuple(parameter.value for parameter in self.parameters)
+
+
+@dataclass(frozen=True)
+class ChannelFinding:
+    """Effects on a recorded quantity, strongest first, and all candidates tested.
+
+    zero: a bias of the force sensor that the windows do not contain.
+    """
+
+    effects: tuple[ChannelEffect, ...]
+    tested: tuple[Tested, ...]
+    zero: ChannelEffect | None = None
+
+
+NOTHING_FOUND = ChannelFinding((), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +165,13 @@ def estimate_with_draws(
     weights = _weights(len(score), seed)
     draws = _solved(np.tensordot(weights, square, axes=1), weights @ score)
     return _solved(square.sum(axis=0)[None], score.sum(axis=0)[None])[0], draws
+
+
+def sized(parameters: Sequence[tuple[str, str]], values: Array, draws: Array) -> tuple[Sized, ...]:
+    """Parameters (name, unit) with estimates (p,) and the 95 % intervals of draws (d, p)."""
+    low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+    each = zip(parameters, values.tolist(), low.tolist(), high.tolist(), strict=True)
+    return tuple(Sized(name, value, least, most, unit) for (name, unit), value, least, most in each)
 
 
 def is_identifiable(each: Contrast, controls: Array) -> bool:

@@ -11,21 +11,27 @@ the contact under its force.
 
 The clock is judged on windows after a push's first: at first contact the slider is at rest, and a late stream still
 shows it at rest. Later windows are valid under acceleration too; v is the speed at the window's start.
+
+An error is corrected in the stream where it occurred, so that the windows can be cut again: the tracker's stream is
+moved to the robot's frame and clock, a tool offset is subtracted from the pusher's stream, a bias from the wrench.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
+    ChannelEffect,
+    ChannelFinding,
     Contrast,
     Stacked,
     best_and_rivals,
@@ -35,11 +41,13 @@ from push_predictor.residuals.channels.contrast import (
     is_identifiable,
     robust_deviation,
     screen_contrasts,
+    sized,
     stacked,
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.outcome import Sized, Tested
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
+from push_predictor.residuals.outcome import Tested
 from push_predictor.types import Array, BoolArray, IntArray
 
 NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")
@@ -50,45 +58,7 @@ PARAMETERS = {
 }
 ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
 MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
-FEWEST_ROWS = 2.0  # per column
-CORNER = 0.002  # m; contacts closer to a corner may be on either side of it
-LEAST_SIZE = 1.0  # root mean square effect on the gap, in units of the gap's noise
-
-
-@dataclass(frozen=True)
-class MeasurementFault:
-    """A measurement error with its parameters (slider's stream against the robot's) and family-wise p value.
-
-    rivals: errors that fit equally well. size: root mean square effect on the gap, m (on the force, N). covariate,
-    basis: what it depends on.
-    """
-
-    mechanism: str
-    parameters: tuple[Sized, ...]
-    p_value: float
-    rivals: tuple[str, ...]
-    size: float
-    covariate: str = CONSTANT
-    basis: str = "constant"
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """The parameters' estimates, as corrections.correct takes them."""
-        return tuple(parameter.value for parameter in self.parameters)
-
-
-@dataclass(frozen=True)
-class MeasurementFinding:
-    """Errors found, strongest first, and all candidates tested.
-
-    noise: robust standard deviation of the gap, m. against_training: whether the gap of the training windows was
-    subtracted.
-    """
-
-    errors: tuple[MeasurementFault, ...]
-    tested: tuple[Tested, ...]
-    noise: float
-    against_training: bool
+CORNER = 0.002  # m; guards against a wrong normal: contacts closer to a corner may be on either side of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +78,7 @@ class _Gap:
 
 def measurement_errors(
     windows: PushTable, baseline: PushTable | None, rig: Rig, alpha: float = 0.01, seed: int = 0
-) -> MeasurementFinding | None:
+) -> ChannelFinding | None:
     """Measurement errors in new windows that the baseline (the model's training windows) does not have.
 
     None if the windows do not determine them: no contact_gap, no pose, or too few windows.
@@ -118,10 +88,10 @@ def measurement_errors(
     base = None if baseline is None else _off_corners(baseline, rig.outline)
     both = stacked(_off_corners(windows, rig.outline), base, NEEDED)
     gap = _gap_of(both, rig.outline)
-    if len(gap.z) < FEWEST_ROWS * gap.controls.shape[1] or not gap.tried:
+    if len(both.tables[-1].pushes) < FEWEST_PUSHES or not gap.tried:
         return None
     gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.controls))
-    return _searched(gap, alpha, seed, len(both.tables) > 1)
+    return _searched(gap, alpha, seed)
 
 
 def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
@@ -189,19 +159,10 @@ def _settled(table: PushTable) -> Array:
     return np.ones(len(table)) if since is None else (since >= SETTLED).astype(np.float64)
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A contrast found, its family-wise p value, and the names of its rivals."""
-
-    contrast: Contrast
-    p_value: float
-    rivals: tuple[str, ...]
-
-
-def _searched(gap: _Gap, alpha: float, seed: int, against_training: bool) -> MeasurementFinding:
+def _searched(gap: _Gap, alpha: float, seed: int) -> ChannelFinding:
     """Select errors one by one, strongest first, each with those before it regressed out."""
     controls, remaining = gap.controls, list(gap.tried)
-    found: list[_Found] = []
+    found: list[tuple[Contrast, float, tuple[str, ...]]] = []
     tested: tuple[Tested, ...] = ()
     while remaining:
         p_values = screen_contrasts(gap.z, remaining, controls, gap.block, seed).p_value.tolist()
@@ -211,11 +172,10 @@ def _searched(gap: _Gap, alpha: float, seed: int, against_training: bool) -> Mea
             break
         alike = best_and_rivals(gap.z, [t for t in remaining if t.mechanism in significant], controls, gap.block, seed)
         best = alike[0]
-        found.append(_Found(best, significant[best.mechanism], _names(alike)))
+        found.append((best, significant[best.mechanism], _names(alike)))
         controls = np.column_stack([controls, best.columns[:, 0]])
         remaining = [t for t in remaining if t is not best and is_identifiable(t, controls)]
-    errors, noise = _sized(gap, found, seed)
-    return MeasurementFinding(errors, tested, noise, against_training)
+    return ChannelFinding(_sized(gap, found, controls, seed) if found else (), tested)
 
 
 def _names(alike: Sequence[Contrast]) -> tuple[str, ...]:
@@ -223,28 +183,72 @@ def _names(alike: Sequence[Contrast]) -> tuple[str, ...]:
     return tuple(name for each in names for name in (each, *ALIKE.get(each, ())) if name != names[0])
 
 
-def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementFault, ...], float]:
-    """Joint estimates of all errors; those smaller than the noise of a single window are dropped."""
-    columns = [f.contrast.columns for f in found]
-    residualizer = Residualizer(np.column_stack([gap.controls, *(c[:, 0] for c in columns)]))
-    noise = robust_deviation(residualizer(gap.z)[:, 0])
-    if not found:
-        return (), noise
-    nothing = np.zeros((len(gap.z), 0))
-    values, draws = estimate_with_draws(gap.z, np.concatenate(columns, axis=2), gap.controls, nothing, gap.block, seed)
+def _sized(
+    gap: _Gap, found: Sequence[tuple[Contrast, float, tuple[str, ...]]], controls: Array, seed: int
+) -> tuple[ChannelEffect, ...]:
+    """Joint estimates of all errors; those with a smaller effect than the noise of a single window are dropped."""
+    noise = robust_deviation(Residualizer(controls)(gap.z)[:, 0])
+    nothing, columns = np.zeros((len(gap.z), 0)), np.concatenate([each.columns for each, _, _ in found], axis=2)
+    values, draws = estimate_with_draws(gap.z, columns, gap.controls, nothing, gap.block, seed)
     errors, begin = [], 0
-    for each in found:
-        part = slice(begin, begin := begin + each.contrast.columns.shape[2])
-        size = float(np.sqrt(np.mean((each.contrast.columns[gap.new, 0] @ values[part]) ** 2)))
-        if size >= LEAST_SIZE * noise:
-            parameters = _parameters(each.contrast.mechanism, values[part], draws[:, part])
-            errors.append(MeasurementFault(each.contrast.mechanism, parameters, each.p_value, each.rivals, size))
-    return tuple(errors), noise
+    for each, p_value, rivals in found:
+        part = slice(begin, begin := begin + each.columns.shape[2])
+        if np.sqrt(np.mean((each.columns[gap.new, 0] @ values[part]) ** 2)) >= noise:
+            parameters = sized(PARAMETERS[each.mechanism], values[part], draws[:, part])
+            errors.append(ChannelEffect(each.mechanism, CONSTANT, "constant", parameters, p_value, rivals))
+    return tuple(errors)
 
 
-def _parameters(mechanism: str, values: Array, draws: Array) -> tuple[Sized, ...]:
-    low, high = np.quantile(draws, [0.025, 0.975], axis=0)
-    return tuple(
-        Sized(name, float(values[k]), float(low[k]), float(high[k]), unit)
-        for k, (name, unit) in enumerate(PARAMETERS[mechanism])
-    )
+# --- correction ------------------------------------------------------------------------------------------------------
+
+
+def correct(recording: Recording, mechanism: str, values: Sequence[float]) -> Recording:
+    """The recording without a measurement error; values: its parameters, as in ChannelEffect.values.
+
+    clock_offset (s): the slider's stamps are late. frame_rotation (rad): the slider appears rotated about the world's
+    origin. frame_shift (m, m): the slider appears shifted. tool_offset (m, m): the pusher appears shifted. wrench_bias
+    (N, N): the sensor reads too much, in world axes. Raises KeyError for another mechanism.
+    """
+    corrected = CORRECTIONS[mechanism](recording, *values)
+    sizes = ", ".join(f"{value:.3g}" for value in values)
+    return replace(corrected, notes=(*recording.notes, f"corrected for {mechanism} ({sizes})"))
+
+
+def _clock(recording: Recording, lateness: float) -> Recording:
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, stamp=slider.stamp - round(lateness * 1e9)))
+
+
+def _rotation(recording: Recording, turn: float) -> Recording:
+    slider = recording.slider
+    place = rotate(np.column_stack([slider.x, slider.y]), np.array(-turn))
+    heading = wrap_angle(slider.heading - turn)
+    return replace(recording, slider=replace(slider, x=place[:, 0], y=place[:, 1], heading=heading))
+
+
+def _shift(recording: Recording, x: float, y: float) -> Recording:
+    return replace(recording, slider=_moved(recording.slider, -x, -y))
+
+
+def _tool(recording: Recording, x: float, y: float) -> Recording:
+    return replace(recording, pusher=_moved(recording.pusher, -x, -y))
+
+
+def _bias(recording: Recording, x: float, y: float) -> Recording:
+    wrench = recording.wrench
+    if wrench is None:
+        return recording
+    return replace(recording, wrench=replace(wrench, fx=wrench.fx - x, fy=wrench.fy - y))
+
+
+def _moved(stream: PoseStream, x: float, y: float) -> PoseStream:
+    return replace(stream, x=stream.x + x, y=stream.y + y)
+
+
+CORRECTIONS: dict[str, Callable[..., Recording]] = {
+    "clock_offset": _clock,
+    "frame_rotation": _rotation,
+    "frame_shift": _shift,
+    "tool_offset": _tool,
+    "wrench_bias": _bias,
+}

@@ -22,21 +22,19 @@ from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fi
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.gate import Gate
-from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
+from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED, REJECTED
+from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
-NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
-FEWEST_PUSHES = 12  # whose variance is judged, and of training with which a constant effect is compared
-LEFT = 0.15  # of an effect's gain: mechanics that are nearly right leave so much of it
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
-CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,21 +120,20 @@ def motion_effects(
         raise RequestError("covariate", ", ".join(names or ()), "one that the inputs do not change, as they shifted")
     found = search(Gate(evidence, candidates, inputs, share, seed, baseline), _rows(model, evidence, baseline, inputs))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
-    notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     terms = _judged(found, evidence, inputs, baseline)
     first = terms[0].term if terms else None
     return MotionFinding(
         terms=terms,
-        equivalent=first.naming.covariates[1:] if first else spread.rivals if notable else (),
+        equivalent=first.naming.covariates[1:] if first else spread.rivals,
         mechanisms=tuple(name for name in first.naming.mechanisms[1:] if name is not None) if first else (),
         tested=_tested(found),
         deviation=baseline.deviation if inputs.learnt else None,
         minimum_detectable={
-            **detectable_json(minimum_detectable(found, evidence, inputs, share, baseline)),
+            **minimum_detectable(found, evidence, inputs, share, baseline),
             **_detectable_noise(spread),
         },
         remaining=_remaining(found, share),
-        variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
+        variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in spread.found),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
     )
@@ -174,7 +171,7 @@ def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseli
 def _is_left(term: Term, larger: Sequence[Term]) -> bool:
     """Whether a term is what the fit of a larger one leaves: small beside one with its mechanism or covariate."""
     return any(
-        term.gain < LEFT * other.gain
+        term.gain < MOST_UNEXPLAINED * other.gain
         and (term.best.mechanism == other.best.mechanism or {*term.naming.covariates} & {*other.naming.covariates})
         for other in larger
     )
@@ -204,7 +201,7 @@ def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> li
 def _differ(one: Effect, other: Effect) -> bool:
     change, covariance = one.coefficients - other.coefficients, one.covariance + other.covariance
     square = float(change @ np.linalg.pinv(covariance, hermitian=True) @ change)
-    return bool(chdtrc(len(change), square) <= CHANGED)
+    return bool(chdtrc(len(change), square) <= REJECTED)
 
 
 def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
@@ -236,7 +233,7 @@ def _spread(
     baseline: Baseline,
 ) -> VarianceFinding:
     if len(evidence.table.pushes) < FEWEST_PUSHES:
-        return VarianceFinding((), ())
+        return VarianceFinding()
     return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
 
 

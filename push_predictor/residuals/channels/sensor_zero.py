@@ -17,35 +17,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.channels.contrast import ChannelEffect
 from push_predictor.residuals.evidence.drivers import CONSTANT, SENSOR_ZERO
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
 BETWEEN_SESSIONS = 0.02  # N, standard deviation of the zero of a sound sensor, per axis
 PROGRESS = "push_index"  # along which a step within the session is placed
-FEWEST_PUSHES = 12  # of a part of the session or of training
 PLACES = 10  # at which a step is tried
 NORMAL_95 = 1.96
-NAMES = ("force read too much along x", "force read too much along y")
+WRENCH_BIAS = "wrench_bias"
+BIAS = (("force read too much along x", "N"), ("force read too much along y", "N"))  # its parameters
 
 
-@dataclass(frozen=True)
-class ZeroShift:
-    """A change of the sensor's zero along the world's axes (x, y), with its p value.
-
-    covariate: model_inputs if it is constant since training, push_index for a step within the session.
-    """
-
-    covariate: str
-    basis: str
-    parameters: tuple[Sized, ...]
-    p_value: float
-
-
-def zero_shift(windows: PushTable, baseline: PushTable | None) -> ZeroShift | None:
+def zero_shift(windows: PushTable, baseline: PushTable | None) -> ChannelEffect | None:
     """The most significant change of the zero, by chance with probability p_value as large anywhere.
 
+    Its covariate is model_inputs if it is constant since training, push_index for a step within the session.
     None if no push recorded it, or too few. A change since training is tried if the baseline has the zero, too.
     """
     now, before = _zeros(windows), None if baseline is None else _zeros(baseline)
@@ -58,7 +48,7 @@ def zero_shift(windows: PushTable, baseline: PushTable | None) -> ZeroShift | No
         return None
     best = max(tried, key=lambda change: change.log_evidence)
     shown = best if best.basis == "constant" else _placed(best, now)
-    return ZeroShift(best.covariate, best.basis, shown.parameters(), best.p_value)
+    return ChannelEffect(WRENCH_BIAS, best.covariate, best.basis, shown.parameters(), best.p_value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +90,7 @@ class _Change:
         half = NORMAL_95 * np.sqrt(np.diag(self.variance))
         return tuple(
             Sized(name, float(value), float(value - by), float(value + by), "N")
-            for name, value, by in zip(NAMES, self.size, half, strict=True)
+            for (name, _), value, by in zip(BIAS, self.size, half, strict=True)
         )
 
 

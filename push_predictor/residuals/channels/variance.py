@@ -24,19 +24,13 @@ from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference, raised
 from push_predictor.residuals.selection.power import QUANTILE
-from push_predictor.residuals.selection.screening import (
-    Controlled,
-    Scores,
-    Screened,
-    screen,
-    unit_scores,
-)
+from push_predictor.residuals.selection.screening import Controlled, Scores, Screened, screen, unit_scores
 from push_predictor.types import Array
 
 TINY = 1e-12
-MOST = 9.0  # of a square: three standard deviations
-ALL = "all"
-MATERIAL = 1.2  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
+MOST = 9.0  # of a square, three standard deviations: guards against a few windows far off
+TRIED = (OUTPUTS, *((name,) for name in OUTPUTS))  # all outputs, then each
+NOTABLE = 1.2  # least ratio: guards against a base that saw few pushes and misjudges its own noise a little
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,25 +50,18 @@ class VarianceEffect:
 
 @dataclass(frozen=True, eq=False)
 class VarianceFinding:
-    """Significant effects, strongest first, one per covariate; tested: all of them.
+    """Significant effects, strongest first, one per covariate.
 
     rivals: covariates that are no longer significant after the trend of the first is removed. detectable: the smallest
     ratio to training that would have been found with 80 % probability, NaN without training windows.
     """
 
-    found: tuple[VarianceEffect, ...]
-    tested: tuple[VarianceEffect, ...]
+    found: tuple[VarianceEffect, ...] = ()
     rivals: tuple[str, ...] = ()
     detectable: float = float("nan")
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    covariate: str
-    basis: DriverBasis
-    output: str
-    score: Scores
-    ratio: float
+Trial = tuple[VarianceEffect, Scores]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +112,8 @@ def variance_effects(
 def _trend(evidence: Evidence, z: Array, effect: VarianceEffect) -> Array:
     """Relative standard deviation (n, 3) of the residuals by an effect; 1 in outputs that it does not concern."""
     values = effect.basis.values(evidence.table.covariates, len(z))
-    on = np.array([name in effect.outputs for name in OUTPUTS])
-    size = _log_squares(z)[:, on].mean(axis=1)
+    on = _on(effect.outputs)
+    size = _log_squares(z) @ on / on.sum()
     design = np.column_stack([np.ones(len(values)), values])
     slope, *_ = np.linalg.lstsq(design, size, rcond=None)
     fitted = design @ slope
@@ -144,14 +131,13 @@ def _tested(
 ) -> VarianceFinding:
     squares = _Squares.of(model, evidence, z)
     trials = [t for name, basis in screening_bases(evidence.table, names) for t in _along(squares, name, basis)]
-    there = 0
     if baseline is not None:
         constant = _constant(model, evidence, z, baseline)
-        there = len(constant[0].score.rows) - len(trials[0].score.rows) if trials else 0
-        trials = [*(_padded(t, there) for t in trials), *constant]
+        there = len(constant[0][1].rows) - len(trials[0][1].rows) if trials else 0
+        trials = [*((tried, score.padded(there)) for tried, score in trials), *constant]
     if not trials:
-        return VarianceFinding((), ())
-    screened = screen([t.score for t in trials], seed)
+        return VarianceFinding()
+    screened = screen([score for _, score in trials], seed)
     if baseline is None:
         return _finding(trials, screened, alpha)
     detectable = _detectable(screened.threshold(alpha), evidence, z, baseline)
@@ -162,7 +148,7 @@ def _tested(
 
 def _against_training(
     model: PushModel,
-    trials: Sequence[_Trial],
+    trials: Sequence[Trial],
     screened: Screened,
     alpha: float,
     new: _Squares,
@@ -170,12 +156,12 @@ def _against_training(
     seed: int,
 ) -> Screened:
     """Raise p of what is found along covariates of training to that of the difference from training."""
-    found = [k for k, t in enumerate(trials) if screened.p_value[k] <= alpha and t.basis.drivers]
-    compared = [k for k in found if baseline.comparable(trials[k].basis)]
+    found = [k for k, (t, _) in enumerate(trials) if screened.p_value[k] <= alpha and t.basis.drivers]
+    compared = [k for k in found if baseline.comparable(trials[k][0].basis)]
     if not compared:
         return screened
-    before, outputs = _Squares.of(model, baseline.evidence, baseline.evidence.z), dict(_outputs())
-    every = {k: (trials[k].basis, outputs[trials[k].output]) for k in compared}
+    before = _Squares.of(model, baseline.evidence, baseline.evidence.z)
+    every = {k: (trials[k][0].basis, _on(trials[k][0].outputs)) for k in compared}
     changes = {k: difference(new.raw_scores(*each), before.raw_scores(*each)) for k, each in every.items()}
     return raised(screened, changes, seed)
 
@@ -187,7 +173,7 @@ def _detectable(threshold: float, evidence: Evidence, z: Array, baseline: Baseli
         size = _bounded_squares(residual).mean(axis=1)
         of_block = sums_by(block, (size / size.mean() - 1.0)[:, None])[:, 0]
         square += float(np.sum(of_block**2)) / len(size) ** 2
-    return max(MATERIAL, float(np.sqrt(1.0 + (threshold + QUANTILE) * np.sqrt(square))))
+    return max(NOTABLE, float(np.sqrt(1.0 + (threshold + QUANTILE) * np.sqrt(square))))
 
 
 def _log_squares(residual: Array) -> Array:
@@ -200,21 +186,21 @@ def _bounded_squares(residual: Array) -> Array:
     return np.asarray(np.minimum((residual / np.maximum(unit, TINY)) ** 2, MOST))
 
 
-def _along(squares: _Squares, name: str, basis: DriverBasis) -> list[_Trial]:
+def _along(squares: _Squares, name: str, basis: DriverBasis) -> list[Trial]:
     """One covariate against the variance of each output, and of all outputs."""
     values = basis.values(squares.table.covariates, len(squares.residual))
     size = _log_squares(squares.residual)
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
     trials = []
-    for output, on in _outputs():
-        scores = unit_scores(*squares.raw_scores(basis, on))
-        ratio = float(np.sqrt(np.prod(trend ** (2.0 * on / on.sum()))))
-        trials.append(_Trial(name, basis, output, scores, ratio))
+    for outputs in TRIED:
+        on = _on(outputs)
+        ratio = float(np.prod(trend ** (on / on.sum())))
+        trials.append((VarianceEffect(name, basis, outputs, 1.0, ratio), unit_scores(*squares.raw_scores(basis, on))))
     return trials
 
 
-def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline) -> list[_Trial]:
+def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline) -> list[Trial]:
     """The variance in the new data against that in training, with the inputs regressed out."""
     tables = (evidence.table, baseline.evidence.table)
     controls = inputs_basis(model, _inputs_of(tables)).columns
@@ -225,10 +211,11 @@ def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline
     squares = Controlled.of(_bounded_squares(np.vstack([z, baseline.evidence.z])), controls, block)
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
-    for output, on in _outputs():
-        scores = squares.unit_scores((on * new[:, None])[:, :, None])
+    for outputs in TRIED:
+        on = _on(outputs)
         strength = float(np.prod(ratio ** (on / on.sum())))
-        trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
+        tried = VarianceEffect(CONSTANT, DriverBasis("constant"), outputs, 1.0, strength)
+        trials.append((tried, squares.unit_scores((on * new[:, None])[:, :, None])))
     return trials
 
 
@@ -242,29 +229,15 @@ def _inputs_of(tables: tuple[PushTable, PushTable]) -> PushTable:
     )
 
 
-def _outputs() -> list[tuple[str, Array]]:
-    """Which outputs (3,) a trial concerns: all, then each."""
-    return [(ALL, np.ones(len(OUTPUTS))), *zip(OUTPUTS, np.eye(len(OUTPUTS)), strict=True)]
+def _on(outputs: tuple[str, ...]) -> Array:
+    """Which outputs (3,) an effect concerns."""
+    return np.array([float(name in outputs) for name in OUTPUTS])
 
 
-def _padded(trial: _Trial, rows: int) -> _Trial:
-    return replace(trial, score=trial.score.padded(rows))
-
-
-def _finding(trials: list[_Trial], screened: Screened, alpha: float) -> VarianceFinding:
-    ranked = sorted(range(len(trials)), key=lambda k: -screened.statistic[k])
+def _finding(trials: Sequence[Trial], screened: Screened, alpha: float) -> VarianceFinding:
     first: dict[str, VarianceEffect] = {}
-    for k in ranked:
-        first.setdefault(trials[k].covariate, _effect(trials, screened, k))
-    tested = tuple(first.values())
-    return VarianceFinding(tuple(s for s in tested if s.p_value <= alpha and _counts(s)), tested)
-
-
-def _counts(effect: VarianceEffect) -> bool:
-    return effect.covariate != CONSTANT or abs(np.log(effect.ratio)) > np.log(MATERIAL)
-
-
-def _effect(trials: list[_Trial], screened: Screened, k: int) -> VarianceEffect:
-    trial = trials[k]
-    outputs = OUTPUTS if trial.output == ALL else (trial.output,)
-    return VarianceEffect(trial.covariate, trial.basis, outputs, float(screened.p_value[k]), trial.ratio)
+    for k in sorted(range(len(trials)), key=lambda k: -screened.statistic[k]):
+        tried = replace(trials[k][0], p_value=float(screened.p_value[k]))
+        first.setdefault(tried.covariate, tried)
+    notable = (s for s in first.values() if s.p_value <= alpha and abs(np.log(s.ratio)) > np.log(NOTABLE))
+    return VarianceFinding(tuple(notable))

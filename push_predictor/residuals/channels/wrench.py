@@ -26,6 +26,9 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
+    NOTHING_FOUND,
+    ChannelEffect,
+    ChannelFinding,
     Contrast,
     Stacked,
     best_and_rivals,
@@ -34,62 +37,26 @@ from push_predictor.residuals.channels.contrast import (
     is_identifiable,
     robust_deviation,
     screen_contrasts,
+    sized,
     stacked,
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
-from push_predictor.residuals.channels.sensor_zero import zero_shift
+from push_predictor.residuals.channels.sensor_zero import BIAS, WRENCH_BIAS, zero_shift
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.selection.forms import step_places, step_places_near
 from push_predictor.types import Array, BoolArray, IntArray
 
-SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
-LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
-MOST_TERMS = 3
+SURFACE_FRICTION = "surface_friction"
 SIMPLEST_FIRST = ("linear", "step", "quadratic")  # forms of a change of the friction
 MOST_NEAR = 12  # places of a step that are tried near the best of the first
-PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
-FEWEST_PUSHES = 12
+PUSHES_PER_INPUT = 10  # of the controls: all windows of a push share a contact and an angle
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
 PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
-
-
-@dataclass(frozen=True)
-class WrenchEffect:
-    """An effect on the force, with its family-wise p value; rivals: covariates that fit equally well.
-
-    surface_friction: the parameter is the relative change of the force from the 5th to the 95th percentile of the
-    covariate, or relative to training where it is constant. wrench_bias: the parameters are the bias (N, N) along the
-    world's axes.
-    """
-
-    mechanism: str
-    covariate: str
-    basis: str
-    parameters: tuple[Sized, ...]
-    p_value: float
-    rivals: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class WrenchFinding:
-    """Effects on the force in contact, strongest first, and all candidates tested.
-
-    noise: robust standard deviation of the logarithm of the force between windows. against_training: whether the
-    relations in the training windows were subtracted. zero: a bias of the sensor that the windows do not contain.
-    """
-
-    effects: tuple[WrenchEffect, ...]
-    tested: tuple[Tested, ...]
-    noise: float
-    against_training: bool
-    zero: WrenchEffect | None = None
-
-
-NO_WRENCH = WrenchFinding((), (), float("nan"), False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +64,7 @@ class _Force:
     """z (n, 2): log load, and direction minus its prediction (rad), each in robust deviations, unit (2,).
 
     controls (n, m): of the model's inputs. level (n, 1): 1 on new windows, no column without training windows. block
-    (n,): of pushes. table: the new windows. stack, rows: all windows, and which of them are used.
+    (n,): of pushes. stack, rows: all windows, and which of them are used.
     """
 
     z: Array
@@ -106,10 +73,13 @@ class _Force:
     level: Array
     block: IntArray
     tried: tuple[Contrast, ...]
-    table: PushTable
-    against_training: bool
     stack: Stacked
     rows: BoolArray
+
+    @property
+    def table(self) -> PushTable:
+        """The new windows."""
+        return self.stack.tables[-1]
 
     @property
     def levelled(self) -> Array:
@@ -119,7 +89,7 @@ class _Force:
 
 def wrench_effects(
     table: PushTable, baseline: PushTable | None, mechanics: FittedMechanics, alpha: float = 0.01, seed: int = 0
-) -> WrenchFinding:
+) -> ChannelFinding:
     """Effects on the force of new windows that differ from the baseline (the model's training windows).
 
     Half of alpha is for the sensor's zero, where the windows contain it.
@@ -128,17 +98,15 @@ def wrench_effects(
     if zero is None:
         return _of_contact(table, baseline, mechanics, alpha, seed)
     found = _of_contact(table, baseline, mechanics, alpha / PARTS, seed)
-    shifted = WrenchEffect(WRENCH_BIAS, zero.covariate, zero.basis, zero.parameters, _of_channel(zero.p_value), ())
+    zero = replace(zero, p_value=_of_channel(zero.p_value))
     since = SESSION if zero.covariate == CONSTANT else zero.covariate
-    return WrenchFinding(
+    return ChannelFinding(
         effects=tuple(replace(effect, p_value=_of_channel(effect.p_value)) for effect in found.effects),
         tested=(
             *(replace(tried, p_value=_of_channel(tried.p_value)) for tried in found.tested),
-            Tested(WRENCH_BIAS, since, shifted.p_value),
+            Tested(WRENCH_BIAS, since, zero.p_value),
         ),
-        noise=found.noise,
-        against_training=found.against_training,
-        zero=shifted if shifted.p_value <= alpha else None,
+        zero=zero if zero.p_value <= alpha else None,
     )
 
 
@@ -149,38 +117,34 @@ def _of_channel(p_value: float) -> float:
 
 def _of_contact(
     table: PushTable, baseline: PushTable | None, mechanics: FittedMechanics, alpha: float, seed: int
-) -> WrenchFinding:
+) -> ChannelFinding:
     """Effects on the force while the pusher pushes."""
     if any(name not in table.covariates for name in FORCES):
-        return NO_WRENCH
+        return NOTHING_FOUND
     windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
     if len(windows.pushes) < FEWEST_PUSHES:
-        return NO_WRENCH
+        return NOTHING_FOUND
     force = _force_of(stacked(windows, base, FORCES), mechanics)
     return _searched(force, alpha, seed)
 
 
 def _pressing(table: PushTable) -> PushTable:
-    """Windows in which the pusher presses against the slider."""
-    if any(name not in table.covariates for name in FORCES) or not len(table):
-        return table
-    force = table.covariates["normal_force"]
-    return table.take(force > LEAST_FORCE * max(float(np.median(force)), np.finfo(float).tiny))
+    """Windows in which the pusher presses against the slider: the others have no load."""
+    return table.take(table.covariates["normal_force"] > 0.0) if set(FORCES) <= set(table.covariates) else table
 
 
 def _force_of(stack: Stacked, mechanics: FittedMechanics) -> _Force:
     each = [loads(table, mechanics) for table in stack.tables]
     z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
-    most = max(FEWEST_INPUTS, sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT)
+    most = sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT
     controls = stack.joined([inputs_of(table, mechanics, most) for table in stack.tables])
     unit = np.maximum([robust_deviation(column) for column in Residualizer(controls)(z).T], 1e-12)
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
     tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))
     rows = inliers(z / unit, np.zeros((len(z), 2, 0)), controls)
     kept = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
-    compared = len(stack.tables) > 1
     level, block = _level(stack)[rows], stack.block[rows]
-    return _Force(z[rows] / unit, unit, controls[rows], level, block, kept, stack.tables[-1], compared, stack, rows)
+    return _Force(z[rows] / unit, unit, controls[rows], level, block, kept, stack, rows)
 
 
 def _level(stack: Stacked) -> Array:
@@ -219,12 +183,12 @@ def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Contrast:
     return Contrast(WRENCH_BIAS, CONSTANT, DriverBasis("constant"), own, np.column_stack([_level(stack), in_both]))
 
 
-def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
+def _searched(force: _Force, alpha: float, seed: int) -> ChannelFinding:
     """Select effects, strongest first; the level of the force counts only if no covariate explains it."""
     z, remaining = force.z, list(force.tried)
-    effects: list[WrenchEffect] = []
+    effects: list[ChannelEffect] = []
     tested: tuple[Tested, ...] = ()
-    while remaining and len(effects) < MOST_TERMS:
+    while remaining:
         p_values = screen_contrasts(z, remaining, force.controls, force.block, seed).p_value.tolist()
         tested = tested or tuple(Tested(t.mechanism, t.covariate, p) for t, p in zip(remaining, p_values, strict=True))
         significant = [t for t, p in zip(remaining, p_values, strict=True) if p <= alpha]
@@ -236,13 +200,10 @@ def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
         remaining = [t for t in remaining if t is not best]
         best = _as_step(force, z, best, seed)
         values, draws = estimate_with_draws(z, best.columns, force.controls, best.shared, force.block, seed)
-        sized = _sized(force, best, values, draws)
-        effects.append(
-            WrenchEffect(best.mechanism, best.covariate, best.basis.name, sized, p_value, _names(best, alike))
-        )
+        size, names = _sized(force, best, values, draws), _names(best, alike)
+        effects.append(ChannelEffect(best.mechanism, best.covariate, best.basis.name, size, p_value, names))
         z = z - best.columns @ values
-    noise = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
-    return WrenchFinding(tuple(effects), tested, noise, force.against_training)
+    return ChannelFinding(tuple(effects), tested)
 
 
 def _chosen(force: _Force, z: Array, significant: Sequence[Contrast], seed: int) -> tuple[Contrast, list[Contrast]]:
@@ -284,16 +245,12 @@ def _names(best: Contrast, alike: Sequence[Contrast]) -> tuple[str, ...]:
 
 def _sized(force: _Force, best: Contrast, values: Array, draws: Array) -> tuple[Sized, ...]:
     if best.mechanism == WRENCH_BIAS:
-        low, high = np.quantile(draws, [0.025, 0.975], axis=0)
-        names = ("force read too much along x", "force read too much along y")
-        return tuple(Sized(n, float(values[k]), float(low[k]), float(high[k]), "N") for k, n in enumerate(names))
+        return sized(BIAS, values, draws)
     changes = np.concatenate([values[None], draws]) @ (_over_range(force, best) * force.unit[0]).T
     range_ = changes[:, 0] if changes.shape[1] == 1 else np.subtract(*np.quantile(changes, [0.95, 0.05], axis=1))
-    relative = np.expm1(range_)
-    low, high = np.quantile(relative[1:], [0.025, 0.975])
-    constant = best.covariate == CONSTANT
-    name = f"relative change of the force {'since training' if constant else 'over the range of its covariate'}"
-    return (Sized(name, float(relative[0]), float(low), float(high), "1"),)
+    relative = np.expm1(range_)[:, None]
+    over = "since training" if best.covariate == CONSTANT else "over the range of its covariate"
+    return sized([(f"relative change of the force {over}", "1")], relative[0], relative[1:])
 
 
 def _over_range(force: _Force, best: Contrast) -> Array:

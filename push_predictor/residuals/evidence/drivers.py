@@ -24,7 +24,7 @@ NO_CAUSES = (*of_kind("force"), *SENSOR_ZERO, *LOCAL, *FOLDED)
 CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)
-MOST_LEVELS = 12
+MOST_LEVELS = 12  # guards against a category that has a level for every few pushes: it would explain anything
 ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 

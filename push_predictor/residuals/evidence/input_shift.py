@@ -3,23 +3,27 @@
 
 """Whether new pushes lie outside the inputs that a model was trained on, or in a part of them only.
 
-Outside them the model's error is extrapolation. About the rest of them the new pushes say nothing.
+Outside them the model's error is extrapolation: a trace goes on there with mechanics, and noise in proportion to the
+travel. About the rest of them the new pushes say nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.types import Array, BoolArray
 
 SPEED_MARGIN = 0.15  # relative: speeds are estimated from few samples
-ANGLE_MARGIN = 0.1  # rad
-CONTACT_MARGIN = 0.03  # of the perimeter
-WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
+ANGLE_MARGIN = 0.1  # rad: guards against the noise of an estimated angle
+CONTACT_MARGIN = 0.03  # of the perimeter: guards against gaps between contacts that lie densely
+WIDEST_GAPS = 2.0  # of training between contacts: guards against new contacts amid sparse ones
 ONE_SIDED = 0.2  # share of training outside the new inputs from which these are a part of them only
 NOTABLE = 0.05  # share of the windows outside from which an input has shifted
 
@@ -118,3 +122,38 @@ def _usual_gap(places: Array) -> float:
 
 def _range(values: Array) -> tuple[float, float]:
     return float(values.min()), float(values.max())
+
+
+def about_mechanics(model: PushModel) -> PushModel:
+    """The model trained again on its own training windows, with fitted mechanics as its mean.
+
+    A learnt function of the inputs knows nothing outside them; mechanics do. Unchanged if it has mechanics already, or
+    effects.
+    """
+    predictor = model.predictor
+    if not (isinstance(predictor, GaussianProcessPredictor) and predictor.absorbs):
+        return model
+    options = TrainingOptions(seed=model.provenance.seed, mean="mechanics")
+    sources = model.provenance.sources
+    return train_model(model.training, model.rig, model.kind, name=model.name, sources=sources, options=options)
+
+
+def widened(evidence: Evidence, model: PushModel, shift: InputShift) -> Evidence:
+    """The evidence with predicted deviations in proportion to the tip's travel, where that is beyond training.
+
+    Unchanged if those of the model grow with the travel already.
+    """
+    if _grows(model) or not any(each.covariate == "velocity" and each.extrapolates for each in shift.inputs):
+        return evidence
+    longest = float(np.max(model.training.inputs[:, 0] * model.training.duration))
+    travel = evidence.table.inputs[:, 0] * evidence.table.duration
+    factor = np.where(shift.outside, np.maximum(travel / longest, 1.0), 1.0)
+    return replace(evidence, whitener=evidence.whitener / factor[:, None, None])
+
+
+def _grows(model: PushModel) -> bool:
+    """Whether predicted deviations grow with the travel: not if outcomes were learnt as they are, nor of mechanics."""
+    base = model.predictor.base
+    if isinstance(base, GaussianProcessPredictor):
+        return base.scaling.travel is not None
+    return not isinstance(base, MechanicsPredictor)

@@ -13,8 +13,9 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import BoolArray
 
+FEWEST_PUSHES = 12  # of a table, or of a part of one, that anything is concluded from
 BLOCK = 10  # pushes
-FEWEST_BLOCKS = 9  # with fewer pushes the blocks are smaller
+FEWEST_BLOCKS = 9  # guards against few pushes that all lie in analysis: their blocks are smaller
 EVERY = 3  # one block in so many is held out
 RULE = f"every third block of up to {BLOCK} successive pushes is held out"
 

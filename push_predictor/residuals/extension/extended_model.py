@@ -10,18 +10,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model
+from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
+from push_predictor.residuals.evidence.drivers import COUNT, DISTANCE, TIME
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import spread_rows, with_predictor
+from push_predictor.residuals.selection.search import Term
 
 
 def extend(
@@ -52,3 +56,24 @@ def _with_effects(predictor: Predictor, effects: tuple[Effect, ...], cross: Cros
     had = len(predictor.effects)
     moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
     return ExtendedPredictor(predictor.base, (*predictor.effects, *effects), np.ones(3), {**predictor.cross, **moved})
+
+
+def by_the_clock(term: Term, table: PushTable) -> Candidate:
+    """The candidate of a term; a step of count or distance that time explains as well is the same step of time.
+
+    An effect that grows keeps its covariate: a pause, in which time goes on alone, must not let it grow.
+    """
+    best = term.best
+    if best.basis.name != "step" or best.covariate not in (COUNT, DISTANCE) or TIME not in term.naming.covariates:
+        return best
+    elapsed, after = table.covariates[TIME], best.basis.values(table.covariates, len(table))[:, 0] > 0.0
+    before, since = float(elapsed[~after].max()), float(elapsed[after].min())
+    if before >= since:
+        return best
+    step = DriverBasis("step", (TIME,), place=0.5 * (before + since))
+    return replace(best, covariate=TIME, basis=step)  # with the same values
+
+
+def along(named: Candidate, effect: Effect) -> Effect:
+    """The effect along the covariate of the candidate that it was named after, which has the same values."""
+    return replace(effect, covariate=named.covariate, basis=named.basis)

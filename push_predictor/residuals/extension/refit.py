@@ -16,7 +16,7 @@ from push_predictor.models.pushes import Push
 from push_predictor.models.train import retrain_model, training_rows
 from push_predictor.recordings.table import PushTable
 
-FEWEST_ROWS, MOST_ROWS = 300, 500
+FEWEST_ROWS, MOST_ROWS = 300, 500  # guard against a refit from too few rows, and against hours of it
 
 
 def refit_base(model: PushModel, table: PushTable) -> PushModel:

@@ -76,8 +76,8 @@ def _of_motion(motion: MotionFinding) -> list[str]:
 def _of_other_channels(found: Searched) -> list[str]:
     motion, measured, forces = found.motion, found.measured, found.forces
     notes = []
-    if measured is not None and measured.errors:
-        errors = listed([mechanism_phrase(error.mechanism) for error in measured.errors])
+    if measured is not None and measured.effects:
+        errors = listed([mechanism_phrase(error.mechanism) for error in measured.effects])
         notes.append(
             f"The gap between pusher and slider suggests {errors}. Correcting for it does not improve the predictions."
         )

@@ -14,8 +14,12 @@ from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
-from push_predictor.residuals.reporting.figures.key import key_figure
+from push_predictor.residuals.reporting.figures.gallery import (
+    calibration_figures,
+    effect_figures,
+    error_figure,
+    key_figure,
+)
 from push_predictor.residuals.reporting.figures.maps import map_figures
 from push_predictor.residuals.reporting.phrases import count, effect_phrase
 from push_predictor.residuals.reporting.rivals import advice, rivals

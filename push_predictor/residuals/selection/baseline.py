@@ -20,18 +20,16 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.enumeration import usable
-from push_predictor.residuals.candidates.nuisance import Nuisance
+from push_predictor.residuals.candidates.enumeration import Nuisance, usable
 from push_predictor.residuals.evidence.drivers import OF_SESSION
 from push_predictor.residuals.evidence.input_shift import among
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
+from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
 from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, Screened, raw_scores, screen
 from push_predictor.types import Array
-
-FEWEST_COMPARED = 30  # training pushes among the new inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +116,7 @@ def baseline_of(model: PushModel, mechanics: FittedMechanics, inputs: Array | No
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
     rows = np.ones(len(table), dtype=np.bool_) if inputs is None else among(table.inputs, inputs)
-    if len(np.unique(table.push_id[rows])) < FEWEST_COMPARED:
+    if len(np.unique(table.push_id[rows])) < FEWEST_PUSHES:
         rows[:] = True
     return Baseline(evidence.take(rows), inputs_basis(model, table.take(rows)))
 

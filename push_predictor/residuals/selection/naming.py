@@ -19,7 +19,7 @@ from push_predictor.residuals.candidates.joint_fit import Fit, standard_error
 from push_predictor.types import Array
 
 REJECTED = 0.01  # probability that a rival which is rejected is the right one
-MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain
+MOST_UNEXPLAINED = 0.15  # of the gain along a covariate: mechanics that are nearly right leave as much of an effect
 
 
 @dataclass(frozen=True, eq=False)

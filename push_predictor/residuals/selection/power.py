@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,25 +24,14 @@ from push_predictor.types import Array, IntArray
 QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
 
 
-@dataclass(frozen=True)
-class Detectable:
-    """The size found with 80 % probability, in the mechanism's least favourable direction.
-
-    If the effect depends on a covariate, the size is per standard deviation of the covariate.
-    """
-
-    mechanism: str
-    covariate: str
-    value: float
-    unit: str
-
-
 def minimum_detectable(
     found: SearchResult, evidence: Evidence, inputs: InputsBasis, alpha: float, baseline: Baseline | None = None
-) -> list[Detectable]:
-    """For every mechanism the smallest detectable constant effect, then that along the strongest covariate.
+) -> dict[str, Mapping[str, object]]:
+    """By mechanism the size of a constant effect that is found with 80 % probability, its unit and covariate.
 
-    Sizes beyond what a rig can have are dropped: no plausible effect of that mechanism could have been found.
+    The size is that in the mechanism's least favourable direction. Under "driven" that along the strongest covariate,
+    per standard deviation of it. Sizes beyond what a rig can have are dropped: no plausible effect of that mechanism
+    could have been found.
     """
     ordered = sorted(zip(found.first.statistic, found.candidates, strict=True), key=lambda pair: -pair[0])
     driven = [c for _, c in ordered if c.kind != "constant" and c.basis.name == "linear"]
@@ -52,23 +40,16 @@ def minimum_detectable(
     threshold = found.first.threshold(alpha)
     kinds = {c.kind for c in chosen}
     seen = {kind: Controlled.of(found.unexplained, controls_for(kind, inputs), evidence.block) for kind in kinds}
-    sizes = [(c, _size(c, seen[c.kind], threshold, baseline)) for c in chosen]
-    return [
-        Detectable(str(c.mechanism), c.covariate, value, mechanism_named(str(c.mechanism)).parameters[0].unit)
-        for c, value in sizes
-        if mechanism_named(str(c.mechanism)).plausible(np.array([[value]]))
-    ]
-
-
-def detectable_json(sizes: list[Detectable]) -> dict[str, Mapping[str, object]]:
-    """By mechanism: value, unit and covariate of the constant effect; under "driven" that along a covariate."""
     entries: dict[str, Mapping[str, object]] = {}
-    for size in sizes:
-        entry = {"value": size.value, "unit": size.unit, "covariate": size.covariate}
-        if size.mechanism in entries:
-            entry["per"] = f"standard deviation of {size.covariate}"
-            entry = {**entries[size.mechanism], "driven": entry}
-        entries[size.mechanism] = entry
+    for c in chosen:
+        mechanism, value = mechanism_named(str(c.mechanism)), _size(c, seen[c.kind], threshold, baseline)
+        if not mechanism.plausible(np.array([[value]])):
+            continue
+        entry = {"value": value, "unit": mechanism.parameters[0].unit, "covariate": c.covariate}
+        if mechanism.name in entries:
+            entry["per"] = f"standard deviation of {c.covariate}"
+            entry = {**entries[mechanism.name], "driven": entry}
+        entries[mechanism.name] = entry
     return entries
 
 

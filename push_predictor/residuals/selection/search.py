@@ -37,8 +37,7 @@ MOST_EXACT = 7  # labels that are fitted exactly, by their gain to first order
 CLOSE = 0.4  # of the best gain to first order: less is not fitted exactly
 MOST_MOVES = 3  # of a step's place
 MOST_ROUNDS = 6  # of moves after an addition
-HOPELESS = 0.5  # p from which nothing can be significant
-OBVIOUS, SURE = 30.0, 3.5  # nats, and standard errors: a few pushes far off gain as much
+OBVIOUS = 3.5  # standard errors of a gain: guards against a few pushes far off, which gain much and prove little
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 Key = tuple[str | None, str, DriverBasis]
 
@@ -269,14 +268,13 @@ class _Search:
         """
         z = self._unexplained(fit)
         first, few = self.gate.screened(z), int(self.gate.evidence.block.max()) + 1 < FEWEST_BLOCKS
-        if not few or not self.gate.alpha < first.p_value.min() <= HOPELESS:
+        if not few or first.p_value.min() <= self.gate.alpha:
             return first
-        labels = {
-            c.label: p for c, p in zip(self.gate.candidates, first.p_value.tolist(), strict=True) if p <= HOPELESS
-        }
+        order = np.argsort(-first.statistic, kind="stable").tolist()
+        labels = {self.gate.candidates[k].label: float(first.p_value[k]) for k in order}
         best = replace(self, passed=labels)._best(fit, chosen)
         gains = np.zeros(1) if best is None else best.fit.scores - fit.scores
-        if best is None or gains.sum() < max(OBVIOUS, SURE * standard_error(gains)):
+        if best is None or gains.sum() < OBVIOUS * standard_error(gains):
             return first
         again, p_value = self.gate.screened(z, self._unexplained(best.fit)), first.p_value.copy()
         same = [k for k, c in enumerate(self.gate.candidates) if c.label == best.candidate.label]

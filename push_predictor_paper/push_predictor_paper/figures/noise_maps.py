@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.push_maps import ColourScale
+from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid, outside_legend
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid

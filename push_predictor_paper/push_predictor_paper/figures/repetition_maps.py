@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.push_maps import ColourScale, colour_scale
-from push_predictor.evaluation.report.figures.slider import magnification, paint_slider, start_pose
+from push_predictor.evaluation.report.figures.ellipses import magnification, paint_slider, start_pose
+from push_predictor.evaluation.report.maps import ColourScale, colour_scale
 from push_predictor.geometry.frames import to_world
 from push_predictor.recordings.rig import Rig
 from push_predictor.reporting.canvas import EMPTY, OBSERVED, SYMBOLS, UNIT_NAMES, UNITS, outside_legend

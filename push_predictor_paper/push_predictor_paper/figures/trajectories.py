@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.ellipses import ellipse
-from push_predictor.evaluation.report.figures.slider import start_pose
+from push_predictor.evaluation.report.figures.ellipses import ellipse, start_pose
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.recordings.rig import Rig
 from push_predictor.reporting.canvas import COLOURS, START, grid, outside_legend

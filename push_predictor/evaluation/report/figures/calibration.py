@@ -12,13 +12,17 @@ import numpy as np
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, pit
-from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
+from push_predictor.reporting.canvas import COLOURS, SYMBOLS
+from push_predictor.reporting.chart import Band, Chart, Line, Mark
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+NAMES = ("Δx", "Δy", "Δθ")
+KINDS = ("fit", "dy", "dtheta")  # colours of dx, dy, dtheta in charts
+PERCENT = 100.0
 LEVELS = np.linspace(0.02, 0.98, 49)
 WINDOWS_PER_BAR = 10
 FEWEST_BARS, MOST_BARS = 4, 10
@@ -26,23 +30,31 @@ DRAWS = 400
 NORMAL_95 = 1.96
 
 
-def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None:
-    """A row per model: the coverage curve and a PIT histogram per output."""
-    axes = figure.subplots(len(comparisons), 4, squeeze=False, width_ratios=(1.25, 1.0, 1.0, 1.0))
+def coverage_chart(comparison: Comparison) -> Chart:
+    """Observed against promised share for each output, in percent, with bands from resampling whole pushes."""
+    levels = PERCENT * LEVELS
+    share, low, high = (PERCENT * part for part in coverage_curve(comparison))
+    bands: list[Mark] = [Band(kind, levels, low[:, k], high[:, k]) for k, kind in enumerate(KINDS)]
+    lines = [Line(kind, levels, share[:, k], name=NAMES[k]) for k, kind in enumerate(KINDS)]
+    ends = np.array([0.0, PERCENT])
+    promised = Line("zero", ends, ends, name="as promised")
+    label = f"Share of outcomes inside the predicted intervals of {comparison.model}, by their nominal share"
+    limits = (0.0, PERCENT), (0.0, PERCENT)
+    return Chart(label, "promised share (%)", "observed share (%)", *limits, (*bands, promised, *lines))
+
+
+def paint_pit(figure: Figure, comparisons: Sequence[Comparison]) -> None:
+    """A row per model: a histogram of the probability integral transform (PIT) per output."""
+    axes = figure.subplots(len(comparisons), 3, squeeze=False)
     for row, comparison in zip(axes, comparisons, strict=True):
-        _paint_coverage(row[0], comparison)
         values = pit(comparison)
         tallest = max(histogram(values[:, k])[0].max() for k in range(3))
-        for k, ax in enumerate(row[1:]):
+        for k, ax in enumerate(row):
             _paint_pit(ax, values[:, k], comparison.push_id, k, tallest)
-        row[0].set_ylabel(f"{comparison.model}\nobserved share")
-        row[1].set_ylabel("windows")
-    for k, ax in enumerate(axes[0, 1:]):
+        row[0].set_ylabel(f"{comparison.model}\nwindows")
+    for k, ax in enumerate(axes[0]):
         ax.set_title(f"PIT of {SYMBOLS[k]}")
-    axes[0, 0].set_title("coverage")
-    axes[0, 0].legend(loc="upper left", handlelength=2.2, borderaxespad=0.2)
-    axes[-1, 0].set_xlabel("nominal share")
-    for ax in axes[-1, 1:]:
+    for ax in axes[-1]:
         ax.set_xlabel("predicted probability")
 
 
@@ -75,18 +87,6 @@ def expected_counts(values: Array, push_id: np.ndarray) -> tuple[float, float]:
     away = found - found.mean(axis=1, keepdims=True)
     middle, half = len(values) / bars, NORMAL_95 * float(np.sqrt(np.sum(away**2) / bars))
     return max(middle - half, 0.0), middle + half
-
-
-def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
-    share, low, high = coverage_curve(comparison)
-    grid(ax)
-    ax.plot([0.0, 1.0], [0.0, 1.0], color="0.2", linewidth=0.8, linestyle=":")
-    for k, (colour, style) in enumerate(zip(COLOURS, ("-", "--", "-."), strict=True)):
-        if len(set(comparison.push_id.tolist())) > 1:
-            ax.fill_between(LEVELS, low[:, k], high[:, k], color=colour, alpha=0.12, linewidth=0.0)
-        ax.plot(LEVELS, share[:, k], color=colour, linestyle=style, linewidth=1.4, label=SYMBOLS[k])
-    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
-    ax.set_aspect("equal")
 
 
 def _paint_pit(ax: Axes, values: Array, push_id: np.ndarray, output: int, tallest: float) -> None:

@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.calibration import paint_calibration
-from push_predictor.evaluation.report.figures.ellipses import paint_examples
-from push_predictor.evaluation.report.figures.nearby import ENOUGH, examples
-from push_predictor.evaluation.report.figures.push_maps import Panel, paint_maps
+from push_predictor.evaluation.report.figures.calibration import paint_pit
+from push_predictor.evaluation.report.figures.ellipses import ENOUGH, examples, paint_examples
 from push_predictor.evaluation.report.figures.residuals import paint_residuals, time_axis
 from push_predictor.evaluation.report.figures.tracks import paint_tracks
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     Condition,
+    Panel,
     PushMap,
     coarse_cells,
     commonest_condition,
     fine_cells,
     fold_order,
+    paint_maps,
     predicted_at_windows,
     push_map,
     recorded_map,
@@ -82,10 +82,10 @@ def example_pictures(out: Path, shown: Validation) -> list[Picture]:
 
 
 def calibration_pictures(out: Path, shown: Validation) -> list[Picture]:
-    """Coverage curves and PIT histograms of all models."""
+    """PIT histograms of all models."""
     path, comparisons = out / "calibration.png", shown.comparisons
-    draw(path, (WIDTH, 2.45 * len(comparisons) + 0.3), lambda figure: paint_calibration(figure, comparisons))
-    alt = f"Coverage curves and PIT histograms of {', '.join(c.model for c in comparisons)}."
+    draw(path, (WIDTH, 2.45 * len(comparisons) + 0.3), lambda figure: paint_pit(figure, comparisons))
+    alt = f"PIT histograms of {', '.join(c.model for c in comparisons)}."
     return [Picture(path, alt, CALIBRATION_CAPTION)]
 
 
@@ -182,12 +182,10 @@ TRACK_CAPTION = (
     "counter-clockwise."
 )
 CALIBRATION_CAPTION = (
-    "A calibrated model has coverage on the diagonal and bars in the grey band. Left: share of outcomes inside the "
-    "predicted central interval, against its nominal share. Above the diagonal the predicted uncertainty is too "
-    "large, below it too small. Shaded: 95 % interval from resampling whole pushes. Right: probability integral "
-    "transform (PIT), the predicted probability of a smaller outcome. A hump: the predicted uncertainty is too large. "
-    "A trough: it is too small. A slope: the mean is biased. The band contains 95 % of the bars of a "
-    "calibrated model; it counts the windows of a push together, since they resemble each other."
+    "A calibrated model has bars in the grey band. Probability integral transform (PIT): predicted probability of a "
+    "smaller outcome. A hump: the predicted uncertainty is too large. A trough: it is too small. A slope: the mean is "
+    "biased. The band contains 95 % of the bars of a calibrated model; it counts the windows of a push together, since "
+    "they resemble each other."
 )
 RESIDUAL_CAPTION = (
     "A trend whose interval excludes zero is a drift. Top: observed against predicted outcome, with the predicted 95 % "

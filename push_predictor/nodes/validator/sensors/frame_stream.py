@@ -5,37 +5,31 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from time import monotonic
 
 from rclpy.node import Node
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.following import FollowingSubscription
-from push_predictor.nodes.validator.sensors.stream_source import DEPTH, SILENT, reliability_text, resolved
-from push_predictor.online.message_buffer import RECENT
+from push_predictor.nodes.validator.sensors.topic_stream import DEPTH, SILENT, as_messages, reliability_text
 from push_predictor.online.sensors.topic_report import TopicReport, stamp_figures
-from push_predictor.online.sensors.transform_buffer import TransformBuffer
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, encode
+from push_predictor.recordings.decoder.sources import STATIC
+from push_predictor.recordings.decoder.topic_input import RECENT
+from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.sources import TF_TYPES, Source
-from push_predictor.recordings.samples import SampleRules, check_samples
-from push_predictor.recordings.select import STATIC
-from push_predictor.types import Array, IntArray
 
 TYPE = TF_TYPES[0]
 NOT_INSTALLED = "install ros-jazzy-tf2-msgs, or run scripts/install_tf2_msgs.sh"
 
 
 class TransformTopics:
-    """The subscriptions to a tf topic and its static one.
+    """The subscriptions to a tf topic and its static one; messages go into the buffer.
 
-    frames: the streams that are frames in it; world and turned: as in TransformBuffer. Call `look` in the executor's
-    thread; not at the same time as `move`.
+    Call `look` in the executor's thread; not at the same time as `move`.
     """
 
-    def __init__(self, node: Node, topic: str, frames: Sequence[str], world: str, turned: str = "") -> None:
-        self.buffer = TransformBuffer(frames, world, turned)
+    def __init__(self, node: Node, topic: str, buffer: TransformBuffer) -> None:
+        self.buffer = buffer
         self.problem, self.refused = "No publisher.", False
         self.heard = monotonic()  # when the last message came, or the last publisher
         self._moving = FollowingSubscription(node, topic, DEPTH, earlier=False, overridable=True)
@@ -80,64 +74,31 @@ class TransformTopics:
     def move(self) -> None:
         """Move arrived messages from the middleware into the buffer."""
         for static, subscription in ((True, self._static), (False, self._moving)):
-            for taken in subscription.taken():
-                self.buffer.put(taken.message, static)
+            if taken := [*subscription.taken()]:
+                self.buffer.put(as_messages(taken, subscription.name, TYPE)[0], static, live=True)
                 self.heard = self.heard if static else monotonic()
 
 
-class FrameBuffer:
-    """The poses of a frame, checked as those of a topic."""
-
-    def __init__(self, transforms: TransformBuffer, frame: str, rules: SampleRules) -> None:
-        self._transforms, self._frame, self._rules = transforms, frame, rules
-        self._unusable: Counter[str] = Counter()
-
-    def __len__(self) -> int:
-        return len(self._transforms)
-
-    @property
-    def received(self) -> int:
-        """How many samples there have been."""
-        return self._transforms.received(self._frame)
-
-    @property
-    def dropped(self) -> int:
-        """Messages that were dropped before their poses were taken."""
-        return self._transforms.dropped
-
-    @property
-    def rejected(self) -> Counter[str]:
-        """Unusable samples, by reason."""
-        return self._unusable + self._transforms.rejected(self._frame)
-
-    def take(self) -> tuple[IntArray, Array]:
-        """Stamps (n,) in ns and numbers (n, 7) of the usable poses since the last call."""
-        stamp, rows = self._transforms.take(self._frame)
-        checked = check_samples(encode(stamp, rows, POSE_STAMPED, self._transforms.world), self._rules)
-        self._unusable.update(checked.rejected)
-        return checked.stamp[checked.usable], checked.values[checked.usable]
-
-
 class FrameStream:
-    """The poses of the frame of a source. name: slider or pusher."""
+    """What is known of the poses of a frame. name: of the source, after remapping."""
 
-    def __init__(self, node: Node, name: str, source: Source, topics: TransformTopics, rules: SampleRules) -> None:
-        self.buffer = FrameBuffer(topics.buffer, source.frame, rules)
-        self._name, self._source, self._topics = name, resolved(node, source), topics
+    def __init__(self, node: Node, source: Source, topics: TransformTopics) -> None:
+        self.name = node.resolve_topic_name(source.topic) + source.text[len(source.topic) :]
+        self._source, self._topics = source, topics
 
     @property
     def lost(self) -> int:
         """How many messages of tf were overwritten or missed."""
         return self._topics.lost
 
-    def report(self) -> TopicReport:
+    def report(self, stream: str) -> TopicReport:
         """What is known of the frame now."""
         transforms, frame = self._topics.buffer, self._source.frame
         stamp = transforms.recent(frame, RECENT)
         figures = stamp_figures(stamp, None)
         return TopicReport(
-            stream=self._name,
-            topic=self._source.text,
+            stream=stream,
+            topic=self.name,
             kind=TYPE,
             reliability=self._topics.reliability,
             frames=(transforms.world,) if transforms.world else (),

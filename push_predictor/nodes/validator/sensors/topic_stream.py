@@ -1,53 +1,69 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A live stream from a topic: subscribed with the type of its publishers, converted by the code that reads bags."""
+"""A live topic of a decoder: subscribed with the type and QoS of its publishers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from time import monotonic
 
+import numpy as np
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.following import FollowingSubscription
-from push_predictor.nodes.message_text import definition_of
-from push_predictor.nodes.validator.sensors.stream_source import DEPTH, SILENT, reliability_text, resolved
-from push_predictor.online.message_buffer import MessageBuffer, unchanged
+from push_predictor.nodes.polling import Taken
 from push_predictor.online.sensors.topic_report import TopicReport, stamp_figures
-from push_predictor.recordings.fields.sources import FieldReader, Source, Target, definitions_of, field_to_read
-from push_predictor.recordings.samples import SampleRules
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.topic_input import TopicInput
+from push_predictor.recordings.fields.installed_definitions import definition_text
+from push_predictor.types import IntArray
 
+DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones; memory grows as the queue fills
+SILENT = 5.0  # s without a sample that are reported
 NO_WRENCH = "No publisher: contact is found from geometry alone."
 
 
 class TopicStream:
-    """Messages of the topic of a source. name: slider, pusher or wrench; frame_id: as in MessageBuffer.
+    """Moves the messages of a topic into an input of a decoder.
 
-    Call `look` and `report` in the executor's thread; not at the same time as `move`.
+    expected: the frame that headers must name, '' for any. earlier: also take what was sent before. Call `look` and
+    `report` in the executor's thread; not at the same time as `move`.
     """
 
-    def __init__(
-        self, node: Node, name: str, source: Source, target: Target, rules: SampleRules, frame_id: str
-    ) -> None:
-        self.buffer = MessageBuffer(rules, frame_id)
-        self._name, self._source, self._target, self._frame_id = name, resolved(node, source), target, frame_id
-        self._subscription = FollowingSubscription(node, source.topic, DEPTH, earlier=False, overridable=True)
-        self._read: dict[str, FieldReader] = {}  # by type
-        self._refusals: dict[str, str] = {}  # by type
-        self._kind = ""  # of the subscription
+    def __init__(self, node: Node, own: TopicInput, expected: str = "", earlier: bool = False) -> None:
+        self.input, self._expected = own, expected
+        topic = own.source.topic
+        self.name = node.resolve_topic_name(topic) + own.source.text[len(topic) :]  # after remapping, for people
+        self._subscription = FollowingSubscription(node, topic, DEPTH, earlier=earlier, overridable=not earlier)
+        self.refusals: dict[str, str] = {}  # by type
         self._offered: list[tuple[str, ReliabilityPolicy]] = []  # type and reliability of each publisher
         self._heard = monotonic()  # when the last message came, or the last publisher
-        if not source.field:
-            self._follow(target.type, [])
+        if own.target.type and not own.source.field:
+            self._follow(own.target.type, [])
 
     @property
     def lost(self) -> int:
         """How many messages were overwritten or missed."""
         return self._subscription.lost
+
+    @property
+    def kinds(self) -> list[str]:
+        """The types of the publishers."""
+        return sorted({kind for kind, _ in self._offered})
+
+    @property
+    def refused(self) -> bool:
+        """Whether there are publishers, but not of one type that fits."""
+        return bool(self._offered) and len(self._usable()) != 1
+
+    @property
+    def refusal(self) -> str:
+        """Why the types of the publishers do not fit."""
+        return next(iter(filter(None, map(self.refusals.get, self.kinds))), "One type of publishers is accepted.")
 
     def look(self) -> None:
         """Subscribe to the type that the publishers have, as they offer it."""
@@ -55,80 +71,84 @@ class TopicStream:
         if not self._offered:
             self._heard = monotonic()
         self._offered = [(each.topic_type, each.qos_profile.reliability) for each in publishers]
-        usable = [kind for kind in self._kinds if self._understood(kind)]
-        if len(usable) == 1:
+        if len(usable := self._usable()) == 1:
             self._follow(usable[0], [each for each in publishers if each.topic_type == usable[0]])
 
     def move(self) -> None:
-        """Move arrived messages from the middleware into the buffer."""
-        for taken in self._subscription.taken():
-            self.buffer.put(taken.message, taken.sent, taken.received)
-            self._heard = monotonic()
+        """Move arrived messages from the middleware into the input."""
+        if taken := self.taken():
+            self.input.put(*as_messages(taken, self.input.source.topic, self.input.kind))
 
-    def report(self) -> TopicReport:
+    def taken(self) -> list[Taken]:
+        """The messages that have arrived."""
+        found = [*self._subscription.taken()]
+        self._heard = monotonic() if found else self._heard
+        return found
+
+    def report(self, stream: str) -> TopicReport:
         """What is known of the topic now."""
-        stamp, received, found = self.buffer.recent()
-        frames = tuple(sorted(found - {""}))
+        stamp, received, found = self.input.recent()
+        frames, kind = tuple(sorted(found - {""})), self.input.kind
         return TopicReport(
-            stream=self._name,
-            topic=self._source.text,
-            kind=self._kind if self._kind in self._kinds or not self._kinds else " and ".join(self._kinds),
+            stream=stream,
+            topic=self.name,
+            kind=kind if kind in self.kinds or not self.kinds else " and ".join(self.kinds),
             reliability=reliability_text(self._subscription.reliability),
             frames=frames,
             figures=stamp_figures(stamp, received),
-            problem=self._problem(frames),
-            refused=self._refused,
-            note=NO_WRENCH if self._name == "wrench" and not self._offered else "",
+            problem=self._problem(stream, frames),
+            refused=self.refused,
+            note=NO_WRENCH if stream == "wrench" and not self._offered else "",
         )
 
-    @property
-    def _kinds(self) -> list[str]:
-        return sorted({kind for kind, _ in self._offered})
-
-    @property
-    def _refused(self) -> bool:
-        return bool(self._offered) and len([kind for kind in self._kinds if kind in self._read]) != 1
-
-    def _problem(self, frames: Sequence[str]) -> str:
+    def _problem(self, stream: str, frames: Sequence[str]) -> str:
         if not self._offered:
-            return "" if self._name == "wrench" else "No publisher."
-        if self._refused:
-            return next(iter(filter(None, map(self._refusals.get, self._kinds))), "One type of publishers is accepted.")
-        offered = [reliability for kind, reliability in self._offered if kind == self._kind]
+            return "" if stream == "wrench" else "No publisher."
+        if self.refused:
+            return self.refusal
+        offered = [reliability for kind, reliability in self._offered if kind == self.input.kind]
         if self._subscription.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
-        if self._frame_id and (others := [frame for frame in frames if frame != self._frame_id]):
+        if self._expected and (others := [frame for frame in frames if frame.strip("/") != self._expected]):
+            wrench = ", or wrench_frame to tip or a frame of tf" if stream == "wrench" else ""
             names = " and ".join(map(repr, others))
-            wrench = ", or wrench_frame to tip or a frame of tf" if self._name == "wrench" else ""
-            return f"frame_id {names} is not accepted, give {self._frame_id!r}, or set world_frame or frame_id{wrench}."
+            return f"frame_id {names} is not accepted, give {self._expected!r}, or set world_frame{wrench}."
         if monotonic() - self._heard > SILENT:
             return f"No message for over {SILENT:g} s."
         return ""
 
+    def _usable(self) -> list[str]:
+        return [kind for kind in self.kinds if self._understood(kind)]
+
     def _understood(self, kind: str) -> bool:
         """Whether messages of a type have what the stream needs; remembers why not."""
-        if kind not in self._read and kind not in self._refusals:
+        if kind == self.input.kind:
+            return True
+        if kind not in self.refusals:
             try:
-                schemas = {kind: definition_of(kind)}
-                field = field_to_read(self._source, kind, self._target, schemas, "")
-                self._read[kind] = FieldReader(self._target, kind, field, definitions_of(kind, schemas))
+                self.input.check(kind, {kind: definition_text(kind)})
+                self.refusals[kind] = ""
             except RecordingError as error:
-                self._refusals[kind] = str(error)
-            except PushPredictorError as error:
-                self._refusals[kind] = str(self._source.error("", str(error)))
-        return kind in self._read
+                self.refusals[kind] = str(error)
+        return not self.refusals[kind]
 
     def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        if kind != self._kind and kind in self._read:
-            self._convert(kind)
-        self._kind = kind
-        self._subscription.follow(kind, publishers)
+        if kind != self.input.kind:
+            self.input.declare(kind, {kind: definition_text(kind)})
+        try:
+            self._subscription.follow(kind, publishers)
+        except PushPredictorError as error:
+            self.refusals[kind] = f"{error}."
 
-    def _convert(self, kind: str) -> None:
-        """Read the messages that come from now on as those of a type."""
-        reader = self._read[kind]
-        if kind == self._target.type and not self._source.field:
-            self.buffer.convert_by(unchanged, self._frame_id)
-            return
-        # Without a header a message names no frame; it is then dated by its sending.
-        self.buffer.convert_by(reader.read, self._frame_id if reader.timed else "")
+
+def as_messages(taken: Sequence[Taken], topic: str, kind: str) -> tuple[Messages, IntArray]:
+    """Messages as a decoder takes them, dated by their sending, and when they arrived, ns."""
+    arrived = np.array([message.received for message in taken], np.int64)
+    return Messages.of(
+        topic, kind, [message.sent for message in taken], [message.message for message in taken]
+    ), arrived
+
+
+def reliability_text(reliability: ReliabilityPolicy | None) -> str:
+    """In words; empty for none."""
+    return "" if reliability is None else reliability.name.lower().replace("_", " ")

@@ -9,24 +9,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
+from push_predictor.reporting.chart import SMALL, Band, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.channels.measurement import gap_responses
-from push_predictor.residuals.channels.wrench import WRENCH_BIAS
+from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SETTLED
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.pushes import (
     Axis,
-    Means,
     axis_of,
     means_along,
     push_means,
     recorded_axis,
     titles,
 )
-from push_predictor.residuals.reporting.phrases import interval
 from push_predictor.types import Array, TextArray
 
 NORMAL = "Direction of the contact normal in the world (deg)"
@@ -102,7 +99,7 @@ def size_chart(trace: Trace, covariate: str, outputs: list[int]) -> Chart | None
         dots.append(
             Dots("push" if len(shown) == 1 else kind, place, np.sqrt(square), titles(names, np.sqrt(square)), name=one)
         )
-        bars.append(_bars(kind, bins, "", kind if len(shown) > 1 else "pushes, in bins"))
+        bars.append(bins.bars(kind, "", kind if len(shown) > 1 else "pushes, in bins"))
         tops += [float(np.quantile(np.sqrt(square), 1.0 - SHARE)), float(bins.high.max(initial=0.0))]
     label = "Error of a push / predicted standard deviation"
     x, y = limits_of(axis.x, margin=0.02), (0.0, 1.1 * max(tops))
@@ -143,7 +140,7 @@ def _compared(label: str, unit: str, now: Values, before: Values | None) -> Char
     marks = (
         *(() if before is None else _training(before, x)),
         Dots("push" if before is None else "before", place, each, titles(names, each, unit), name="one push"),
-        _bars("before", bins, unit, "pushes, in bins"),
+        bins.bars("before", unit, "pushes, in bins"),
     )
     return Chart(f"{label}.", now.axis.label, label, x, y, marks, names=now.axis.names)
 
@@ -153,9 +150,3 @@ def _training(before: Values, x: tuple[float, float]) -> tuple[Mark, ...]:
     ends = np.array(x)
     band = Band("push", ends, np.full(2, low), np.full(2, high), name="middle 90 % of the training windows")
     return band, Line("push", ends, np.full(2, middle), name="median in training")
-
-
-def _bars(kind: str, bins: Means, unit: str, name: str) -> Bars:
-    ends = zip(bins.y, bins.low, bins.high, strict=True)
-    shown = [interval(Estimate(float(value), float(low), float(high)), unit) for value, low, high in ends]
-    return Bars(kind, bins.x, bins.y, bins.low, bins.high, shown, name=name)

@@ -10,20 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate
-from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts, histogram
+from push_predictor.evaluation.report.figures.calibration import KINDS, coverage_chart, expected_counts, histogram
 from push_predictor.evaluation.validation import Comparison, pit
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.canvas import UNITS
-from push_predictor.reporting.chart import HALF, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
+from push_predictor.reporting.chart import HALF, Band, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.reporting.figures.pushes import Axis, axis_of, means_along, push_means, titles
-from push_predictor.residuals.reporting.phrases import interval
 from push_predictor.types import Array, TextArray
 
 QUARTER = (215.0, 195.0)
-KINDS = {"before": "before", "refit": "push", "after": "after"}
+MODELS = {"before": "before", "refit": "push", "after": "after"}
 SHARE = 0.02  # of the pushes that may lie above the picture
-OUTPUT_KINDS = ("fit", "dy", "dtheta")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +52,7 @@ def coverage_charts(comparison: Comparison) -> list[Chart]:
     tallest = max(float(counts.max()) for counts, _ in bars)
     expected = [expected_counts(values[:, k], comparison.push_id) for k in range(len(OUTPUTS))]
     charts = [_pit_chart(*bars[k], expected[k], k, tallest) for k in range(len(OUTPUTS))]
-    return [_coverage(comparison), *charts]
+    return [replace(coverage_chart(comparison), title=comparison.model, size=QUARTER), *charts]
 
 
 def _judged(comparison: Comparison, place: dict[str, float]) -> Judged:
@@ -73,32 +70,16 @@ def _error_chart(axis: Axis, judged: Sequence[Judged], k: int, label: str, unit:
     ends: list[Array] = [np.zeros(1)]
     alike = len({one.push_id.tobytes() for one in judged}) == 1
     for one in judged:
-        kind, size = KINDS[one.model], one.size[:, k]
+        kind, size = MODELS[one.model], one.size[:, k]
         names, square = push_means(one.push_id, size**2)
         each, bins = np.sqrt(square), means_along(replace(axis, x=one.x), one.push_id, size, square=True)
         dots.append(Dots(kind, push_means(one.push_id, one.x)[1], each, titles(names, each, unit)))
-        found = [Estimate(*map(float, ends)) for ends in zip(bins.y, bins.low, bins.high, strict=True)]
         if alike:
-            bars.append(Line(kind, bins.x, bins.y))
-        shown = [interval(gain, unit) for gain in found]
-        bars.append(Bars(kind, bins.x, bins.y, bins.low, bins.high, shown, name=one.model))
+            bars.append(Line(kind, bins.place, bins.value))
+        bars.append(bins.bars(kind, unit, one.model))
         ends += [bins.high, np.quantile(each, [1.0 - SHARE]) if len(each) else np.zeros(0)]
     x, y = limits_of(axis.x, margin=0.02), (0.0, limits_of(*ends)[1])
     return Chart(f"{label} before and after.", axis.label, label, x, y, (*dots, *bars), size=HALF, names=axis.names)
-
-
-def _coverage(comparison: Comparison) -> Chart:
-    share, low, high = coverage_curve(comparison)
-    marks: list[Mark] = [Line("zero", np.array([0.0, 1.0]), np.array([0.0, 1.0]))]
-    known = len(set(comparison.push_id.tolist())) > 1
-    for k, (kind, name) in enumerate(zip(OUTPUT_KINDS, OUTPUTS, strict=True)):
-        band = [Band(kind, LEVELS, low[:, k], high[:, k])] if known else []
-        marks += [*band, Line(kind, LEVELS, share[:, k], name=name)]
-    unit = (0.0, 1.0)
-    return Chart(
-        f"Coverage of the model {comparison.model}.", "Nominal share", "Observed share", unit, unit, tuple(marks),
-        title=comparison.model, size=QUARTER,
-    )  # fmt: skip
 
 
 def _pit_chart(counts: Array, edges: Array, expected: tuple[float, float], output: int, tallest: float) -> Chart:
@@ -107,7 +88,7 @@ def _pit_chart(counts: Array, edges: Array, expected: tuple[float, float], outpu
     band = Band("push", across, np.full(2, low), np.full(2, high))
     top = 1.08 * max(tallest, float(high))
     name = OUTPUTS[output]
-    marks = Columns(OUTPUT_KINDS[output], edges, counts), band
+    marks = Columns(KINDS[output], edges, counts), band
     return Chart(
         f"Histogram of the PIT of {name}.", "Predicted probability", "Windows", (0.0, 1.0), (0.0, top), marks,
         title=f"PIT of {name}", size=QUARTER,

@@ -1,15 +1,34 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The figures of a trace's report below the key picture, with their captions."""
+"""The figures of a trace's report with their captions: the key picture, one for each verdict, then the others."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
+from push_predictor.reporting.chart import WIDE, Chart, Dots
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.driver_basis import basis_charts
+from push_predictor.residuals.reporting.figures.channels import (
+    force_chart,
+    gap_chart,
+    input_chart,
+    noise_chart,
+    size_chart,
+)
+from push_predictor.residuals.reporting.figures.driver_basis import (
+    Rows,
+    Strength,
+    analysis_rows,
+    basis_charts,
+    held_out_rows,
+    strength_of,
+)
 from push_predictor.residuals.reporting.figures.errors import coverage_charts, error_charts
-from push_predictor.residuals.reporting.figures.partial import Rows, Strength, analysis_rows, held_out_rows, strength_of
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     count,
@@ -19,6 +38,14 @@ from push_predictor.residuals.reporting.phrases import (
 )
 
 BARS = "Bars: 95 % intervals from a bootstrap of pushes."
+EFFECT = "Each grey dot is one push: the size of the effect that this push alone shows."
+MAP = "The background is the fitted map. Each dot is one push, in the colour of the effect that this push alone shows."
+SIZE = "Each dot is one push: the size of its error. At 1 the errors are as large as the model predicts."
+FORCE = "Each dot is one push: its mean force now. Grey: the force in training."
+GAP = "Each dot is one push: the gap that was measured while the tip touched the slider. Without an error it is zero."
+INPUTS = "Where the pushes of training and the new pushes lie. Outside the training range the model extrapolates."
+MEANS = "Points with bars: means of neighbouring pushes, with 95 % intervals."
+HOVER = "Hover over a mark to see its push and its value."
 
 
 def effect_figures(trace: Trace) -> list[str]:
@@ -86,3 +113,48 @@ def _data_words(trace: Trace) -> str:
     model = "extended" if trace.extended is not None else "deployed"
     pushes = count(len(trace.analysis.pushes), "analysis push", "analysis pushes")
     return f"Data: {pushes}, residuals of the {model} model."
+
+
+def key_figure(trace: Trace) -> list[str]:
+    """The key picture with its caption; none if these windows do not contain the data."""
+    charts, text = _charts(trace)
+    charts = [replace(chart, size=WIDE) for chart in charts] if len(charts) == 1 and not charts[0].key else charts
+    if not charts:
+        return []
+    bars = "" if text in (MAP, INPUTS) else f" {MEANS}"
+    hidden = sum(_outside(chart) for chart in charts)
+    cut = f" {count(hidden, 'push lies', 'pushes lie')} outside the picture." if hidden else ""
+    return [html.charts(charts, f"{text}{bars}{cut} {HOVER}")]
+
+
+def _charts(trace: Trace) -> tuple[list[Chart], str]:
+    if trace.verdict == "wrench_only":
+        return _known(force_chart(trace)), FORCE
+    if trace.verdict == "measurement":
+        return _known(gap_chart(trace)), GAP
+    if trace.verdict == "variance":
+        return _known(noise_chart(trace)), SIZE
+    if trace.verdict == "input_shift":
+        return _known(*(input_chart(trace, shift.covariate) for shift in trace.input_shift)), INPUTS
+    if trace.terms and trace.effects[0].mechanism is not None:
+        return [_effect_chart(trace)], MAP if len(trace.terms[0].basis.drivers) > 1 else EFFECT
+    covariate = trace.effects[0].covariate if trace.effects else ""
+    return _known(size_chart(trace, covariate, list(range(len(OUTPUTS))))), SIZE
+
+
+def _effect_chart(trace: Trace) -> Chart:
+    """The chart of the first effect's parameter that changes most."""
+    strength = strength_of(trace.terms[0], trace.analysis)
+    values = strength.curve(trace.analysis.covariates, len(trace.analysis))[0]
+    most = int(np.argmax(np.abs(values).max(axis=0)))
+    return basis_charts(trace, strength, analysis_rows(trace), None)[most]
+
+
+def _known(*charts: Chart | None) -> list[Chart]:
+    return [chart for chart in charts if chart is not None]
+
+
+def _outside(chart: Chart) -> int:
+    """Dots that lie outside the plot area; unknown ones are none."""
+    dots = [mark for mark in chart.marks if isinstance(mark, Dots)]
+    return sum(int(np.sum(np.isfinite(d.y) & ~chart.frame.inside(d.x, d.y))) for d in dots)

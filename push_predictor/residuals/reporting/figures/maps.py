@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.push_maps import contact_label
-from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
+from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, contact_label, recorded_map
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -20,7 +19,7 @@ from push_predictor.reporting import chart, html
 from push_predictor.reporting.chart import Chart
 from push_predictor.reporting.html import number
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.partial import Strength, strength_of
+from push_predictor.residuals.reporting.figures.driver_basis import Strength, strength_of
 from push_predictor.residuals.reporting.phrases import bare, count, covariate_phrase, place_of_step
 from push_predictor.types import Array, BoolArray
 
@@ -51,17 +50,11 @@ class Halves:
 
 
 def map_figures(trace: Trace) -> list[str]:
-    """Maps of the analysis pushes and of the held-out pushes."""
-    figures = []
-    for title, columns in (
-        ("analysis pushes", _analysis_columns(trace)),
-        ("held-out pushes", _held_out_columns(trace)),
-    ):
-        shown = map_charts(trace.model.rig.outline, columns) if columns else []
-        if shown:
-            per_row = len(columns) if len(columns) > 1 else len(OUTPUTS)
-            figures.append(html.charts(shown, _map_caption(trace, title, columns), per_row))
-    return figures
+    """Maps of the held-out pushes: on those of the analysis a smaller residual would be no proof."""
+    columns = _columns(trace)
+    shown = map_charts(trace.model.rig.outline, columns) if columns else []
+    per_row = len(columns) if len(columns) > 1 else len(OUTPUTS)
+    return [html.charts(shown, _map_caption(trace, columns), per_row)] if shown else []
 
 
 def halves_of(strength: Strength | None, table: PushTable) -> Halves:
@@ -93,18 +86,12 @@ def map_charts(outline: Outline, columns: Sequence[Column]) -> list[Chart]:
     cells = _cells(outline, columns)
     if np.prod(cells.shape) < LEAST_CELLS:
         return []
-    maps = [residual_map(outline, column, cells) for column in columns]
+    maps = [recorded_map(outline, replace(c.table, outcomes=c.z), np.zeros_like(c.z), cells) for c in columns]
     if not any(np.isfinite(shown.mean).any() for shown in maps):
         return []
     reach = reach_of(maps)
     size = NARROW if len(columns) > 3 else chart.SMALL
     return [_panel(c, m, k, reach, size) for k in range(len(OUTPUTS)) for c, m in zip(columns, maps, strict=True)]
-
-
-def residual_map(outline: Outline, column: Column, cells: Cells) -> PushMap:
-    """Mean residual per cell."""
-    shown = replace(column.table, outcomes=column.z)
-    return recorded_map(outline, shown, np.zeros_like(column.z), cells)
 
 
 def reach_of(maps: Sequence[PushMap]) -> float:
@@ -163,46 +150,24 @@ def _names(basis: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str,
     return "weak effect", "strong effect"
 
 
-def _analysis_columns(trace: Trace) -> list[Column]:
-    if not len(trace.analysis):
-        return []
-    halves = _halves(trace, "analysis")
-    after = "after" if trace.terms or trace.verdict == "measurement" else "refit"
-    columns = columns_of("before", trace.analysis, trace.residual, halves)
-    if len(trace.unexplained) == len(trace.analysis) and not np.array_equal(trace.unexplained, trace.residual):
-        columns += columns_of(after, trace.analysis, trace.unexplained, halves)
-    return columns
-
-
-def _held_out_columns(trace: Trace) -> list[Column]:
+def _columns(trace: Trace) -> list[Column]:
     table, shown = trace.held_out.table, trace.comparisons
     shown = shown[::2] if trace.verdict == "measurement" and len(shown) > 2 else shown[-2:]
     if not len(table) or any(len(comparison.observed) != len(table) for comparison in shown):
         return []
-    halves = _halves(trace, "held out")
+    halves = halves_of(strength_of(trace.terms[0], trace.analysis) if trace.terms else None, table)
     return [c for each in shown for c in columns_of(each.model, table, each.residuals, halves)]
 
 
-def _halves(trace: Trace, part: str) -> Halves:
-    strength = strength_of(trace.terms[0], trace.analysis) if trace.terms else None
-    return halves_of(strength, trace.analysis if part == "analysis" else trace.held_out.table)
-
-
-def _map_caption(trace: Trace, title: str, columns: list[Column]) -> str:
-    seen = title == "analysis pushes"
-    pushes = len((trace.analysis if seen else trace.held_out.table).pushes)
-    trust = (
-        "The search used these pushes, so a smaller residual here is no proof."
-        if seen
-        else "Nothing was fitted or chosen on these pushes."
-    )
+def _map_caption(trace: Trace, columns: list[Column]) -> str:
     after = "the deployed model on windows cut again" if trace.verdict == "measurement" else "with the effects found"
     meaning = {"before": "the deployed model", "refit": "retrained on the analysis pushes", "after": after}
     models = [f"{name.capitalize()}: {meaning[name]}." for name in dict.fromkeys(column.title for column in columns)]
     return (
-        f"Mean residual of {pushes} {title} over contact point and push angle, in units of the predicted standard "
-        f"deviation. {' '.join(models)}{_split_words(trace, columns)} {trust} Up: push angle. Across: "
-        f"{contact_label(trace.model.rig.outline)}. Grey: fewer than six windows."
+        f"Mean residual of {len(trace.held_out.table.pushes)} held-out pushes over contact point and push angle, in "
+        f"units of the predicted standard deviation. {' '.join(models)}{_split_words(trace, columns)} Nothing was "
+        f"fitted or chosen on these pushes. Up: push angle. Across: {contact_label(trace.model.rig.outline)}. Grey: "
+        "fewer than six windows."
     )
 
 

@@ -10,14 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.push_scores import resampled_means
 from push_predictor.recordings.table import INPUTS, PushTable
+from push_predictor.reporting.chart import Bars
 from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.standardised import push_order
-from push_predictor.residuals.reporting.figures.partial import DRAWS, LEAST_PUSHES
-from push_predictor.residuals.reporting.phrases import covariate_phrase, label, shown_unit_of
+from push_predictor.residuals.reporting.phrases import covariate_phrase, interval, label, shown_unit_of
 from push_predictor.types import Array, IntArray, TextArray
 
+LEAST_PUSHES = 3  # of a bin that is shown
 BINS, PUSHES_PER_BIN = 10, 4  # at most; about
 GAP, WIDTH = 0.05, 0.03  # of the range: levels of a covariate are farther apart, and narrower
 
@@ -41,14 +43,19 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class Means:
-    """Bins (b,): position, mean with its 95 % ends from a bootstrap of pushes, number of pushes."""
+class Bins:
+    """Places (b,) of bins along an axis; in each an estimate (b, ...) with 95 % ends from a bootstrap of pushes."""
 
-    x: Array
-    y: Array
+    place: Array
+    value: Array
     low: Array
     high: Array
-    pushes: IntArray
+
+    def bars(self, kind: str, unit: str, name: str) -> Bars:
+        """The mark that shows one estimate for each bin; hovering shows it with its unit."""
+        ends = zip(self.value, self.low, self.high, strict=True)
+        shown = [interval(Estimate(*map(float, each)), unit) for each in ends]
+        return Bars(kind, self.place, self.value, self.low, self.high, shown, name=name)
 
 
 def axis_of(table: PushTable, covariate: str) -> Axis:
@@ -94,24 +101,21 @@ def bins_along(values: Array, count: int) -> IntArray:
     return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.int64)
 
 
-def means_along(axis: Axis, push_id: TextArray, values: Array, *, square: bool = False) -> Means:
+def means_along(axis: Axis, push_id: TextArray, values: Array, *, square: bool = False) -> Bins:
     """Means of values (n,) in bins of the axis; square: root mean squares instead."""
     count = int(np.clip(len(set(push_id.tolist())) // PUSHES_PER_BIN, 1, BINS))
     bins = np.unique(axis.x, return_inverse=True)[1] if axis.whole else bins_along(axis.x, count)
     found = [_mean(axis.x, push_id, values, bins == b, square) for b in np.unique(bins)]
-    x, y, low, high, pushes = np.array([each for each in found if each is not None]).reshape(-1, 5).T
-    return Means(x, y, low, high, pushes.astype(np.int64))
+    return Bins(*np.array([each for each in found if each is not None]).reshape(-1, 4).T)
 
 
 def _mean(x: Array, push_id: TextArray, values: Array, rows: Array, square: bool) -> list[float] | None:
-    pushes = len(set(push_id[rows].tolist()))
-    if pushes < LEAST_PUSHES:
+    if len(set(push_id[rows].tolist())) < LEAST_PUSHES:
         return None
     shown = values[rows] ** 2 if square else values[rows]
-    weights = push_bootstrap(push_id[rows], draws=DRAWS)
-    low, high = np.quantile(weights @ shown / weights.sum(axis=1), [0.025, 0.975])
+    low, high = np.quantile(resampled_means(push_id[rows], shown[:, None]), [0.025, 0.975])
     ends = np.array([shown.mean(), low, high])
-    return [float(x[rows].mean()), *(np.sqrt(ends) if square else ends).tolist(), float(pushes)]
+    return [float(x[rows].mean()), *(np.sqrt(ends) if square else ends).tolist()]
 
 
 def _order(table: PushTable) -> Axis:

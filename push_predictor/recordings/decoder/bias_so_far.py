@@ -1,0 +1,116 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bias and weight of a force sensor, from the free motion so far: of a recording that is read, from all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from push_predictor.recordings.decoder.posed_wrench import Wrenches
+from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, joined
+from push_predictor.recordings.windows.clock_set import set_back
+from push_predictor.recordings.windows.free_motion import free_motion
+from push_predictor.types import Array
+
+FIRST = 50  # wrenches before the first attempt
+LATER, REFINED = 1.1, 2.0  # factors in their number to the next attempt: without an estimate, with one
+MOST = 50_000  # wrenches that are kept; an estimate from as many is final
+
+
+class _Portion(NamedTuple):
+    wrench: Wrenches
+    slider: PoseStream
+    pusher: PoseStream
+
+
+class BiasSoFar:
+    """Holds wrenches back until the bias is known, then subtracts it; it is refined while free motion is added.
+
+    estimate: None until the tip was free for long enough. problem: why there is no estimate, or no better one.
+    """
+
+    def __init__(self) -> None:
+        self._begin(None)
+
+    def _begin(self, rig: Rig | None) -> None:
+        self.estimate: WrenchBias | None = None
+        self.problem = ""
+        self._rig = rig
+        self._final = False
+        self._forget()
+
+    def _forget(self) -> None:
+        self._portions: list[_Portion] = []
+        self._count, self._next = 0, FIRST  # wrenches in the portions; from how many on to make an estimate
+
+    def begin(self, rig: Rig) -> None:
+        """Begin anew with a rig, by whose outline free motion is found."""
+        self._begin(rig)
+
+    @property
+    def waits(self) -> bool:
+        """Whether wrenches are held back."""
+        return self.estimate is None and self._count > 0
+
+    def put(self, wrench: Wrenches, slider: PoseStream, pusher: PoseStream, last: bool = False) -> Wrenches:
+        """The wrenches without bias that are known with these portions; slider and pusher: their new poses.
+
+        last: no more will come.
+        """
+        known_before = self.estimate is not None
+        if not self._final:
+            self._keep(_Portion(wrench, slider, pusher))
+        if (
+            self._rig is not None
+            and not self._final
+            and (self._next <= self._count or (last and self._count > 0 and not known_before))
+        ):
+            self._attempt(self._rig)
+        if self.estimate is None:
+            return _joined([wrench], 0)
+        ready = wrench if known_before else _joined([portion.wrench for portion in self._portions])
+        if self._final:
+            self._portions = []
+        values = with_planar_numbers(ready.values) if ready.sensor is None else ready.values
+        return ready._replace(values=self.estimate.subtracted_from(values, ready.sensor))
+
+    def _keep(self, portion: _Portion) -> None:
+        before = next((each.slider for each in reversed(self._portions) if len(each.slider)), None)
+        if before is not None and set_back(before, portion.slider):
+            self._forget()  # samples of two times do not make one free motion
+            self._final = self.estimate is not None
+        self._portions.append(portion)
+        self._count += len(portion.wrench.stamp)
+        self._final = self._final or (self.estimate is not None and self._count > MOST)
+        while self._count > MOST and len(self._portions) > 1:
+            self._count -= len(self._portions.pop(0).wrench.stamp)
+            self._next = min(self._next, MOST)
+
+    def _attempt(self, rig: Rig) -> None:
+        wrench = _joined([portion.wrench for portion in self._portions])
+        slider = joined([portion.slider for portion in self._portions])
+        pusher = joined([portion.pusher for portion in self._portions])
+        values = with_planar_numbers(wrench.values) if wrench.sensor is None else wrench.values
+        free = free_motion(rig, slider, pusher, wrench.stamp)
+        try:
+            self.estimate, self.problem = estimate_bias(wrench.stamp, values, free, wrench.sensor), ""
+        except BiasError as error:
+            self.problem = str(error)
+        self._next = round(self._count * (LATER if self.estimate is None else REFINED)) + 1
+
+
+def _joined(parts: Sequence[Wrenches], count: int | None = None) -> Wrenches:
+    """The parts as one, of which the first `count` samples."""
+
+    def column(values: Sequence[Array | None]) -> Array | None:
+        known = [each for each in values if each is not None]
+        return np.concatenate(known)[:count] if known else None
+
+    stamp = np.concatenate([part.stamp for part in parts])[:count]
+    values = np.concatenate([part.values for part in parts])[:count]
+    return Wrenches(stamp, values, column([part.sensor for part in parts]), column([part.tip for part in parts]))

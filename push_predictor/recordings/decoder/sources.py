@@ -1,0 +1,80 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where the streams are, as topics name them, and which topics contain them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from push_predictor.errors import RequestError
+from push_predictor.recordings.fields.sources import POSE_TARGET, WRENCH_TARGET, Source
+from push_predictor.recordings.topics import DEFAULT_TOPICS, Topics
+
+TF, STATIC = "/tf", "_static"  # /tf_static belongs to /tf
+STREAMS = {"slider": POSE_TARGET, "pusher": POSE_TARGET, "wrench": WRENCH_TARGET}
+COVARIATE = "covariate"
+POSES = ("slider", "pusher")
+
+
+@dataclass(frozen=True)
+class RecordedTopic:
+    """A topic of a recording.
+
+    uses: the streams that are read from it: slider, pusher, wrench or covariate. expected: its absence is a problem.
+    static: it is silent for most of the time, as /tf_static.
+    """
+
+    name: str
+    uses: tuple[str, ...]
+    expected: bool = True
+    static: bool = False
+
+
+def topics_to_record(given: Topics, with_wrench: bool = True) -> tuple[RecordedTopic, ...]:
+    """The topics of these streams, each once; streams that are not given have their default topic.
+
+    with_wrench: whether the wrench is expected.
+    """
+    found: dict[str, RecordedTopic] = {}
+    for name, source in sources_of(given):
+        expected = name != "wrench" or with_wrench
+        found[source.topic] = _with_use(found.get(source.topic), RecordedTopic(source.topic, (name,), expected))
+        if source.frame:
+            static = RecordedTopic(source.topic + STATIC, (name,), expected=False, static=True)
+            found[static.name] = _with_use(found.get(static.name), static)
+    if given.world or given.wrench_tf_frame:  # by tf the poses or the wrench will be turned
+        for tf in (RecordedTopic(TF, ()), RecordedTopic(TF + STATIC, (), expected=False, static=True)):
+            found.setdefault(tf.name, tf)
+    return tuple(found.values())
+
+
+def sources_of(given: Topics) -> list[tuple[str, Source]]:
+    """(stream, its source) of slider, pusher, wrench and each covariate."""
+    every = given.over(DEFAULT_TOPICS)
+    streams = [(name, Source(f"{name}_topic", f"--{name}-topic", getattr(every, name))) for name in STREAMS]
+    covariates = [Source("covariate_topics", "--covariate-topic", text) for text in every.covariates]
+    return streams + [(COVARIATE, source) for source in covariates]
+
+
+def resolved(given: Topics, resolve: Callable[[str], str]) -> Topics:
+    """The topics of all streams with their full names, by a function from a topic's name to its full name.
+
+    Raises RequestError for a text that is not TOPIC, TOPIC.FIELD or, for a pose, /tf:FRAME.
+    """
+    names: dict[str, list[str]] = {}
+    for name, source in sources_of(given):
+        text, frame_fits = source.text, name in POSES
+        if not source.topic.strip("/ ") or (":" in text and not (source.frame and frame_fits)):
+            raise RequestError(source.key, text, "TOPIC, TOPIC.FIELD" + (" or /tf:FRAME" if frame_fits else ""))
+        names.setdefault(name, []).append(resolve(source.topic) + text[len(source.topic) :])
+    streams = {name: names[name][0] for name in STREAMS}
+    return replace(given, **streams, covariates=tuple(names.get(COVARIATE, ())))
+
+
+def _with_use(known: RecordedTopic | None, other: RecordedTopic) -> RecordedTopic:
+    if known is None:
+        return other
+    uses = tuple(dict.fromkeys([*known.uses, *other.uses]))
+    return replace(known, uses=uses, expected=known.expected or other.expected)

@@ -1,0 +1,128 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The messages of one source until they are taken as columns."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.fields.sources import (
+    Columns,
+    FieldReader,
+    Source,
+    Target,
+    definitions_of,
+    field_to_read,
+)
+from push_predictor.types import IntArray
+
+_Recent: TypeAlias = tuple[IntArray, IntArray, frozenset[str]]  # stamps, when they arrived, frames
+LIMIT = 200_000  # live messages that wait: over 13 minutes at 250 Hz
+RECENT = 250  # samples that are kept for the report about a live topic
+
+
+class TopicInput:
+    """received: number of messages. rejected: unusable ones by fault; foreign: those of another type, by type.
+
+    named: the frames that headers have named. dropped: messages of a live topic that nobody took in time. `put` may be
+    called in any thread, the others in one.
+    """
+
+    def __init__(self, source: Source, target: Target) -> None:
+        self.source, self.target = source, target
+        self.kind = ""
+        self.received = self.dropped = 0
+        self.rejected: Counter[str] = Counter()
+        self.foreign: Counter[str] = Counter()
+        self.named: frozenset[str] = frozenset()
+        self._reader: FieldReader | None = None
+        self._waiting: list[tuple[Messages, IntArray | None]] = []
+        self._decoded: list[Columns] = []
+        self._recent: list[_Recent] = []
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return sum(len(messages) for messages, _ in self._waiting) + sum(len(c.stamp) for c in self._decoded)
+
+    @property
+    def timed(self) -> bool:
+        """Whether messages contain their time, as far as their type is known."""
+        return self._reader is not None and self._reader.timed
+
+    def check(self, kind: str, schemas: Mapping[str, str], where: object = "") -> str:
+        """The field of a type that is read. schemas: {type: definition}; where: the bag in errors, '' for live topics.
+
+        Raises RecordingError for a type without what the stream needs.
+        """
+        return field_to_read(self.source, kind, self.target, schemas, where)
+
+    def declare(self, kind: str, schemas: Mapping[str, str], where: object = "") -> None:
+        """State the type of the messages from now on, see `check`."""
+        field = self.check(kind, schemas, where)
+        reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas))
+        with self._lock:  # messages of an earlier type cannot be read as those of the new one
+            self.dropped += sum(len(messages) for messages, _ in self._waiting)
+            self._waiting, self._recent = [], []
+            self.kind, self._reader = kind, reader
+
+    def put(self, messages: Messages, arrived: IntArray | None = None) -> None:
+        """Add messages. arrived (n,): when they were received, ns, of a live topic."""
+        if messages.type != self.kind:
+            self.foreign[messages.type] += len(messages)
+            return
+        with self._lock:
+            self.received += len(messages)
+            self._waiting.append((messages, arrived))
+            while arrived is not None and len(self) > LIMIT:  # the oldest first
+                self.dropped += len(self._decoded.pop(0).stamp if self._decoded else self._waiting.pop(0)[0])
+
+    def take(self) -> Columns:
+        """The columns of the messages since the last call."""
+        self._decode()
+        decoded, self._decoded = self._decoded, []
+        return _joined(decoded, self.target.count)
+
+    def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
+        """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
+        self._decode()
+        stamp, arrived = (
+            np.concatenate([np.empty(0, np.int64), *of]) for of in ([r[k] for r in self._recent] for k in (0, 1))
+        )
+        return stamp[-RECENT:], arrived[-RECENT:], frozenset[str]().union(*(frames for _, _, frames in self._recent))
+
+    def _decode(self) -> None:
+        with self._lock:
+            waiting, self._waiting = self._waiting, []
+            reader = self._reader
+        if reader is None:
+            return
+        for messages, arrived in waiting:
+            columns = reader.read(messages)
+            self.named |= columns.named
+            self._decoded.append(columns)
+            if arrived is not None:
+                self._recent.append((columns.stamp[columns.valid], arrived[columns.valid], columns.named))
+        while self._recent and sum(len(stamp) for stamp, _, _ in self._recent[1:]) >= RECENT:
+            self._recent.pop(0)
+
+
+def _joined(parts: Sequence[Columns], count: int) -> Columns:
+    """Consecutive columns as one."""
+    if len(parts) == 1:
+        return parts[0]
+    frames = {"": 0}
+    number = [np.array([frames.setdefault(name, len(frames)) for name in part.frames]) for part in parts]
+    return Columns(
+        np.concatenate([np.empty(0, np.int64), *(part.stamp for part in parts)]),
+        np.concatenate([np.empty((0, count)), *(part.values for part in parts)]),
+        np.concatenate([np.empty(0, np.bool_), *(part.valid for part in parts)]),
+        np.concatenate([np.empty(0, np.int64), *(of[part.frame] for of, part in zip(number, parts, strict=True))]),
+        tuple(frames),
+    )

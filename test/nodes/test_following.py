@@ -1,0 +1,111 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which messages a subscription that follows its publishers counts as lost."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+from push_predictor.nodes import following
+from push_predictor.nodes.following import FollowingSubscription
+from push_predictor.nodes.polling import Taken
+
+
+class Topic:
+    """A topic without a middleware, and the subscription to it. Each call of `send` takes one nanosecond."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.publishers, self._now = 1, 0
+        self._waiting: list[Taken] = []
+        node: Any = SimpleNamespace(
+            resolve_topic_name=str,
+            get_publishers_info_by_topic=lambda _: [None] * self.publishers,
+            count_publishers=lambda _: self.publishers,
+        )
+        monkeypatch.setattr(following, "take_all", self._take_all)
+        monkeypatch.setattr(following, "time_ns", lambda: self._now)
+        self.subscription = FollowingSubscription(node, "/slider/pose")
+        self.subscription._subscription = node
+
+    def _take_all(self, _: object) -> list[Taken]:
+        taken, self._waiting = self._waiting, []
+        return taken
+
+    def send(self, *numbers: int) -> None:
+        """Messages with these numbers arrive."""
+        for number in numbers:
+            self._now += 1
+            self._waiting.append(Taken(b"", number, self._now, self._now))
+
+    def look(self, publishers: int) -> None:
+        """The node looks at the publishers, of which there are this many."""
+        self._now += 1
+        self.publishers = publishers
+        self.subscription.publishers()
+
+    def lost(self) -> int:
+        list(self.subscription.taken())
+        return self.subscription.lost
+
+
+@pytest.fixture
+def topic(monkeypatch: pytest.MonkeyPatch) -> Topic:
+    found = Topic(monkeypatch)
+    found.look(1)
+    return found
+
+
+def test_missing_numbers_of_one_publisher_are_lost_messages(topic: Topic) -> None:
+    topic.send(7, 8, 11, 12)
+    assert topic.lost() == 2
+    topic.look(1)
+    topic.send(14)
+    assert topic.lost() == 3, "also from one look to the next"
+    topic.send(3, 4)
+    assert topic.lost() == 3, "a publisher that begins anew"
+
+
+def test_two_publishers_number_their_messages_independently(topic: Topic) -> None:
+    topic.look(2)
+    topic.send(7, 90, 8, 91, 200)
+    assert topic.lost() == 0
+
+
+def test_no_message_is_lost_when_one_of_two_publishers_leaves(topic: Topic) -> None:
+    topic.look(2)
+    topic.send(7, 8, 3)
+    assert topic.lost() == 0
+    topic.look(1)
+    topic.send(9, 10)
+    assert topic.lost() == 0
+    topic.send(13)
+    assert topic.lost() == 2, "the one that stays is counted again"
+
+
+def test_messages_of_a_publisher_that_has_left_may_still_wait(topic: Topic) -> None:
+    topic.look(2)
+    topic.send(7, 3)
+    topic.look(1)
+    assert topic.lost() == 0
+    topic.send(200, 201, 203)
+    assert topic.lost() == 1
+
+
+def test_no_message_is_lost_when_a_publisher_leaves_between_two_looks(topic: Topic) -> None:
+    topic.look(2)
+    topic.send(7, 3)
+    topic.publishers = 1
+    topic.send(200)
+    assert topic.lost() == 0
+
+
+def test_no_message_is_lost_when_another_publisher_comes_between_two_looks(topic: Topic) -> None:
+    topic.send(7)
+    topic.publishers = 2
+    topic.send(200)
+    assert topic.lost() == 0

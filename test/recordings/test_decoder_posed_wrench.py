@@ -1,0 +1,110 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A wrench along the tip's axes becomes the wrench along the world's, whatever the portions in which it comes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from push_predictor.recordings.decoder.posed_wrench import PosedWrench
+from push_predictor.recordings.fields.wrench_axes import at_tip, in_sensor_axes
+from push_predictor.types import Array, IntArray
+
+MS = 10**6
+TIP = np.arange(0, 1000 * MS, 10 * MS)  # 100 Hz
+STAMPS = np.arange(3 * MS, 980 * MS, 4 * MS)  # 250 Hz
+NO_WRENCH, NO_TIP = (np.empty(0, np.int64), np.empty((0, 6))), (np.empty(0, np.int64), np.empty((0, 7)))
+
+
+def poses(stamp: IntArray) -> Array:
+    """A tip that turns by 2 rad a second about the vertical."""
+    half = 1e-9 * stamp
+    none = np.zeros(len(stamp))
+    return np.column_stack([none, none, none, none, none, np.sin(half), np.cos(half)])
+
+
+def world(stamp: IntArray) -> Array:
+    return np.column_stack(
+        [np.cos(1e-8 * stamp), np.sin(1e-8 * stamp), *np.tile([[1.0], [0.1], [0.2], [0.3]], len(stamp))]
+    )
+
+
+def measured(stamp: IntArray) -> Array:
+    return in_sensor_axes(world(stamp), poses(stamp))
+
+
+def put(turned: PosedWrench, stamp: IntArray, values: Array, at: IntArray, tip: Array) -> tuple[IntArray, Array]:
+    """Stamps and wrenches along the world's axes, about the tip, that are known with these portions."""
+    found = turned.put(stamp, values, at, tip)
+    assert found.sensor is not None and found.tip is not None
+    return found.stamp, at_tip(found.values, found.sensor, found.tip)
+
+
+@pytest.mark.parametrize("lag", [0, 37, -21])  # samples by which the wrench is ahead of the tip
+@pytest.mark.parametrize("portions", [1, 7])
+def test_the_wrench_is_that_along_the_axes_of_the_world(lag: int, portions: int) -> None:
+    turned, found = PosedWrench(), []
+    for part, tip in zip(np.array_split(STAMPS, portions), np.array_split(TIP, portions), strict=True):
+        ahead = part if lag >= 0 else part[:lag]
+        found.append(put(turned, ahead, measured(ahead), tip, poses(tip)))
+        if lag < 0:
+            found.append(put(turned, part[lag:], measured(part[lag:]), *NO_TIP))
+    stamp = np.concatenate([each for each, _ in found])
+    values = np.concatenate([each for _, each in found])
+    assert np.array_equal(stamp, STAMPS) and turned.without_pose == 0
+    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
+
+
+def test_a_wrench_waits_for_the_tip() -> None:
+    turned = PosedWrench()
+    stamp, _ = put(turned, STAMPS, measured(STAMPS), *NO_TIP)
+    assert len(stamp) == 0
+    stamp, _ = put(turned, *NO_WRENCH, TIP[:50], poses(TIP[:50]))
+    assert np.array_equal(stamp, STAMPS[TIP[49] >= STAMPS])
+    stamp, _ = put(turned, *NO_WRENCH, TIP[50:], poses(TIP[50:]))
+    assert np.array_equal(stamp, STAMPS[TIP[49] < STAMPS]) and turned.without_pose == 0
+
+
+def test_a_wrench_of_the_same_time_as_the_last_pose_waits_no_longer() -> None:
+    stamp, _ = put(PosedWrench(), TIP, measured(TIP), TIP, poses(TIP))
+    assert np.array_equal(stamp, TIP)
+
+
+def test_a_wrench_before_the_tip_or_in_a_dropout_of_it_has_no_pose() -> None:
+    turned = PosedWrench()
+    tip = np.concatenate([TIP[10:30], TIP[60:]])
+    stamp, values = put(turned, STAMPS, measured(STAMPS), tip, poses(tip))
+    outside = (TIP[10] > STAMPS) | ((TIP[29] < STAMPS) & (TIP[60] > STAMPS))
+    assert np.array_equal(stamp, STAMPS[~outside]) and turned.without_pose == outside.sum()
+    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
+
+
+def test_a_tip_without_orientation_turns_nothing() -> None:
+    turned = PosedWrench()
+    flat = np.zeros((len(TIP), 7))
+    stamp, _ = put(turned, STAMPS, measured(STAMPS), TIP, flat)
+    assert len(stamp) == 0
+    stamp, _ = put(turned, *NO_WRENCH, TIP, poses(TIP))
+    assert np.array_equal(stamp, STAMPS)
+
+
+def test_a_clock_that_is_set_back_begins_again() -> None:
+    turned = PosedWrench()
+    put(turned, STAMPS, measured(STAMPS), TIP[:-10] + 3_600_000 * MS, poses(TIP[:-10]))
+    assert turned.without_pose == len(STAMPS)
+    late = STAMPS + 3_600_000 * MS + 1000 * MS
+    put(turned, late, measured(STAMPS), *NO_TIP)
+    stamp, values = put(turned, STAMPS, measured(STAMPS), TIP, poses(TIP))
+    assert np.array_equal(stamp, STAMPS) and turned.without_pose == 2 * len(STAMPS)
+    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
+
+
+def test_few_poses_are_kept() -> None:
+    turned = PosedWrench()
+    for second in range(10):
+        put(turned, *NO_WRENCH, TIP + second * 1000 * MS, poses(TIP))
+    late = STAMPS + 9000 * MS
+    assert len(put(turned, late, measured(STAMPS), *NO_TIP)[0]) == len(STAMPS)
+    assert len(put(turned, STAMPS, measured(STAMPS), *NO_TIP)[0]) == 0 and turned.without_pose == len(STAMPS)

@@ -1,0 +1,275 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Transforms in any portions give the poses that reading a recording of them gives."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+from decoding import decoder_of, in_portions
+from decoding import put as hand
+from lab_bags import Lab, Message, pose_rows, robot_in_tf, short_recording
+
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder import transform_buffer
+from push_predictor.recordings.decoder.rules import NO_TRANSFORM
+from push_predictor.recordings.decoder.transform_buffer import SET_BACK, TransformBuffer
+from push_predictor.recordings.fields.sources import TF_TYPES
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.topics import Topics
+from push_predictor.types import Array, IntArray
+
+MILLISECOND = 1_000_000
+START = 1_700_000_000_000 * MILLISECOND
+
+
+@cache
+def original() -> Recording:
+    return short_recording(0.6, after=1.0)
+
+
+def put(buffer: TransformBuffer, messages: list[Message]) -> None:
+    for sent, topic, data in messages:
+        buffer.put(Messages.of(topic, TF_TYPES[0], [sent], [data]), topic == "/tf_static", live=True)
+
+
+def taken(buffer: TransformBuffer, messages: list[Message], frame: str, portion: int = 40) -> tuple[IntArray, Array]:
+    """All poses of a frame, taken after each portion of messages."""
+    parts = []
+    for first in range(0, len(messages), portion):
+        put(buffer, messages[first : first + portion])
+        parts.append(buffer.take(frame, last=first + portion >= len(messages)))
+        buffer.forget()
+    return np.concatenate([stamp for stamp, _ in parts]), np.concatenate([rows for _, rows in parts])
+
+
+def line(stamps: IntArray, speed: float = 1.0) -> Array:
+    """Rows (n, 7) of a motion along x at a constant speed, m/s."""
+    n = len(stamps)
+    return np.column_stack([speed * (stamps - START) * 1e-9, np.zeros((n, 5)), np.ones(n)])
+
+
+def every(period: float, begin: int, end: int) -> IntArray:
+    """Stamps in ns, all in ms from START."""
+    return np.asarray(START + np.arange(begin, end, period) * MILLISECOND, dtype=np.int64)
+
+
+def cart(coarse: IntArray, fine: IntArray) -> Lab:
+    """A tip that moves on a cart that moves, each at 1 m/s."""
+    lab = Lab()
+    lab.transform("/tf", "world", "cart", coarse, line(coarse))
+    lab.transform("/tf", "cart", "tip", fine, line(fine))
+    return lab
+
+
+@pytest.mark.parametrize("portion", [1, 37, 5000])
+def test_poses_are_those_of_a_recording_however_they_arrive(tmp_path: Path, portion: int) -> None:
+    lab = robot_in_tf(original())
+    read = read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:tip"))
+    for frame, stream in (("block", read.slider), ("tip", read.pusher)):
+        stamp, rows = taken(TransformBuffer([frame], "world"), lab.in_order(), frame, portion)
+        assert stamp.tolist() == stream.stamp.tolist()
+        np.testing.assert_allclose(rows[:, :3], pose_rows(stream)[:, :3], rtol=0.0, atol=1e-12)
+
+
+def test_several_portions_that_are_taken_at_once_stay_in_order() -> None:
+    messages = cart(every(20, 0, 1201), every(4, 0, 1201)).in_order()
+    buffer = TransformBuffer(["tip"], "world")
+    for portion in (messages[:100], messages[100:]):
+        times, data = [sent for sent, _, _ in portion], [each for *_, each in portion]
+        buffer.put(Messages.of("/tf", TF_TYPES[0], times, data), static=False)
+    stamp, rows = buffer.take("tip")
+    assert stamp.tolist() == every(4, 0, 1201).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
+
+
+def test_two_frames_share_the_messages_and_the_world(tmp_path: Path) -> None:
+    buffer = TransformBuffer(["block", "tip"])
+    put(buffer, robot_in_tf(original(), "map").in_order())
+    assert [len(buffer.take(frame, last=True)[0]) for frame in ("block", "tip", "block")] == [
+        len(original().slider),
+        len(original().pusher),
+        0,
+    ]
+    assert buffer.world == "map" and not buffer.problem("block")
+    assert (buffer.received("tip"), buffer.rejected("tip").total()) == (len(original().pusher), 0)
+
+
+def test_a_sample_waits_for_the_other_transforms() -> None:
+    lab, buffer = cart(every(20, 0, 1101), every(4, 0, 1151)), TransformBuffer(["tip"])
+    put(buffer, lab.in_order())
+    stamp, rows = buffer.take("tip")
+    assert stamp[-1] == START + 1100 * MILLISECOND, "the cart is known until then"
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
+    put(buffer, [m for m in cart(every(20, 1120, 1141), every(4, 0, 0)).in_order() if m[1] == "/tf"])
+    assert buffer.take("tip")[0].tolist() == every(4, 1104, 1141).tolist()
+
+
+def test_a_single_stamp_is_known_once_all_transforms_have_reached_it() -> None:
+    buffer, stamps = TransformBuffer([]), every(10, 0, 200)
+    put(buffer, cart(every(20, 0, 101), every(4, 0, 151)).in_order())
+    known, rows = buffer.at("tip", "world", stamps, "wrench")
+    assert stamps[known].tolist() == every(10, 0, 101).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamps[known] - START), atol=1e-12)
+    known, rows = buffer.at("tip", "world", stamps, "wrench", last=True)
+    assert known.all() and np.isnan(rows[stamps > START + 100 * MILLISECOND]).all()
+
+
+def test_samples_before_another_transform_began_or_in_its_dropout_are_counted() -> None:
+    coarse = every(20, 200, 2000)
+    coarse = coarse[(coarse < START + 800 * MILLISECOND) | (coarse > START + 1300 * MILLISECOND)]
+    buffer = TransformBuffer(["tip"], "world")
+    stamp, _ = taken(buffer, cart(coarse, every(4, 0, 2000)).in_order(), "tip")
+    assert buffer.rejected("tip")[NO_TRANSFORM] > 100
+    assert len(stamp) + buffer.rejected("tip")[NO_TRANSFORM] == buffer.received("tip")
+    assert np.diff(stamp).max() == 540 * MILLISECOND
+
+
+def test_a_clock_that_is_set_back_begins_anew() -> None:
+    first = cart(every(20, 60_000, 62_001), every(4, 60_000, 62_001)).in_order()
+    again = cart(every(20, 0, 1001), every(4, 0, 1001)).in_order()
+    buffer = TransformBuffer(["tip"])
+    stamp, rows = taken(buffer, [*first, *again], "tip", portion=50)
+    jump = int(np.flatnonzero(np.diff(stamp) < 0)[0]) + 1
+    assert jump + len(stamp[jump:]) == len(stamp) and stamp[jump:].tolist() == every(4, 0, 1001).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
+    waiting = TransformBuffer(["tip"])
+    put(waiting, cart(every(20, 60_000, 61_001), every(4, 60_000, 61_101)).in_order())
+    waiting.take("tip")
+    put(waiting, again)
+    waiting.take("tip")
+    assert waiting.rejected("tip")[SET_BACK] == 25, "they waited for the cart"
+
+
+def test_among_equal_transforms_the_nearest_to_the_frame_gives_the_stamps() -> None:
+    messages = cart(every(10, 0, 501), every(10, 3, 501)).in_order()
+    stamp, _ = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion=1)
+    assert len(stamp) > 40 and {*(stamp % (10 * MILLISECOND))} == {3 * MILLISECOND}
+
+
+@pytest.mark.parametrize("portion", [7, 37, 5000])
+def test_the_transform_with_most_samples_in_the_first_second_of_all_gives_the_stamps(portion: int) -> None:
+    messages = cart(every(20, 0, 2501), every(4, 1000, 2501)).in_order()
+    stamp, rows = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion)
+    assert stamp.tolist() == every(4, 1000, 2501).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
+
+
+@pytest.mark.parametrize("portion", [7, 37, 5000])
+def test_a_transform_that_becomes_finer_later_does_not_take_over(portion: int) -> None:
+    tip = np.concatenate([every(20, 0, 1500), every(2, 1500, 3001)])
+    stamp, _ = taken(TransformBuffer(["tip"], "world"), cart(every(10, 0, 3001), tip).in_order(), "tip", portion)
+    assert stamp.tolist() == every(10, 0, 3001).tolist()
+
+
+def test_samples_of_a_frame_without_connection_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transform_buffer, "LIMIT", 100)
+    buffer, stamps = TransformBuffer(["tip"], "world"), every(4, 0, 1000)
+    lab = Lab()
+    lab.transform("/tf", "cart", "tip", stamps, line(stamps))
+    taken(buffer, lab.in_order(), "tip")
+    assert (buffer.dropped, len(buffer._histories["tip"].edge.stamp)) == (150, 100)
+
+
+def test_the_last_static_transform_counts() -> None:
+    buffer, stamps, lab = TransformBuffer(["tip"], "world"), every(4, 0, 100), Lab()
+    lab.transform("/tf", "cart", "tip", stamps, line(stamps, 0.0))
+    lab.transform("/tf_static", "world", "cart", stamps[:2] + 10**6, [line(stamps[:1])[0], [5.0, *[0.0] * 5, 1.0]])
+    for message in lab.in_order():
+        put(buffer, [message])
+        buffer.recent("tip", 1)
+    assert buffer.take("tip")[1][:, 0] == pytest.approx(5.0) and len(buffer._histories["cart"].edge.stamp) == 1
+
+
+def test_a_frame_that_was_static_may_move() -> None:
+    static, moving = Lab(), cart(every(20, 20, 101), every(4, 0, 101))
+    static.transform("/tf_static", "world", "cart", every(1, 0, 1), line(every(1, 0, 1)))
+    buffer = TransformBuffer(["tip"], "world")
+    for messages in (static.in_order(), [message for message in moving.in_order() if message[1] == "/tf"]):
+        put(buffer, messages)
+        buffer.recent("tip", 1)
+    stamp, rows = buffer.take("tip", last=True)
+    assert stamp.tolist() == every(4, 0, 101).tolist()
+    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
+
+
+def test_a_pose_at_a_stamp_waits_for_the_slowest_of_two_transforms() -> None:
+    buffer, stamps = TransformBuffer([], "world"), START + np.array([40, 60, 80]) * MILLISECOND
+    put(buffer, cart(every(20, 0, 61), every(4, 0, 101)).in_order())
+    decided, rows = buffer.at("tip", "world", stamps, "wrench")
+    assert decided.tolist() == [True, True, False]
+    np.testing.assert_allclose(rows[:, 0], [0.08, 0.12], atol=1e-12)
+
+
+def test_old_samples_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transform_buffer, "KEPT", 100 * MILLISECOND)
+    buffer = TransformBuffer(["tip"])
+    stamp, _ = taken(buffer, cart(every(20, 0, 3001), every(4, 0, 3001)).in_order(), "tip")
+    assert len(stamp) == 751
+    assert {child: len(history.edge.stamp) for child, history in buffer._histories.items()}["tip"] < 50
+
+
+def test_a_decoder_keeps_the_transforms_of_some_seconds() -> None:
+    lab = cart(every(40, 0, 12_000), every(10, 0, 12_000))
+    decoder = decoder_of(lab, Topics("/tf:cart", "/tf:tip"))
+    for portion in in_portions(lab.in_order(), 100):
+        hand(decoder, lab, portion)
+        decoder.take()
+    (buffer,) = decoder.tf.values()
+    assert 500 <= len(buffer._histories["tip"].edge.stamp) < 700
+
+
+def test_a_frame_that_is_not_connected_is_named_until_it_is() -> None:
+    buffer, stamps = TransformBuffer(["tip"], "world"), every(4, 0, 100)
+    lab = Lab()
+    lab.transform("/tf", "cart", "tip", stamps, line(stamps))
+    put(buffer, lab.in_order())
+    assert len(buffer.take("tip")[0]) == 0
+    assert buffer.problem("tip") == "no frame 'world'; the frames are cart, tip"
+    static = Lab()
+    static.transform("/tf_static", "world", "cart", stamps[:1], line(stamps[:1]))
+    put(buffer, static.in_order())
+    assert buffer.take("tip", last=True)[0].tolist() == stamps.tolist() and not buffer.problem("tip")
+
+
+def test_a_tree_that_grows_above_its_root_is_reported() -> None:
+    buffer, stamps = TransformBuffer(["tip"]), every(4, 0, 1100)
+    lab = Lab()
+    lab.transform("/tf", "cart", "tip", stamps, line(stamps))
+    put(buffer, lab.in_order())
+    assert len(buffer.take("tip")[0]) == 275 and buffer.world == "cart" and not buffer.problem("tip")
+    static = Lab()
+    static.transform("/tf_static", "world", "cart", stamps[:1], line(stamps[:1]))
+    put(buffer, static.in_order())
+    assert len(buffer.take("tip")[0]) == 0
+    assert (
+        buffer.problem("tip") == "poses are given in 'cart', but the root of the tree is now 'world'; set world_frame"
+    )
+
+
+def test_a_frame_with_two_parents_is_refused_by_name() -> None:
+    buffer, stamps = TransformBuffer(["tip"]), every(4, 0, 100)
+    for parent in ("cart", "rail"):
+        lab = Lab()
+        lab.transform("/tf", parent, "tip", stamps, line(stamps))
+        put(buffer, lab.in_order())
+        buffer.take("tip")
+    assert buffer.problem("tip") == "frame 'tip' has the parents 'cart' and 'rail', one is accepted"
+    assert buffer.dropped == len(stamps)
+
+
+def test_reports_the_newest_stamps_without_taking_them() -> None:
+    buffer = TransformBuffer(["tip"])
+    assert len(buffer.recent("tip", 10)) == 0 and "no frame 'tip'" in buffer.problem("tip")
+    put(buffer, cart(every(20, 0, 1101), every(4, 0, 1101)).in_order())
+    waiting = len(buffer)
+    assert buffer.recent("tip", 10).tolist() == every(4, 1064, 1101).tolist()
+    assert len(buffer) == waiting == 332, "they wait as before"
+    assert len(buffer.take("tip")[0]) == 276 and len(buffer) == 0
