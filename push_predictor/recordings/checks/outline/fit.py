@@ -186,7 +186,7 @@ def _fit(
     free[YAW] &= centred.rotational_symmetry != 0
     problem = _Problem(touches, free)
     tried = starts(near_symmetry(centred), lambda full: problem.residuals(full[free]))
-    part = _best([_refined(problem, start[free]) for start in tried], problem.gaps)
+    part = _best(problem, [start[free] for start in tried])
     estimate, sd = _full(free, part), _full(free, _deviation(problem, part))
     gaps = touches.gaps(estimate)
     push_gaps, places = _by_push(touches.push, gaps, touches.placed(estimate).nearest.contact)
@@ -237,9 +237,16 @@ def _by_push(push: IntArray, gap: Array, contact: Array) -> tuple[Array, Array]:
     return gap[middle], contact[middle]
 
 
-def _best(parts: list[Array], gaps: Gaps) -> Array:
-    """The first, unless another leaves a clearly smaller gap; the first begins without a correction."""
-    costs = [_cost(gaps, part) for part in parts]
+def _best(problem: _Problem, starts: Sequence[Array]) -> Array:
+    """The fit from the first start, unless another leaves a clearly smaller gap; the first has no correction.
+
+    Below the noise of a tracker none is clearly smaller, and the others are not tried.
+    """
+    parts = [_refined(problem, starts[0])]
+    if _cost(problem.gaps, parts[0]) <= NOISE:
+        return parts[0]
+    parts += [_refined(problem, start) for start in starts[1:]]
+    costs = [_cost(problem.gaps, part) for part in parts]
     return parts[0] if costs[0] <= TIE * min(costs) else parts[int(np.argmin(costs))]
 
 
