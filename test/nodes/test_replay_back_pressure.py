@@ -62,23 +62,33 @@ def sent(publishers: ReplayTopics, topic: str, count: int) -> None:
         publishers.make_room(topic)
 
 
-def test_after_a_part_of_the_history_the_subscriber_is_waited_for(clock: Clock) -> None:
+def test_a_late_subscriber_is_waited_for_before_its_messages_are_overwritten(clock: Clock) -> None:
     publishers = replay(clock, since=0.4)
-    sent(publishers, TOPIC, DEPTH // PARTS - 1)
+    sent(publishers, TOPIC, DEPTH - 1)
     assert clock.now == 0.0
     sent(publishers, TOPIC, 1)
     assert clock.now == pytest.approx(0.4, abs=0.01) and publishers.overwritten == 0
 
 
+def test_one_that_has_caught_up_in_between_is_not_waited_for(clock: Clock) -> None:
+    publishers = replay(clock, since=0.4)
+    sent(publishers, TOPIC, DEPTH // PARTS)
+    clock.now = 0.5
+    sent(publishers, TOPIC, DEPTH // PARTS)
+    publishers.publishers[TOPIC].since = 9.0
+    sent(publishers, TOPIC, DEPTH - 1)
+    assert clock.now == 0.5
+
+
 def test_one_that_hangs_is_waited_for_once_and_its_losses_are_counted(clock: Clock) -> None:
-    publishers = replay(clock, since=60.0)
-    sent(publishers, TOPIC, 3 * DEPTH // PARTS)
-    assert clock.now == pytest.approx(PATIENCE, abs=0.01) and publishers.overwritten == 3 * DEPTH // PARTS
+    publishers, lost = replay(clock, since=60.0), 3 * DEPTH // PARTS
+    sent(publishers, TOPIC, DEPTH + 2 * DEPTH // PARTS)
+    assert clock.now == pytest.approx(PATIENCE, abs=0.01) and publishers.overwritten == lost
     clock.now = 61.0
     sent(publishers, TOPIC, DEPTH // PARTS)
     publishers.publishers[TOPIC].since = 62.0  # it has caught up, and is late again
-    sent(publishers, TOPIC, DEPTH // PARTS)
-    assert clock.now == pytest.approx(62.0, abs=0.01) and publishers.overwritten == 3 * DEPTH // PARTS
+    sent(publishers, TOPIC, DEPTH)
+    assert clock.now == pytest.approx(62.0, abs=0.01) and publishers.overwritten == lost
 
 
 def test_the_other_topics_and_the_end_do_not_wait(clock: Clock) -> None:

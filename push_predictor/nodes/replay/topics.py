@@ -22,7 +22,7 @@ from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.fields.sources import SCALAR_FIELDS, TF_TYPES
 
 OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
-PARTS = 4  # of a publisher's history, after each of which subscribers are waited for
+PARTS = 4  # of a publisher's history, after each of which its subscribers are looked at
 PATIENCE = 5.0  # s that subscribers are waited for
 POLL = 0.001  # s
 
@@ -44,7 +44,7 @@ class ReplayTopics:
         self.skipped: dict[str, str] = {}
         self.untimed: set[str] = set()
         self.overwritten = 0
-        self._sent: dict[str, int] = {}  # since the last wait, of topics whose history is bounded
+        self._sent: dict[str, int] = {}  # since all was acknowledged, of topics whose history is bounded
         self._lagging: set[str] = set()  # topics whose subscribers have not acknowledged in time
         for topic, kind in topics.items():
             self._open(topic, kind)
@@ -54,18 +54,22 @@ class ReplayTopics:
         if topic not in self._sent:
             return
         publisher = self.publishers[topic]
+        part = max(1, publisher.qos_profile.depth // PARTS)
         self._sent[topic] += 1
-        if self._sent[topic] < max(1, publisher.qos_profile.depth // PARTS):
+        if self._sent[topic] % part:
             return
-        count, self._sent[topic] = self._sent[topic], 0
+        if not _acknowledged(publisher) and self._sent[topic] + part <= publisher.qos_profile.depth:
+            return
         # A subscriber that hangs must not delay the others again and again.
         deadline = time.monotonic() + (0.0 if topic in self._lagging else PATIENCE)
         while not _acknowledged(publisher) and not self._ending():
             if time.monotonic() >= deadline:
-                self.overwritten += count
+                self.overwritten += part
+                self._sent[topic] -= part
                 self._lagging.add(topic)
                 return
             time.sleep(POLL)
+        self._sent[topic] = 0
         self._lagging.discard(topic)
 
     def publish(self, message: RawMessage) -> bool:
