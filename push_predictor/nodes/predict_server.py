@@ -106,6 +106,7 @@ class PredictServer(LifecycleNode):
 
     def close(self) -> None:
         """Publish the last diagnostics."""
+        self._closing.set()
         self._trace.close()
         self._diagnostics_thread.stop()
         self._publish_diagnostics()
@@ -202,8 +203,8 @@ class PredictServer(LifecycleNode):
     def _unload(self, state: str) -> None:
         self._state = state
         self._trace.abort(f"the node is {state} now")
+        self._registry, self._problems = ModelRegistry(), []  # before the services end: a loading must not wait for us
         self._destroy_services()
-        self._registry, self._problems = ModelRegistry(), []
         gc.collect()  # models contain reference cycles and take many MB each
 
     def _destroy_services(self) -> None:
@@ -237,31 +238,50 @@ class PredictServer(LifecycleNode):
         return self._guarded(handle_list_models, request, response)
 
     def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
-        was_empty = not self._registry.names
-        response = self._guarded(handle_load_model, request, response)
-        if not response.success:
-            return response
+        return self._guarded(self._load, request, response)
+
+    def _load(self, registry: ModelRegistry, request: Any, response: Any) -> None:
+        """Load a model and take it into use. Raises PushPredictorError."""
+        was_empty = not registry.names
+        handle_load_model(registry, request, response)
         self.get_logger().info(response.message)
         gc.collect()
-        self._in_executor(partial(self._use, response.name, request.make_default, was_empty))
-        return response
+        self._in_executor(registry, partial(self._use, response.name, request.make_default, was_empty))
 
     def _use(self, name: str, as_default: bool, was_empty: bool) -> None:
-        """Take a loaded model into use."""
         if as_default:
-            self.set_parameters([Parameter("default_model", value=name)])
+            (done,) = self.set_parameters([Parameter("default_model", value=name)])
+            if not done.successful:
+                raise InactiveError(done.reason)
         if was_empty and self._state == "inactive" and self.value("autostart"):
             self.trigger_activate()
 
-    def _in_executor(self, work: Callable[[], None]) -> None:
-        """Let the executor do some work and wait for it: parameters and states are changed in its thread only."""
+    def _in_executor(self, registry: ModelRegistry, work: Callable[[], None]) -> None:
+        """Let the executor do some work and wait for it: parameters and states are changed in its thread only.
+
+        Raises what the work raises, and InactiveError where the models are unloaded meanwhile.
+        """
         if self.executor is None:
             work()
             return
-        done = Event()
-        self.executor.create_task(work).add_done_callback(lambda _: done.set())
-        while not done.wait(0.1) and not self._closing.is_set():
-            pass
+        done, errors = Event(), list[Exception]()
+
+        def guarded() -> None:
+            try:
+                if self._registry is registry:
+                    work()
+            except Exception as error:
+                errors.append(error)
+            done.set()
+
+        self.executor.create_task(guarded)
+        while not done.wait(0.1):
+            if self._closing.is_set() or self._registry is not registry:
+                raise InactiveError(f"the node is {self._state}")
+        if errors:
+            raise errors[0]
+        if self._registry is not registry:
+            raise InactiveError(f"the node is {self._state}")
 
     def _prediction(self, handler: Handler, request: Any, response: Any) -> Any:
         start = perf_counter()

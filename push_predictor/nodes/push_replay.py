@@ -31,7 +31,7 @@ from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
 from push_predictor.errors import RecordingError, RigError
-from push_predictor.nodes.qos import CLOCK, LATCHED
+from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
 from push_predictor.nodes.replay.topics import ReplayTopics
@@ -64,7 +64,7 @@ class PushReplay(Node):
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
         self._status = self.create_publisher(String, "replay_status", LATCHED)
-        self._clock_publisher = self.create_publisher(Clock, "/clock", CLOCK)
+        self._clock_publisher = self.create_publisher(Clock, "/clock", KEPT if self._topics.untimed else CLOCK)
         self._rig = self.create_publisher(String, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None

@@ -26,7 +26,8 @@ from push_predictor.nodes.network_security import LIMITED, limit_discovery, requ
 from push_predictor.online.child_process import kill_children
 
 TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
-GRACE = 0.3  # s in which a start or a callback may still end after a signal
+GRACE = 0.3  # s in which a start may still end after a signal
+LONGEST = 3.0  # s in which a callback may: less than a launch waits for
 _GRAPH_ERRORS = (
     rclpy_implementation.RCLError,
     rclpy_implementation.RCLInvalidROSArgsError,
@@ -81,10 +82,10 @@ def run(
     """
     _parse(name, args)
     stop = Stop()
-    _handle_signals(stop)
     life = Life(name, make_node, stop, args, start)
+    _handle_signals(stop, life)
     life.spin()
-    signal.setitimer(signal.ITIMER_REAL, 0.0)  # the end is not interrupted
+    signal.signal(signal.SIGALRM, signal.SIG_IGN)  # the end is not interrupted
     status = life.end()
     if life.half_made:  # it may have threads that only a whole node could end
         kill_children()
@@ -125,7 +126,8 @@ class Life:
         except ExternalShutdownException:
             self._stop.request()
         except KeyboardInterrupt:
-            self.half_made = self._node is None
+            self.half_made = self._executor is None
+            self._stop.request()
         except BaseException as error:
             self._stop.fail(error)
 
@@ -154,7 +156,7 @@ class Life:
             self._stop.fail(error)
         try:
             self._node.close()
-        except PushPredictorError as error:
+        except Exception as error:
             self._stop.fail(error)
 
     def _made(self) -> Closable:
@@ -207,13 +209,13 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _handle_signals(stop: Stop) -> None:
-    """End at SIGINT and SIGTERM; what takes longer than GRACE then, a start or a callback, is interrupted."""
+def _handle_signals(stop: Stop, life: Life) -> None:
+    """End at SIGINT and SIGTERM; a start that takes longer than GRACE then is interrupted, a callback after LONGEST."""
 
     def end(number: int, frame: object) -> None:
         stop.request()
         signal.signal(number, signal.SIG_DFL)  # a second signal ends the process at once
-        signal.setitimer(signal.ITIMER_REAL, GRACE)
+        signal.setitimer(signal.ITIMER_REAL, LONGEST if life.spinning else GRACE)
 
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt

@@ -27,6 +27,8 @@ class ClockHistory:
 
     def put(self, data: bytes, sent: int) -> None:
         """Add a message of /clock."""
+        if len(data) < 12:  # of another type
+            return
         seconds, rest = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
         self._sent.append(max(sent, self._sent[-1] if self._sent else 0))
         self._clock.append(seconds * 1_000_000_000 + rest)
@@ -35,16 +37,14 @@ class ClockHistory:
 
     def known_until(self, now: int) -> int:
         """The sending time (ns) up to which messages can be dated at a time."""
-        if self.published:
-            return self._sent[-1] if self._sent else 0
-        return now - DELAY
+        return self._sent[-1] if self.published and self._sent else now - DELAY
 
     def at(self, sent: int) -> int | None:
         """The time (ns) published last before something was sent, None if it is not known.
 
         Without /clock, or long after its end, the time of sending itself.
         """
-        if not self.published and (not self._sent or sent > self._sent[-1] + STALE):
+        if not self._sent or (not self.published and sent > self._sent[-1] + STALE):
             return sent
         place = bisect_right(self._sent, sent)
         return self._clock[place - 1] if place else None

@@ -105,7 +105,7 @@ def refused_start(
 
     start: as main() of a node, from its arguments. params: names with `__` for a dot.
     """
-    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setattr(runtime, "_handle_signals", lambda *_: None)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     given = {name.replace("__", "."): value for name, value in params.items()}

@@ -44,7 +44,9 @@ class ReplayTopics:
         self.skipped: dict[str, str] = {}
         self.untimed: set[str] = set()
         self.overwritten = 0
-        self._sent: dict[str, int] = {}  # since all was acknowledged, of topics whose history is bounded
+        self._sent: dict[str, int] = {}  # of topics whose history is bounded
+        self._confirmed: dict[str, int] = {}  # how many of these were acknowledged, or given up
+        self._looked: dict[str, int] = {}  # after how many of them the subscribers were looked at last
         self._lagging: set[str] = set()  # topics whose subscribers have not acknowledged in time
         for topic, kind in topics.items():
             self._open(topic, kind)
@@ -55,21 +57,23 @@ class ReplayTopics:
             return
         publisher = self.publishers[topic]
         part = max(1, publisher.qos_profile.depth // PARTS)
-        self._sent[topic] += 1
-        if self._sent[topic] % part:
+        sent = self._sent[topic]
+        if sent % part or sent == self._looked.get(topic, 0):
             return
-        if not _acknowledged(publisher) and self._sent[topic] + part <= publisher.qos_profile.depth:
+        self._looked[topic] = sent
+        unconfirmed = sent - self._confirmed.get(topic, 0)
+        if not _acknowledged(publisher) and unconfirmed + part <= publisher.qos_profile.depth:
             return
         # A subscriber that hangs must not delay the others again and again.
         deadline = time.monotonic() + (0.0 if topic in self._lagging else PATIENCE)
         while not _acknowledged(publisher) and not self._ending():
             if time.monotonic() >= deadline:
                 self.overwritten += part
-                self._sent[topic] -= part
+                self._confirmed[topic] = self._confirmed.get(topic, 0) + part
                 self._lagging.add(topic)
                 return
             time.sleep(POLL)
-        self._sent[topic] = 0
+        self._confirmed[topic] = sent
         self._lagging.discard(topic)
 
     def publish(self, message: RawMessage) -> bool:
@@ -82,6 +86,8 @@ class ReplayTopics:
                 throttle_duration_sec=5.0,
             )
             return False
+        if message.topic in self._sent:
+            self._sent[message.topic] += 1
         return True
 
     def acknowledged(self) -> bool:

@@ -45,6 +45,7 @@ class SensorSubscriber:
 
     def __init__(self, node: Node, topics: Topics) -> None:
         check_sources(topics)
+        self._error = node.get_logger().error
         self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
         wanted = topics.world or topics.wrench_tf_frame
         used = {source.topic.strip("/") for _, source in sources_of(topics) if source.frame}
@@ -107,6 +108,7 @@ class SensorSubscriber:
             return
         self._looked = monotonic()
         with self._draining:
+            self._scalars.move()
             self._scalars.look()
             for stream in self._subscribed():
                 stream.move()
@@ -125,7 +127,10 @@ class SensorSubscriber:
 
     def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):
-            self.drain()
+            try:
+                self.drain()
+            except Exception as error:  # without this thread the queues would overflow
+                self._error(f"messages could not be taken: {error!r}", throttle_duration_sec=10.0)
 
     def begin(self, rig: Rig) -> None:
         """Begin a run: the samples that are taken from now on are of this rig."""

@@ -97,7 +97,9 @@ class McapFile:
             for of in dict.fromkeys(wanted[channel] for channel in np.unique(rows[:, 0]).tolist()):
                 own = [channel for channel, other in wanted.items() if other == of]
                 _, time, start, end = rows[np.isin(rows[:, 0], own)].T
-                yield Messages(*of, time, content, start, end - start)
+                # Copied: a chunk may be mostly of other topics, such as a camera's.
+                parts = [bytes(content[a:b]) for a, b in zip(start.tolist(), end.tolist(), strict=True)]
+                yield Messages.of(*of, time, parts)
         yield from gathered(single)
 
     def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, _Found, Wanted, bool]]:

@@ -45,7 +45,7 @@ class Messages:
     def of(topic: str, kind: str, times: Sequence[int] | IntArray, data: Sequence[bytes]) -> Messages:
         """The same of single messages."""
         length = np.fromiter(map(len, data), np.int64, len(data))
-        logged = np.asarray(times, np.uint64).astype(np.int64)
+        logged = times if isinstance(times, np.ndarray) else np.array([_signed(time) for time in times], np.int64)
         return Messages(topic, kind, logged, b"".join(data), np.cumsum(length) - length, length)
 
     def __len__(self) -> int:
@@ -61,6 +61,11 @@ class Messages:
         for length in np.unique(self.length).tolist():
             rows = np.flatnonzero(self.length == length)
             yield rows, data[self.start[rows][:, None] + np.arange(length)]
+
+
+def _signed(time: int) -> int:
+    """A time of 64 bits without a sign as one with it: damaged files have any."""
+    return time if time < 2**63 else time - 2**64
 
 
 def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:

@@ -17,6 +17,7 @@ from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.fields.sources import POSE_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
+from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, IntArray
 
 Names: TypeAlias = NDArray[np.str_]
@@ -74,6 +75,9 @@ class PoseTopic:
 
     def _turned(self, stamp: IntArray, values: Array, frame: Names, last: bool) -> tuple[IntArray, Array]:
         """The poses in the world whose transforms have come; those after one that waits wait as well."""
+        if len(stamp) and len(self._stamp) and self._stamp.max() - stamp[-1] > CLOCK_SET:  # all that waits is old
+            self.rejected[NO_TRANSFORM] += len(self._stamp)
+            self._stamp, self._values, self._frame = self._stamp[:0], self._values[:0], self._frame[:0]
         stamp, values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
         frame = np.concatenate([self._frame, frame])
         turned, known, without = values.copy(), np.ones(len(stamp), np.bool_), np.zeros(len(stamp), np.bool_)
@@ -91,9 +95,10 @@ class PoseTopic:
             at = rows[known[rows]]
             turned[at], without[at] = composed(poses, values[at]), np.isnan(poses).any(axis=1)
         expired = ~known & (last | (stamp < stamp.max(initial=0) - WAIT))
-        usable({NO_TRANSFORM: without | expired}, self.rejected)
         waits = ~known & ~expired
         end = int(np.argmax(waits)) if waits.any() else len(stamp)
+        if gone := int(np.sum((without | expired)[:end])):
+            self.rejected[NO_TRANSFORM] += gone
         self._stamp, self._values, self._frame = stamp[end:], values[end:], frame[end:]
         ready = np.flatnonzero(~(without | expired)[:end])
         return stamp[ready], turned[ready]

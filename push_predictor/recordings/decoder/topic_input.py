@@ -43,13 +43,14 @@ class TopicInput:
         self.foreign: Counter[str] = Counter()
         self.named: frozenset[str] = frozenset()
         self._reader: FieldReader | None = None
+        self._count = self._undecoded = 0  # of the messages that wait: all, and those that are not decoded
         self._waiting: list[tuple[Messages, IntArray | None]] = []
         self._decoded: list[Columns] = []
         self._recent: list[_Recent] = []
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
-        return sum(len(messages) for messages, _ in self._waiting) + sum(len(c.stamp) for c in self._decoded)
+        return self._count
 
     @property
     def timed(self) -> bool:
@@ -68,7 +69,8 @@ class TopicInput:
         field = self.check(kind, schemas, where)
         reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas))
         with self._lock:  # messages of an earlier type cannot be read as those of the new one
-            self.dropped += sum(len(messages) for messages, _ in self._waiting)
+            old, self._undecoded = self._undecoded, 0
+            self.dropped, self._count = self.dropped + old, self._count - old
             self._waiting, self._recent = [], []
             self.kind, self._reader = kind, reader
 
@@ -79,14 +81,20 @@ class TopicInput:
             return
         with self._lock:
             self.received += len(messages)
+            self._count += len(messages)
             self._waiting.append((messages, arrived))
-            while arrived is not None and len(self) > LIMIT:  # the oldest first
-                self.dropped += len(self._decoded.pop(0).stamp if self._decoded else self._waiting.pop(0)[0])
+            self._undecoded += len(messages)
+            while arrived is not None and self._undecoded > LIMIT:  # the oldest first
+                old = len(self._waiting.pop(0)[0])
+                self.dropped, self._count = self.dropped + old, self._count - old
+                self._undecoded -= old
 
     def take(self) -> Columns:
         """The columns of the messages since the last call."""
         self._decode()
         decoded, self._decoded = self._decoded, []
+        with self._lock:
+            self._count -= sum(len(columns.stamp) for columns in decoded)
         return _joined(decoded, self.target.count)
 
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
@@ -99,7 +107,7 @@ class TopicInput:
 
     def _decode(self) -> None:
         with self._lock:
-            waiting, self._waiting = self._waiting, []
+            waiting, self._waiting, self._undecoded = self._waiting, [], 0
             reader = self._reader
         if reader is None:
             return
@@ -109,8 +117,28 @@ class TopicInput:
             self._decoded.append(columns)
             if arrived is not None:
                 self._recent.append((columns.stamp[columns.valid], arrived[columns.valid], columns.named))
+        if waiting and waiting[-1][1] is not None:
+            self._drop_oldest()
         while self._recent and sum(len(stamp) for stamp, _, _ in self._recent[1:]) >= RECENT:
             self._recent.pop(0)
+
+    def _drop_oldest(self) -> None:
+        """Of what is decoded, beyond LIMIT."""
+        excess = sum(len(columns.stamp) for columns in self._decoded) - LIMIT
+        while excess > 0:
+            first = self._decoded.pop(0)
+            old = min(excess, len(first.stamp))
+            if old < len(first.stamp):
+                stamp, values, valid, frame = (
+                    first.stamp[old:],
+                    first.values[old:],
+                    first.valid[old:],
+                    first.frame[old:],
+                )
+                self._decoded.insert(0, Columns(stamp, values, valid, frame, first.frames))
+            excess -= old
+            with self._lock:
+                self.dropped, self._count = self.dropped + old, self._count - old
 
 
 def _joined(parts: Sequence[Columns], count: int) -> Columns:

@@ -122,12 +122,11 @@ class TransformBuffer:
         are kept; last: no more will come. Raises TransformError.
         """
         tree = self.tree()
-        self._wanted.setdefault(asks, None)
         reached = [int(edge.stamp.max()) for edge in tree.not_static(frame, world).values()]
         known = np.ones(len(stamp), np.bool_) if last or not reached else stamp <= min(reached)
         found = tree.poses_at(frame, world, stamp[known])
         pending = [*stamp[~known].tolist(), *reached] or stamp.tolist()
-        self._wanted[asks] = min(pending, default=self._wanted[asks])
+        self._wanted[asks] = min(pending, default=self._wanted.get(asks))
         return known, found
 
     def recent(self, frame: str, count: int) -> IntArray:

@@ -57,8 +57,8 @@ class ScalarTopics:
         """Date the messages whose time on /clock is known by now; last: all."""
         until = sys.maxsize if last else self._clock.known_until(time_ns())
         for name, waiting in self._undated.items():
-            count = sum(message.sent < until for message in waiting)
-            due, self._undated[name] = waiting[:count], waiting[count:]
+            due = [message for message in waiting if message.sent < until]
+            self._undated[name] = [message for message in waiting if message.sent >= until]
             own, times = self._streams[name].input, [self._clock.at(message.sent) for message in due]
             dated = [message for message, time in zip(due, times, strict=True) if time is not None]
             if len(dated) < len(due):
