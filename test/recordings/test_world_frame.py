@@ -227,3 +227,25 @@ def test_the_world_is_an_option_and_is_saved(tmp_path: Path, capsys: pytest.Capt
     assert main(["check", path]) == 0
     assert main(["info", path, "--world-frame", "desk"]) == 1
     assert "world_frame 'desk' (option --world-frame)" in capsys.readouterr().err
+
+
+def test_poses_in_another_frame_go_on_after_a_replay_began_again() -> None:
+    """The newest poses wait for tf at the end of each round; they must not hold back the next round."""
+    begin, rounds = 100 * 10**9, []
+    stamp = begin + np.arange(0, 10 * 10**9, 4 * 10**6)
+    lab = Lab()
+    rows = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamp), 1))
+    for topic in ("/slider/pose", "/pusher/pose"):
+        given = {"header.frame_id": "cam", "pose.orientation.w": 1.0}
+        poses = ({**lab.header(time, "header"), **given} for time in stamp.tolist())
+        lab.add(topic, "geometry_msgs/msg/PoseStamped", stamp, poses)
+    lab.transform("/tf", "base", "cam", stamp[::5], rows[::5])
+    decoder = decoder_of(lab, Topics(world="base"))
+    for _ in range(3):
+        count = 0
+        for portion in in_portions(lab.in_order(), 200):
+            put(decoder, lab, portion, live=True)
+            count += len(decoder.take().slider)
+        rounds.append(count)
+    assert min(rounds) > 0.99 * len(stamp)
+    assert decoder.poses["slider"].rejected.total() + sum(rounds) + len(decoder.poses["slider"]) == 3 * len(stamp)
