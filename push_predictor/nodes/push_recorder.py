@@ -12,7 +12,6 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
     sys.exit(entry.push_recorder())
 
-import threading
 from collections.abc import Sequence
 from time import monotonic
 
@@ -50,7 +49,6 @@ class PushRecorder(Node):
         self._topics = RecorderSubscriptions(self, self._recording)
         self._line = LiveLine(self.get_logger().info, self.get_logger().warning)
         self._publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._working = threading.Lock()  # close() is called by another thread
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(PERIOD, self._work, clock=steady)
         self.create_timer(SHOWN, self._show, clock=steady)
@@ -58,22 +56,18 @@ class PushRecorder(Node):
 
     def close(self) -> None:
         """Write what has arrived, and complete the bag. Raises RecordingError if it cannot be written."""
-        with self._working:
-            self._line.clear()
-            try:
-                if self._stop.error is None:
-                    self._move()
-            finally:
-                self.summary = self._recording.close(monotonic())
+        self._line.clear()
+        try:
+            if self._stop.error is None:
+                self._move()
+        finally:
+            self.summary = self._recording.close(monotonic())
 
     def _work(self) -> None:
-        with self._working:
-            if self.summary is not None:
-                return
-            self._move()
-            self._topics.look()
-            if 0.0 < self._options.duration <= self._recording.seconds:
-                self._stop.request()
+        self._move()
+        self._topics.look()
+        if 0.0 < self._options.duration <= self._recording.seconds:
+            self._stop.request()
 
     def _move(self) -> None:
         self._rigs.work()
@@ -82,15 +76,12 @@ class PushRecorder(Node):
         self._topics.drain()
 
     def _show(self) -> None:
-        with self._working:
-            if self.summary is None:
-                self._recording.work(monotonic())
-                self._line.show(self._recording.progress(monotonic()), monotonic())
+        self._recording.work(monotonic())
+        self._line.show(self._recording.progress(monotonic()), monotonic())
 
     def _publish(self) -> None:
-        with self._working:
-            name, progress = self.get_fully_qualified_name(), self._recording.progress(monotonic())
-            status = recorder_status(name, progress, self._rigs.rig)
+        name, progress = self.get_fully_qualified_name(), self._recording.progress(monotonic())
+        status = recorder_status(name, progress, self._rigs.rig)
         self._publisher.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
 
 

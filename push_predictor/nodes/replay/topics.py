@@ -46,7 +46,6 @@ class ReplayTopics:
         self.overwritten = 0
         self._sent: dict[str, int] = {}  # of topics whose history is bounded
         self._confirmed: dict[str, int] = {}  # how many of these were acknowledged, or given up
-        self._looked: dict[str, int] = {}  # after how many of them the subscribers were looked at last
         self._lagging: set[str] = set()  # topics whose subscribers have not acknowledged in time
         for topic, kind in topics.items():
             self._open(topic, kind)
@@ -58,18 +57,17 @@ class ReplayTopics:
         publisher = self.publishers[topic]
         part = max(1, publisher.qos_profile.depth // PARTS)
         sent = self._sent[topic]
-        if sent % part or sent == self._looked.get(topic, 0):
+        if sent % part or sent == self._confirmed[topic]:
             return
-        self._looked[topic] = sent
-        unconfirmed = sent - self._confirmed.get(topic, 0)
-        if not _acknowledged(publisher) and unconfirmed + part <= publisher.qos_profile.depth:
+        room = sent - self._confirmed[topic] + part <= publisher.qos_profile.depth
+        if room and not _acknowledged(publisher):
             return
         # A subscriber that hangs must not delay the others again and again.
         deadline = time.monotonic() + (0.0 if topic in self._lagging else PATIENCE)
         while not _acknowledged(publisher) and not self._ending():
             if time.monotonic() >= deadline:
                 self.overwritten += part
-                self._confirmed[topic] = self._confirmed.get(topic, 0) + part
+                self._confirmed[topic] += part
                 self._lagging.add(topic)
                 return
             time.sleep(POLL)
@@ -114,7 +112,7 @@ class ReplayTopics:
             return
         profile = publisher.qos_profile
         if profile.history == HistoryPolicy.KEEP_LAST and profile.reliability == ReliabilityPolicy.RELIABLE:
-            self._sent[topic] = 0
+            self._sent[topic] = self._confirmed[topic] = 0
 
     def _publisher(self, topic: str, name: str, found: type, kept: bool) -> Publisher:
         profile = replay_profile(self._qos.get(topic, ""), kept)
