@@ -180,13 +180,13 @@ def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
         if pose.problem:
             turned = f"; the frame of the poses is turned into world_frame {world!r} (option --world-frame)"
             raise pose.messages.source.error(bag.path, pose.problem + turned)
-        notes += _notes(label, pose.rejected, pose.messages.foreign)
-        if frames := pose.named - ({world} if not decoder.topics.world else pose.named):
+        notes += _notes(label, pose.messages.rejected, pose.messages.foreign)
+        if frames := set() if decoder.topics.world else pose.messages.named - {world}:
             notes.append(f"{label}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
     if decoder.headless:
         label = _label(bag, decoder.poses["pusher"])
         notes.append(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
-    one, other = ({frame.strip("/") for frame in decoder.poses[name].named} - {""} for name in POSES)
+    one, other = ({frame.strip("/") for frame in decoder.of(name).named} - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
         both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
         notes.append(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")

@@ -248,4 +248,4 @@ def test_poses_in_another_frame_go_on_after_a_replay_began_again() -> None:
             count += len(decoder.take().slider)
         rounds.append(count)
     assert min(rounds) > 0.99 * len(stamp)
-    assert decoder.poses["slider"].rejected.total() + sum(rounds) + len(decoder.poses["slider"]) == 3 * len(stamp)
+    assert decoder.of("slider").rejected.total() + sum(rounds) + len(decoder.poses["slider"]) == 3 * len(stamp)

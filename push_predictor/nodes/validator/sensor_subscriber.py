@@ -22,6 +22,7 @@ from push_predictor.online.sensors.topic_report import ReportLog, TopicReport
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame
 from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
+from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.sources import Source
 from push_predictor.recordings.fields.transforms import WORLD
@@ -57,10 +58,10 @@ class SensorSubscriber:
         self._streams: dict[str, Stream] = {
             name: FrameStream(node, pose.source, self._tf[pose.source.topic.strip("/")])
             if isinstance(pose, PoseFrame)
-            else TopicStream(node, pose.messages, pose.expected)
+            else TopicStream(node, pose.messages)
             for name, pose in decoder.poses.items()
         }
-        self._streams["wrench"] = TopicStream(node, decoder.wrench.messages, decoder.wrench.expected)
+        self._streams["wrench"] = TopicStream(node, decoder.wrench.messages)
         self._scalars = ScalarTopics(node, decoder.scalars)
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
@@ -207,8 +208,8 @@ class SensorSubscriber:
             if own.rejected:
                 kinds = ", ".join(f"{kind} {count}" for kind, count in own.rejected.items())
                 found.append(f"{topic}: {own.rejected.total()} of {own.received} samples were rejected ({kinds}).")
-            if isinstance(self._streams[report.stream], TopicStream) and own.problem:
-                found.append(f"{topic}: {own.problem}.")
+            if isinstance(own, TopicInput) and (problem := self.decoder.problem(report.stream)):
+                found.append(f"{topic}: {problem}.")
             if lost:
                 found.append(f"{topic}: {lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
             if own.dropped:

@@ -113,8 +113,8 @@ class Findings:
             if own.rejected:
                 kinds = ", ".join(f"{kind} {count}" for kind, count in own.rejected.items())
                 found[name] = f"{source.text}: {own.rejected.total()} samples were rejected ({kinds})."
-            if own.problem:
-                found[name] = f"{source.error('', own.problem)}."
+            if problem := self._decoder.problem(name):
+                found[name] = f"{source.error('', problem)}."
         return found | self._refused
 
     def silent(self, now: float) -> dict[str, float]:

@@ -21,8 +21,6 @@ from push_predictor.recordings.decoder.rules import (
     PUSHER,
     SCALAR,
     SLIDER,
-    UNREADABLE,
-    broken,
     has_orientation,
     pusher_stream,
     slider_stream,
@@ -95,9 +93,14 @@ class StreamDecoder:
         """How many messages of the sensors wait."""
         return sum(map(len, self.poses.values())) + len(self.wrench.messages)
 
-    def of(self, stream: str) -> PoseTopic | PoseFrame | WrenchInput:
-        """The input of slider, pusher or wrench."""
-        return self.wrench if stream == "wrench" else self.poses[stream]
+    def of(self, stream: str) -> TopicInput | PoseFrame:
+        """What counts the samples of a stream."""
+        pose = self.poses.get(stream)
+        return pose if isinstance(pose, PoseFrame) else self.inputs()[stream]
+
+    def problem(self, stream: str) -> str:
+        """Why slider, pusher or wrench has no samples, or is not turned; empty if there is no reason."""
+        return (self.wrench if stream == "wrench" else self.poses[stream]).problem
 
     def begin(self, rig: Rig) -> None:
         """Begin a run: the samples that are taken from now on are of this rig."""
@@ -141,7 +144,7 @@ class StreamDecoder:
         """The frames that the poses name, without a given world, into which they are turned."""
         if self.topics.world:
             return frozenset({self.topics.world})
-        return frozenset(name.strip("/") for pose in self.poses.values() for name in pose.named)
+        return frozenset(name.strip("/") for stream in POSES for name in self.of(stream).named)
 
 
 def key_of(topic: str) -> str:
@@ -171,9 +174,8 @@ def _buffers(topics: Topics, sources: Mapping[str, Source], expected: str) -> di
 
 def _scalar(each: TopicInput, span: tuple[int, int] | None) -> ScalarStream:
     """The usable samples of a scalar; span: of the stamps (ns) of the poses, None if it is not known."""
-    columns = each.take()
-    faults = {UNREADABLE: ~columns.valid} | broken(columns.values, SCALAR)
+    columns = each.usable(SCALAR)
     if span is not None:
-        faults[OTHER_CLOCK] = (columns.stamp < span[0] - FAR) | (columns.stamp > span[1] + FAR)
-    kept = usable(faults, each.rejected)
-    return ScalarStream(columns.stamp[kept], columns.values[kept, 0])
+        far = (columns.stamp < span[0] - FAR) | (columns.stamp > span[1] + FAR)
+        columns = columns.rows(usable({OTHER_CLOCK: far}, each.rejected))
+    return ScalarStream(columns.stamp, columns.values[:, 0])

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from push_predictor.recordings.decoder.rules import NO_TRANSFORM, OTHER_FRAME, UNREADABLE, Rules, broken, usable
+from push_predictor.recordings.decoder.rules import NO_TRANSFORM, Rules, broken, usable
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.pose_rows import composed
@@ -32,51 +32,27 @@ class PoseTopic:
     """
 
     def __init__(self, name: str, source: Source, rules: Rules, tf: TransformBuffer, world: str, expected: str) -> None:
-        self.messages = TopicInput(source, POSE_TARGET)
+        self.messages = TopicInput(source, POSE_TARGET, "" if world else expected)
         self.problem = ""  # why poses are not turned
         self._name, self._rules, self._tf = name, rules, tf
-        self._world, self.expected = world, "" if world else expected
+        self._world = world
         self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 7))
         self._frame: Names = np.empty(0, np.str_)
 
     def __len__(self) -> int:
         return len(self.messages) + len(self._stamp)
 
-    @property
-    def received(self) -> int:
-        """How many messages there have been."""
-        return self.messages.received
-
-    @property
-    def rejected(self) -> Counter[str]:
-        """Unusable samples, by fault."""
-        return self.messages.rejected
-
-    @property
-    def dropped(self) -> int:
-        """Messages that nobody took in time."""
-        return self.messages.dropped
-
-    @property
-    def named(self) -> frozenset[str]:
-        """The frames that headers have named."""
-        return self.messages.named
-
     def take(self, last: bool = False) -> tuple[IntArray, Array]:
         """Stamps (n,) in ns and poses (n, 7) of the usable samples since the last call; last: no more will come."""
-        columns = self.messages.take()
-        frames = np.array([name.strip("/") for name in columns.frames])[columns.frame]
-        faults = {UNREADABLE: ~columns.valid}
-        if self.expected and self.messages.timed:
-            faults[OTHER_FRAME] = frames != self.expected
-        kept = usable(faults | broken(columns.values, self._rules), self.rejected)
-        found = columns.stamp[kept], columns.values[kept]
-        return self._turned(*found, frames[kept], last) if self._world else found
+        columns = self.messages.usable(self._rules)
+        if not self._world:
+            return columns.stamp, columns.values
+        return self._turned(columns.stamp, columns.values, columns.frame_names(), last)
 
     def _turned(self, stamp: IntArray, values: Array, frame: Names, last: bool) -> tuple[IntArray, Array]:
         """The poses in the world whose transforms have come; those after one that waits wait as well."""
         if len(stamp) and len(self._stamp) and self._stamp.max() - stamp[-1] > CLOCK_SET:  # all that waits is old
-            self.rejected[NO_TRANSFORM] += len(self._stamp)
+            self.messages.rejected[NO_TRANSFORM] += len(self._stamp)
             self._stamp, self._values, self._frame = self._stamp[:0], self._values[:0], self._frame[:0]
         stamp, values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
         frame = np.concatenate([self._frame, frame])
@@ -98,7 +74,7 @@ class PoseTopic:
         waits = ~known & ~expired
         end = int(np.argmax(waits)) if waits.any() else len(stamp)
         if gone := int(np.sum((without | expired)[:end])):
-            self.rejected[NO_TRANSFORM] += gone
+            self.messages.rejected[NO_TRANSFORM] += gone
         self._stamp, self._values, self._frame = stamp[end:], values[end:], frame[end:]
         ready = np.flatnonzero(~(without | expired)[:end])
         return stamp[ready], turned[ready]
@@ -142,5 +118,5 @@ class PoseFrame:
     def take(self, last: bool = False) -> tuple[IntArray, Array]:
         """See PoseTopic."""
         stamp, rows = self._tf.take(self.source.frame, last)
-        kept = usable({UNREADABLE: np.zeros(len(stamp), np.bool_), **broken(rows, self._rules)}, self._broken)
+        kept = usable(broken(rows, self._rules), self._broken)
         return stamp[kept], rows[kept]

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.rules import OTHER_FRAME, UNREADABLE, Rules, broken, usable
 from push_predictor.recordings.fields.sources import (
     Columns,
     FieldReader,
@@ -31,12 +32,12 @@ RECENT = 250  # samples that are kept for the report about a live topic
 class TopicInput:
     """received: number of messages. rejected: unusable ones by fault; foreign: those of another type, by type.
 
-    named: the frames that headers have named. dropped: messages of a live topic that nobody took in time. `put` may be
-    called in any thread, the others in one.
+    named: the frames that headers have named; expected: the one that they must name, '' for any. dropped: messages of
+    a live topic that nobody took in time. `put` may be called in any thread, the others in one.
     """
 
-    def __init__(self, source: Source, target: Target) -> None:
-        self.source, self.target = source, target
+    def __init__(self, source: Source, target: Target, expected: str = "") -> None:
+        self.source, self.target, self.expected = source, target, expected
         self.kind = ""
         self.received = self.dropped = 0
         self.rejected: Counter[str] = Counter()
@@ -97,6 +98,14 @@ class TopicInput:
             self._count -= sum(len(columns.stamp) for columns in decoded)
         return _joined(decoded, self.target.count)
 
+    def usable(self, rules: Rules) -> Columns:
+        """Of `take` those that are readable, in the expected frame and break no rule; the others are rejected."""
+        columns = self.take()
+        faults = {UNREADABLE: ~columns.valid}
+        if self.expected and self.timed:
+            faults[OTHER_FRAME] = columns.frame_names() != self.expected
+        return columns.rows(usable(faults | broken(columns.values, rules), self.rejected))
+
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
         """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
         self._decode()
@@ -129,13 +138,7 @@ class TopicInput:
             first = self._decoded.pop(0)
             old = min(excess, len(first.stamp))
             if old < len(first.stamp):
-                stamp, values, valid, frame = (
-                    first.stamp[old:],
-                    first.values[old:],
-                    first.valid[old:],
-                    first.frame[old:],
-                )
-                self._decoded.insert(0, Columns(stamp, values, valid, frame, first.frames))
+                self._decoded.insert(0, first.rows(slice(old, None)))
             excess -= old
             with self._lock:
                 self.dropped, self._count = self.dropped + old, self._count - old

@@ -5,21 +5,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from push_predictor.recordings.decoder.bias_so_far import BiasSoFar
 from push_predictor.recordings.decoder.posed_wrench import PosedWrench, Wrenches
 from push_predictor.recordings.decoder.rules import (
-    OTHER_FRAME,
     SPATIAL_WRENCH,
-    UNREADABLE,
     WRENCH,
-    broken,
     pusher_stream,
     slider_stream,
-    usable,
     wrench_stream,
 )
 from push_predictor.recordings.decoder.topic_input import TopicInput
@@ -42,19 +36,19 @@ UNKNOWN_BIAS = (
 class WrenchInput:
     """The wrench of a source. tf: has the sensor's frame, where the axes are those of a frame.
 
-    messages: of the topic. expected: frame that headers must name, '' for any. world: of the poses, '' before it is
-    known; named: frames that the poses' headers name.
+    messages: of the topic. expected: frame that headers must name, '' for any, if the axes are the world's, else they
+    name the sensor's. world: of the poses, '' before it is known; named: frames that the poses' headers name.
     """
 
     def __init__(self, source: Source, topics: Topics, tf: TransformBuffer, expected: str) -> None:
-        self.messages = TopicInput(source, WRENCH_TARGET)
+        axes_of_world = topics.wrench_axes == WORLD_AXES
+        self.messages = TopicInput(source, WRENCH_TARGET, expected if axes_of_world else "")
         self.problem = self.turned_into = ""  # why the axes are not turned; the frame into which they are
         self.frame = topics.wrench_tf_frame
         self.world, self.named = topics.world, frozenset[str]()
         self._tf = tf
-        self.expected = expected if topics.wrench_axes == WORLD_AXES else ""  # else headers name the sensor's frame
         axes = self._axes_at if self.frame else None
-        self._posed = None if topics.wrench_axes == WORLD_AXES else PosedWrench(axes)
+        self._posed = None if axes_of_world else PosedWrench(axes)
         self.bias = BiasSoFar() if topics.wrench_bias == FREE_MOTION else None
 
     def begin(self, rig: Rig) -> None:
@@ -64,7 +58,8 @@ class WrenchInput:
 
     def take(self, slider: tuple[IntArray, Array], tip: tuple[IntArray, Array], last: bool = False) -> WrenchStream:
         """The wrenches that are known with these new poses: stamps (n,) ns and poses (n, 7)."""
-        found = self._usable()
+        columns = self.messages.usable(WRENCH if self._posed is None else SPATIAL_WRENCH)
+        found = Wrenches(columns.stamp, columns.values)
         if self._posed is not None:
             found = self._posed.put(found.stamp, found.values, *tip, last)
         if self.bias is not None:
@@ -72,15 +67,6 @@ class WrenchInput:
         if found.sensor is None or found.tip is None:
             return wrench_stream(found.stamp, found.values)
         return wrench_stream(found.stamp, at_tip(found.values, found.sensor, found.tip))
-
-    def _usable(self) -> Wrenches:
-        columns = self.messages.take()
-        other = np.array([name.strip("/") != self.expected for name in columns.frames])[columns.frame]
-        faults = {UNREADABLE: ~columns.valid}
-        faults |= {OTHER_FRAME: other} if self.expected and self.messages.timed else {}
-        rules = WRENCH if self._posed is None else SPATIAL_WRENCH
-        kept = usable(faults | broken(columns.values, rules), self.messages.rejected)
-        return Wrenches(columns.stamp[kept], columns.values[kept])
 
     def _axes_at(self, stamp: IntArray, last: bool) -> tuple[BoolArray, Array]:
         """See AxesAt: by tf, in the world as far as tf has it, else in the root above the frame."""
@@ -96,21 +82,6 @@ class WrenchInput:
             self.problem = str(error)
             return np.zeros(len(stamp), np.bool_), np.zeros((0, 7))
         return found
-
-    @property
-    def received(self) -> int:
-        """How many messages there have been."""
-        return self.messages.received
-
-    @property
-    def rejected(self) -> Counter[str]:
-        """Unusable samples, by fault."""
-        return self.messages.rejected
-
-    @property
-    def dropped(self) -> int:
-        """Messages that nobody took in time."""
-        return self.messages.dropped
 
     @property
     def without_pose(self) -> int:

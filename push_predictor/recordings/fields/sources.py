@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.definitions import POSE, WRENCH
@@ -116,6 +117,14 @@ class Columns:
     def named(self) -> frozenset[str]:
         """The frames of readable messages."""
         return frozenset(self.frames[k] for k in np.unique(self.frame[self.valid]).tolist())
+
+    def frame_names(self) -> NDArray[np.str_]:
+        """The frame (n,) of each, without the slashes around it."""
+        return np.array([name.strip("/") for name in self.frames])[self.frame]
+
+    def rows(self, which: BoolArray | slice) -> Columns:
+        """Some of the messages."""
+        return Columns(self.stamp[which], self.values[which], self.valid[which], self.frame[which], self.frames)
 
 
 class FieldReader:

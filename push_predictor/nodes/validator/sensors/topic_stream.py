@@ -30,12 +30,12 @@ NO_WRENCH = "No publisher: contact is found from geometry alone."
 class TopicStream:
     """Moves the messages of a topic into an input of a decoder.
 
-    expected: the frame that headers must name, '' for any. earlier: also take what was sent before. Call `look` and
+    earlier: also take what was sent before. Call `look` and
     `report` in the executor's thread; not at the same time as `move`.
     """
 
-    def __init__(self, node: Node, own: TopicInput, expected: str = "", earlier: bool = False) -> None:
-        self.input, self._expected = own, expected
+    def __init__(self, node: Node, own: TopicInput, earlier: bool = False) -> None:
+        self.input = own
         topic = own.source.topic
         self.name = node.resolve_topic_name(topic) + own.source.text[len(topic) :]  # after remapping, for people
         self._subscription = FollowingSubscription(node, topic, DEPTH, earlier=earlier, overridable=not earlier)
@@ -109,10 +109,11 @@ class TopicStream:
         offered = [reliability for kind, reliability in self._offered if kind == self.input.kind]
         if self._subscription.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
-        if self._expected and (others := [frame for frame in frames if frame.strip("/") != self._expected]):
+        expected = self.input.expected
+        if expected and (others := [frame for frame in frames if frame.strip("/") != expected]):
             wrench = ", or wrench_frame to tip or a frame of tf" if stream == "wrench" else ""
             names = " and ".join(map(repr, others))
-            return f"frame_id {names} is not accepted, give {self._expected!r}, or set world_frame{wrench}."
+            return f"frame_id {names} is not accepted, give {expected!r}, or set world_frame{wrench}."
         if monotonic() - self._heard > SILENT:
             return f"No message for over {SILENT:g} s."
         return ""
