@@ -170,7 +170,7 @@ def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
         pose = decoder.poses[name]
         label = _label(bag, pose)
         if isinstance(pose, PoseFrame):
-            if pose.problem and f"no frame {world!r}" in pose.problem and decoder.topics.world:
+            if pose.lacks_world and decoder.topics.world:
                 raise _option_error(bag, "world_frame", world, pose.problem)
             if pose.problem:
                 raise pose.source.error(bag.path, pose.problem)

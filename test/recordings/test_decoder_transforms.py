@@ -232,11 +232,12 @@ def test_a_frame_that_is_not_connected_is_named_until_it_is() -> None:
     lab.transform("/tf", "cart", "tip", stamps, line(stamps))
     put(buffer, lab.in_order())
     assert len(buffer.take("tip")[0]) == 0
-    assert buffer.problem("tip") == "no frame 'world'; the frames are cart, tip"
+    assert buffer.problem("tip") == "no frame 'world'; the frames are cart, tip" and buffer.lacks_world("tip")
     static = Lab()
     static.transform("/tf_static", "world", "cart", stamps[:1], line(stamps[:1]))
     put(buffer, static.in_order())
     assert buffer.take("tip", last=True)[0].tolist() == stamps.tolist() and not buffer.problem("tip")
+    assert not buffer.lacks_world("tip")
 
 
 def test_a_tree_that_grows_above_its_root_is_reported() -> None:
@@ -268,6 +269,7 @@ def test_a_frame_with_two_parents_is_refused_by_name() -> None:
 def test_reports_the_newest_stamps_without_taking_them() -> None:
     buffer = TransformBuffer(["tip"])
     assert len(buffer.recent("tip", 10)) == 0 and "no frame 'tip'" in buffer.problem("tip")
+    assert not buffer.lacks_world("tip")
     put(buffer, cart(every(20, 0, 1101), every(4, 0, 1101)).in_order())
     waiting = len(buffer)
     assert buffer.recent("tip", 10).tolist() == every(4, 1064, 1101).tolist()

@@ -115,6 +115,11 @@ class PoseFrame:
         """Why there are no poses, empty if there are."""
         return self._tf.problem(self.source.frame)
 
+    @property
+    def lacks_world(self) -> bool:
+        """Whether there are no poses because the world is in no transform."""
+        return self._tf.lacks_world(self.source.frame)
+
     def take(self, last: bool = False) -> tuple[IntArray, Array]:
         """See PoseTopic."""
         stamp, rows = self._tf.take(self.source.frame, last)

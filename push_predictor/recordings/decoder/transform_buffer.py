@@ -53,7 +53,7 @@ class _Progress:
     newest: int | None = None
     received: int = 0
     rejected: Counter[str] = field(default_factory=Counter)
-    problem: str = ""
+    problem: TransformError | None = None
 
 
 class TransformBuffer:
@@ -111,7 +111,7 @@ class TransformBuffer:
             found = self._new_poses(progress, frame, tree, moving, last)
             progress.problem = self._other_root(tree)
         except TransformError as error:
-            progress.problem = str(error)
+            progress.problem = error.with_traceback(None)
             return nothing
         return found
 
@@ -135,7 +135,7 @@ class TransformBuffer:
         try:
             moving = tree.moving(frame, self.world or tree.root(self._frames[0]))
         except TransformError as error:
-            progress.problem = str(error)
+            progress.problem = error.with_traceback(None)
             return np.zeros(0, np.int64)
         progress.problem = self._other_root(tree)
         leader = progress.leader if progress.leader in moving else _leader(moving, last=True)
@@ -151,13 +151,19 @@ class TransformBuffer:
 
     def problem(self, frame: str) -> str:
         """Why a frame has no poses, empty if it has."""
-        return self._problem or self._progress[frame].problem
+        return self._problem or str(self._progress[frame].problem or "")
 
-    def _other_root(self, tree: TransformTree) -> str:
-        """In words, that the tree has grown above the frame that was its root at first; empty if not."""
+    def lacks_world(self, frame: str) -> bool:
+        """Whether a frame has no poses because the world is in no transform."""
+        problem = self._progress[frame].problem
+        return not self._problem and problem is not None and problem.missing == self.world
+
+    def _other_root(self, tree: TransformTree) -> TransformError | None:
+        """That the tree has grown above the frame that was its root at first, if it has."""
         if self._given or not self.world or (root := tree.root(self._frames[0])) == self.world:
-            return ""
-        return f"poses are given in {self.world!r}, but the root of the tree is now {root!r}; set world_frame"
+            return None
+        text = f"poses are given in {self.world!r}, but the root of the tree is now {root!r}; set world_frame"
+        return TransformError(text)
 
     def _absorb(self) -> None:
         with self._lock:

@@ -37,7 +37,11 @@ class Edge:
 
 
 class TransformError(ValueError):
-    """A frame has no pose; the message states why and which frames there are."""
+    """A frame has no pose; the message states why and which frames there are. missing: the one that is not there."""
+
+    def __init__(self, message: str, missing: str | None = None) -> None:
+        super().__init__(message)
+        self.missing = missing
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,7 @@ class TransformTree:
     def _ancestors(self, frame: str) -> list[str]:
         """The frame, its parent and so on to the root."""
         if frame not in self.frames:
-            raise TransformError(f"no frame {frame!r}; the frames are {', '.join(self.frames) or 'none'}")
+            raise TransformError(f"no frame {frame!r}; the frames are {', '.join(self.frames) or 'none'}", frame)
         found = [frame]
         while (edge := self.edges.get(found[-1])) is not None:
             if edge.parent in found:

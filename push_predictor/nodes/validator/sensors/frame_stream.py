@@ -110,8 +110,9 @@ class FrameStream:
     def _problem(self) -> str:
         if self._topics.problem:
             return self._topics.problem
-        if problem := self._topics.buffer.problem(self._source.frame):
-            advice = "; set world_frame" if f"no frame {self._topics.buffer.world!r}" in problem else ""
+        buffer, frame = self._topics.buffer, self._source.frame
+        if problem := buffer.problem(frame):
+            advice = "; set world_frame" if buffer.lacks_world(frame) else ""
             return f"{problem[0].upper()}{problem[1:]}{advice}."
         if monotonic() - self._topics.heard > SILENT:
             return f"No message for over {SILENT:g} s."
