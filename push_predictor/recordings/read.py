@@ -17,7 +17,7 @@ from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import POSES, StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
-from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, STREAMS, TF, sources_of
+from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, STREAMS, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
 from push_predictor.recordings.fields.transforms import WORLD
@@ -109,9 +109,7 @@ def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder) -> set[str]:
         if kind in SCALAR_FIELDS and name_of(_scalar_source(topic)) not in decoder.scalars:
             decoder.add_scalar(_scalar_source(topic)).declare(kind, bag.schemas, bag.path)
             read.add(topic)
-    of_tf = {_named(bag, source.topic) for source in named.values() if source.frame}
-    of_tf |= {_named(bag, TF)} if topics.world or (topics.wrench_tf_frame and not of_tf) else set()
-    both = {name for topic in of_tf for name in (topic, topic + STATIC)}
+    both = {name for topic in decoder.tf for name in (_named(bag, topic), _named(bag, topic) + STATIC)}
     return read | {name for name in both if bag.topics.get(name) in TF_TYPES}
 
 

@@ -19,8 +19,8 @@ from push_predictor.nodes.validator.sensors.frame_stream import FrameStream, Tra
 from push_predictor.nodes.validator.sensors.scalar_topics import ScalarTopics
 from push_predictor.nodes.validator.sensors.topic_stream import TopicStream
 from push_predictor.online.sensors.topic_report import ReportLog, TopicReport
-from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, name_of
-from push_predictor.recordings.decoder.poses import PoseFrame
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
@@ -48,15 +48,9 @@ class SensorSubscriber:
         check_sources(topics)
         self._error = node.get_logger().error
         self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
-        wanted = topics.world or topics.wrench_tf_frame
-        used = {source.topic.strip("/") for _, source in sources_of(topics) if source.frame}
-        self._tf = {
-            name: TransformTopics(node, f"/{name}", buffer)
-            for name, buffer in decoder.tf.items()
-            if wanted or name in used
-        }
+        self._tf = {name: TransformTopics(node, f"/{name}", buffer) for name, buffer in decoder.tf.items()}
         self._streams: dict[str, Stream] = {
-            name: FrameStream(node, pose.source, self._tf[pose.source.topic.strip("/")])
+            name: FrameStream(node, pose.source, self._tf[key_of(pose.source.topic)])
             if isinstance(pose, PoseFrame)
             else TopicStream(node, pose.messages)
             for name, pose in decoder.poses.items()
@@ -66,7 +60,8 @@ class SensorSubscriber:
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
         self._empty = monotonic()  # when nothing waited last
-        self._settled = bool(topics.world) or not used  # whether the frame of poses is known from the first message
+        of_topics = all(isinstance(pose, PoseTopic) for pose in decoder.poses.values())
+        self._settled = bool(topics.world) or of_topics  # whether the frame of poses is known from the first message
         self._looked = -LOOK
         self._draining, self._ending = threading.Lock(), threading.Event()
         self.look()

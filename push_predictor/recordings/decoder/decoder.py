@@ -66,7 +66,7 @@ class StreamDecoder:
         named = sources_of(topics)
         sources = {name: source for name, source in named if name != COVARIATE}
         self.tf = _buffers(topics, sources, expected)
-        first = next(iter(self.tf.values()))
+        first = next(iter(self.tf.values()), TransformBuffer([]))
         self.poses: dict[str, PoseTopic | PoseFrame] = {
             name: PoseFrame(source, rules, self.tf[key_of(source.topic)])
             if (source := sources[name]).frame
@@ -158,14 +158,16 @@ def name_of(source: Source) -> str:
 
 
 def _buffers(topics: Topics, sources: Mapping[str, Source], expected: str) -> dict[str, TransformBuffer]:
-    """The transforms by their topic; the first has the frame of the wrench, and turns poses into the world.
+    """The transforms by topic, of the needed ones; the first has the wrench's frame, and turns poses into the world.
 
     Where the other pose comes from a topic, poses from tf are given in the frame that its headers must name.
     """
     poses = [sources[name] for name in POSES]
     frames = [source for source in poses if source.frame]
     world = topics.world or ("" if len(frames) == len(poses) else expected)
-    names = [*dict.fromkeys(key_of(source.topic) for source in frames)] or [key_of(TF)]
+    names = [*dict.fromkeys(key_of(source.topic) for source in frames)]
+    if not names and (topics.world or topics.wrench_tf_frame):
+        names = [key_of(TF)]
     return {
         name: TransformBuffer([source.frame for source in frames if key_of(source.topic) == name], world)
         for name in names
