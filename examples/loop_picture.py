@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import COLOURS, NEARBY, draw, grid
 from push_predictor.residuals.evidence.loading import load_evidence
+from push_predictor.residuals.reporting.phrases import interval, shown_unit
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -183,13 +185,13 @@ def _title(verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> str:
 
 
 def effect_in_words(effect: Mapping[str, Any]) -> str:
-    """An effect in words: contact friction, changes with elapsed time (step), 0.25 (95 % CI 0.2 to 0.3)."""
+    """An effect in words: contact friction, changes with elapsed time (step), 0.25 (95 % CI 0.20 to 0.30)."""
     name = f"{_words(effect['mechanism'] or 'unknown mechanism')}, {_dependence(effect)}"
     size = effect["parameter"]
     if size is None:
         return name
-    low, high = (_number(size[end]) for end in ("low", "high"))
-    return f"{name}, {_number(size['value'])} {_unit(size['unit'])}".strip() + f" (95 % CI {low} to {high})"
+    factor, unit = shown_unit(size["unit"])
+    return f"{name}, {interval(Estimate(size['value'], size['low'], size['high']).times(factor), unit)}"
 
 
 def _dependence(effect: Mapping[str, Any]) -> str:
