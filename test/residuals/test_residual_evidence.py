@@ -23,7 +23,7 @@ from push_predictor.residuals.evidence.standardised import blocks_of, evidence_o
 from push_predictor.types import Array
 
 
-def trained(table: PushTable, kind: str = "analytical") -> PushModel:
+def trained(table: PushTable, kind: str = "gp") -> PushModel:
     return train_model(table, square_rig(), kind, name="deployed", options=TrainingOptions(mean="zero"))
 
 
@@ -121,10 +121,19 @@ def test_contacts_far_from_all_of_training_are_a_shift_and_symmetric_ones_are_no
     assert shift.covariate == "contact" and shift.share_outside > 0.3
 
 
+def test_mechanics_that_learnt_nothing_extrapolate_to_other_speeds_alone(known: PushTable) -> None:
+    narrow = known.take((np.abs(known.inputs[:, 2]) < 0.4) & (np.mod(4.0 * known.inputs[:, 1], 1.0) < 0.6))
+    model = trained(narrow, "analytical")
+    assert input_shift(model, known).inputs == () and not input_shift(model, known).outside.any()
+    faster = input_shift(model, with_inputs(known, 0, np.full(len(known), 3.0 * known.inputs[:, 0].max())))
+    assert [each.covariate for each in faster.inputs] == ["velocity"] and faster.outside.all()
+    assert "angle" in {each.covariate for each in input_shift(trained(narrow), known).inputs}
+
+
 def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTable) -> None:
     slow = with_inputs(known, 0, np.full(len(known), 0.02))
     fast = with_inputs(known, 0, np.full(len(known), 0.06))
-    model = trained(slow)
+    model = trained(slow, "analytical")
     evidence = evidence_of(model, fast)
     wider = widened(evidence, model, input_shift(model, fast))
     assert wider.z == pytest.approx(evidence.z / 3.0)
@@ -150,7 +159,7 @@ def test_deviations_beyond_training_grow_once(known: PushTable, per_path: bool) 
 
 
 def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_stays(known: PushTable) -> None:
-    analytical, learned = trained(known), trained(known, "gp")
+    analytical, learned = trained(known, "analytical"), trained(known)
     assert about_mechanics(analytical) is analytical
     informed = about_mechanics(learned)
     assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)

@@ -4,7 +4,8 @@
 """Whether new pushes lie outside the inputs that a model was trained on, or in a part of them only.
 
 Outside them the model's error is extrapolation: a trace goes on there with mechanics, and noise in proportion to the
-travel. About the rest of them the new pushes say nothing.
+travel. About the rest of them the new pushes say nothing. Mechanics that learnt no function of the inputs do not
+extrapolate to other contacts and angles, only to other speeds, at which noise and inertia differ.
 """
 
 from __future__ import annotations
@@ -63,6 +64,9 @@ def input_shift(model: PushModel, table: PushTable) -> InputShift:
     """Compare the inputs of n new windows with those of a model's training windows."""
     training = model.training.inputs
     outside = _outside(table.inputs, training, model.rig.outline.rotational_symmetry)
+    if not model.base.predictor.learnt:
+        nowhere = np.zeros(len(table), dtype=np.bool_)
+        outside |= {"contact": nowhere, "angle": nowhere}
     unvisited = _outside(training, table.inputs, 1)  # real sides differ, although a model takes them for the same
     every = [
         ShiftedInput(
