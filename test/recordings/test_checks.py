@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +43,7 @@ from push_predictor.recordings.checks.frames import mirrored, swapped
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.write import write_recording
@@ -149,6 +151,23 @@ def test_a_slider_that_never_moves_is_refused() -> None:
     slider = bag(SMALL).slider
     still = replace(bag(SMALL), slider=replace(slider, x=slider.x * 0.0, y=slider.y * 0.0, heading=0.0 * slider.x))
     assert found(still, rig_of(SMALL))["no_contact"].severity == "refused"
+
+
+def test_pushes_at_2_mm_per_s_by_a_quiet_tracker_are_pushes() -> None:
+    """What moves is judged by the tracker's noise: a real rig pushed at 2.5 mm/s, slower than any fixed threshold."""
+    quiet = with_poses(bag(SMALL), lambda values: np.convolve(values, np.full(5, 0.2), "same"))
+    slow = replace(quiet, slider=slower(quiet.slider), pusher=slower(quiet.pusher), wrench=None)
+    assert "no_contact" not in found(slow, rig_of(SMALL))
+
+
+def slower(stream: PoseStream) -> PoseStream:
+    """Every pose ten times as late."""
+    return replace(stream, stamp=stream.stamp[0] + 10 * (stream.stamp - stream.stamp[0]))
+
+
+def with_poses(recording: Recording, alter: Callable[[Array], Array]) -> Recording:
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, **{c: alter(getattr(slider, c)) for c in ("x", "y", "heading")}))
 
 
 @pytest.mark.parametrize(("name", "lag"), [("ellipse_plywood", -0.05), (SMALL, 0.05), (ONE_SIDE, 0.05)])

@@ -16,7 +16,8 @@ from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array, BoolArray, IntArray
 
 SPAN = 0.05  # s before and after a sample that determine its speed
-MOVING = 0.003  # m/s: a slower slider may be the tracker's noise
+MOVING = 0.003  # m/s: a faster slider moves, whatever the tracker's noise
+NOISE = 6.0  # standard deviations of the speed of a slider at rest: what is faster moves
 FEWEST = 5  # samples of each stream
 
 
@@ -63,7 +64,7 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     speed = np.hypot(np.hypot(velocity[:, 0], velocity[:, 1]), turn * velocity[:, 2])
     tip_speed, options = np.hypot(*tip_velocity.T), WindowOptions()
     lowered = tip[:, 2] - slider.z[order] < options.lift
-    moving = speed > MOVING
+    moving = speed > np.clip(NOISE * _speed_noise(pose * [1.0, 1.0, turn]), options.least_speed, MOVING)
     contact = moving & lowered & (tip_speed > options.least_speed)
     force = _force(recording, origin, time)
     height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
@@ -95,6 +96,12 @@ def _velocity(time: Array, values: Array) -> Array:
     """Mean velocities (n, k) from SPAN before to SPAN after each sample."""
     before, after = np.maximum(time - SPAN, time[0]), np.minimum(time + SPAN, time[-1])
     return np.asarray((_at(after, time, values) - _at(before, time, values)) / (after - before)[:, None])
+
+
+def _speed_noise(values: Array) -> float:
+    """Standard deviation (m/s) of the speed at rest, from the second differences of n samples (n, k), m."""
+    spread = 1.4826 * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
+    return float(np.max(spread) * np.sqrt(2.0) / (2.0 * SPAN))
 
 
 def _force(recording: Recording, origin: int, time: Array) -> Array:
