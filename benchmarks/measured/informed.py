@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/results/informed.md.
+"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/results/prior.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.informed --data FOLDER [--bags bags] [--sizes N ...]
         [--models vhgp:zero vhgp:mechanics ...]

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models on pushes measured by others: prints the tables of docs/results/measured.md.
+"""Models on pushes measured by others: prints the tables of docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
 

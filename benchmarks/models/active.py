@@ -9,7 +9,7 @@
 
 --data: the folder of the measured data: whole pushes of mit_square are chosen from four of five folds, and the fifth is
 predicted. --rigs: simulated ones, each with a pool of 300 pushes and 100 others to predict. `run` appends one line per
-trained model to FILE; `table` prints the tables of docs/results/suggest.md.
+trained model to FILE; `table` prints the tables of docs/results/prior.md.
 
 Every way starts with its own first batch and grows to the sizes below; the model is trained again after each batch. The
 pushes that matter are those of the pool, of which a way sees the inputs of all and the outcomes of those it has chosen.

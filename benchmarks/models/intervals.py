@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Coverage of the intervals for new pushes, without and with tails: docs/results/intervals.md.
+"""Coverage of the intervals for new pushes, without and with tails: docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.intervals [--data FOLDER] [--bags bags] [--sets]
         [--runs FOLDER] [--sizes N ...] [--means mechanics zero] [--kind vhgp]

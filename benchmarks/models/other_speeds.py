@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models that were trained at one speed and are asked at others: docs/results/informed.md.
+"""Models that were trained at one speed and are asked at others: docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.other_speeds [--rigs simulated foreign points] [--count 3]
         [--rows 300] [--work FOLDER]
