@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.points_rig.arrays import GRAVITY, dot, quarter_turn, rotate
 from benchmarks.points_rig.drivers import Driver
 from benchmarks.points_rig.effects import Effect
 from benchmarks.points_rig.outlines import rectangle
 from benchmarks.points_rig.pairs import make_pair, write_pair
 from benchmarks.points_rig.pieces import clean_ratio
-from benchmarks.points_rig.rigs import Rig, draw_rig
+from benchmarks.points_rig.rigs import GRAVITY, Rig, draw_rig
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import STEP, Tracks, draw_noise, simulate
+from benchmarks.support.plane import dot, quarter_turn, rotate
 
 TRUTH_KEYS = {
     "number", "group", "seed", "engine", "shape", "surface", "friction", "pushes", "kind", "channel", "names",
