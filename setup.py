@@ -120,7 +120,6 @@ setup(
         "parquet": ["pyarrow>=14"],
         "dxf": ["ezdxf>=1.1"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
-        "foreign": ["mujoco>=3.2", "mcap-ros2-support>=0.5", "rosbags>=0.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
             "catkin_pkg>=1",

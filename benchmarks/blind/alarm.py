@@ -1,13 +1,18 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""False-alarm rate and delay of the alarm about a VHGP, on simulated recordings.
+"""False-alarm rate and delay of the alarm, on simulated recordings.
 
-    python -m benchmarks.blind.alarm [--seeds 8] [--json FILE] [--markdown FILE]
+    python -m benchmarks.blind.alarm unchanged --out FOLDER [--models 40] [--streams 5] [--first 1000]
+    python -m benchmarks.blind.alarm changed [--seeds 8]
 
-For each seed a rig is drawn and a VHGP of 1000 windows is trained on 500 pushes. Two later recordings of 300 pushes
-follow: one without a change, and one in which the contact friction rises by 0.25 (a medium effect) at a push between
-the 90th and the 210th.
+Rigs are drawn as for the blind recordings, and every later recording is judged at the rate 0.01.
+
+unchanged: for each seed from --first on, a VHGP and an analytical model of 250 pushes (500 windows) judge --streams
+recordings of 150 pushes without a change. FOLDER has one file per seed: an interrupted run continues. The recordings
+of a seed share a training recording, so their false alarms are not independent.
+changed: for each seed a VHGP of 1000 windows of 500 pushes judges a recording of 300 pushes, in which the contact
+friction rises by 0.25 (a medium effect) at a push between the 90th and the 210th.
 """
 
 from __future__ import annotations
@@ -15,8 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -37,7 +41,9 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.types import Array
 
-TRAINING, LATER, ROWS = 500, 300, 1000
+KINDS = ("vhgp", "analytical")
+TRAINING, LATER, ROWS = 250, 150, 500  # pushes, pushes, windows: without a change
+LONG_TRAINING, LONG_LATER, MANY_ROWS = 500, 300, 1000  # with one
 RISE = 0.25  # of the contact friction: a medium effect of benchmarks/blind/effects.py
 SHARES = (0.3, 0.7)  # of the later pushes, between which the change comes
 
@@ -46,17 +52,16 @@ SHARES = (0.3, 0.7)  # of the later pushes, between which the change comes
 class Row:
     """The alarm on one recording.
 
-    change: the push before which the change came, None without one. fired: number of pushes seen when the alarm fired,
-    None if it did not; by: the score that fired. seconds: of the calibration.
+    kind: of the model. change: the push before which the change came, None without one. fired: number of pushes seen
+    when the alarm fired, None if it did not; by: the score that fired.
     """
 
     seed: int
     rig: str
-    pushes: int
+    kind: str
     change: int | None
     fired: int | None
     by: str | None
-    seconds: float
 
     @property
     def delay(self) -> int | None:
@@ -71,91 +76,102 @@ class Row:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table of all recordings."""
+    """Judge the recordings and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=8)
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--markdown", type=Path)
+    commands = parser.add_subparsers(required=True)
+    command = commands.add_parser("unchanged")
+    command.set_defaults(work=_unchanged)
+    command.add_argument("--out", type=Path, required=True, help="folder of the results")
+    command.add_argument("--models", type=int, default=40, help="rigs (default 40)")
+    command.add_argument("--streams", type=int, default=5, help="later recordings of each (default 5)")
+    command.add_argument("--first", type=int, default=1000, help="first seed (default 1000)")
+    command = commands.add_parser("changed")
+    command.set_defaults(work=_changed)
+    command.add_argument("--seeds", type=int, default=8)
     options = parser.parse_args(arguments)
-    rows: list[Row] = []
-    for seed in range(options.seeds):
-        rows += rows_of(seed)
-        print(f"\r{seed + 1} of {options.seeds}", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    if options.json:
-        options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
-    text = markdown_of(rows)
-    if options.markdown:
-        options.markdown.write_text(text)
-    print(text)
+    work: Callable[[argparse.Namespace], str] = options.work
+    print(work(options))
     return 0
 
 
-def rows_of(seed: int) -> list[Row]:
-    """Rows of the recordings of one seed, without and with the change."""
-    model, plain, changed, change = case_of(seed)
-    begin = time.process_time()
-    calibration = calibrate(model)
-    seconds = time.process_time() - begin
-    rig = f"{model.rig.shape} on {model.rig.surface}"
-    found = []
-    for table, at in ((plain, None), (changed, change)):
-        state = state_of(model, calibration, table)
-        fired = state.fired_after, state.fired_by
-        found.append(Row(seed, rig, state.pushes, at, *fired, seconds))
-    return found
+def _unchanged(options: argparse.Namespace) -> str:
+    options.out.mkdir(parents=True, exist_ok=True)
+    files = [options.out / f"{seed}.json" for seed in range(options.first, options.first + options.models)]
+    for file in (file for file in files if not file.exists()):
+        found = [asdict(row) for row in rows_without_change(int(file.stem), options.streams)]
+        file.write_text(json.dumps(found, indent=1) + "\n")
+        print(file, file=sys.stderr, flush=True)
+    rows = [Row(**one) for file in files for one in json.loads(file.read_text())]
+    lines = ["| base | rigs | false alarms | 95 % interval | rigs with one |", "| --- | --- | --- | --- | --- |"]
+    for kind in KINDS:
+        own = [row for row in rows if row.kind == kind]
+        false = [row for row in own if row.false]
+        low, high = wilson(len(false), len(own))
+        rigs, with_one = len({row.seed for row in own}), len({row.seed for row in false})
+        lines.append(f"| {kind} | {rigs} | {len(false)} of {len(own)} | {low:.3f} to {high:.3f} | {with_one} |")
+    return "\n".join([*lines, *(f"- {row}" for row in rows if row.false)])
 
 
-def case_of(seed: int) -> tuple[PushModel, PushTable, PushTable, int]:
-    """A model, the windows of later pushes without and with a change, and the push before which it comes."""
+def _changed(options: argparse.Namespace) -> str:
+    rows = []
+    for seed in range(options.seeds):
+        rows.append(row_with_change(seed))
+        print(rows[-1], file=sys.stderr, flush=True)
+    delays = sorted(row.delay for row in rows if row.delay is not None)
+    lines = ["| event | count | of | 95 % interval |", "| --- | --- | --- | --- |"]
+    counts = {"false alarms, before the change": sum(row.false for row in rows), "changes reported": len(delays)}
+    for what, count in counts.items():
+        low, high = wilson(count, len(rows))
+        lines.append(f"| {what} | {count} | {len(rows)} | {low:.2f} to {high:.2f} |")
+    return "\n".join([*lines, f"\nPushes until the alarm: {', '.join(map(str, delays))}."])
+
+
+def rows_without_change(seed: int, count: int) -> Iterator[Row]:
+    """The later recordings of one seed, by each kind of model."""
     rng = np.random.default_rng([seed, 7])
     rig = rig_of(rng, f"{seed}", TRAINING)
-    plain, other = (later_spec(rig, rng, LATER) for _ in range(2))
-    change = int(rng.integers(round(SHARES[0] * LATER), round(SHARES[1] * LATER)))
-    rise = Changes(contact_friction=partial(_risen, change))
-    model = train_model(
-        table_of(rig),
-        simulated_rig(rig),
-        "vhgp",
-        name=f"{seed}",
-        options=TrainingOptions(n_train=ROWS, seed=seed, mean="zero"),
-    )
-    return model, table_of(plain), table_of(replace(other, changes=rise)), change
+    training = _table_of(rig)
+    later = [_table_of(later_spec(rig, rng, LATER)) for _ in range(count)]
+    for kind in KINDS:
+        model = _trained(training, rig, kind, seed, ROWS)
+        calibration = calibrate(model)
+        for table in later:
+            yield _row(seed, rig, kind, None, _state_of(model, calibration, table))
+
+
+def row_with_change(seed: int) -> Row:
+    """A recording in which the contact friction rises."""
+    rng = np.random.default_rng([seed, 7])
+    rig = rig_of(rng, f"{seed}", LONG_TRAINING)
+    _, later = (later_spec(rig, rng, LONG_LATER) for _ in range(2))
+    change = int(rng.integers(round(SHARES[0] * LONG_LATER), round(SHARES[1] * LONG_LATER)))
+    later = replace(later, changes=Changes(contact_friction=partial(_risen, change)))
+    model = _trained(_table_of(rig), rig, "vhgp", seed, MANY_ROWS)
+    return _row(seed, rig, "vhgp", change, _state_of(model, calibrate(model), _table_of(later)))
 
 
 def _risen(change: int, moment: Moment) -> Array:
     return np.where(moment.conditions.values["push_index"] >= change, RISE, 0.0)
 
 
-def table_of(spec: SimulationSpec) -> PushTable:
-    """Simulate a recording and find its windows."""
+def _row(seed: int, rig: SimulationSpec, kind: str, change: int | None, state: AlarmState) -> Row:
+    return Row(seed, f"{rig.slider.name} on {rig.table.name}", kind, change, state.fired_after, state.fired_by)
+
+
+def _trained(table: PushTable, rig: SimulationSpec, kind: str, seed: int, rows: int) -> PushModel:
+    options = TrainingOptions(n_train=rows, seed=seed, mean="zero")
+    return train_model(table, simulated_rig(rig), kind, name=f"{seed}", options=options)
+
+
+def _table_of(spec: SimulationSpec) -> PushTable:
+    """The windows of a simulated recording."""
     return windows_to_table(find_windows(simulate(spec), simulated_rig(spec)))
 
 
-def state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:
+def _state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:
     """The state of the alarm after all pushes of a table."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return alarm_state(calibration, table, prediction.mean, prediction.covariance)
-
-
-def markdown_of(rows: Sequence[Row]) -> str:
-    """The table for the documentation, with counts and 95 % Wilson intervals."""
-    plain, changed = ([row for row in rows if (row.change is None) is without] for without in (True, False))
-    lines = ["| recordings of 300 pushes | count | of | 95 % interval |", "| --- | --- | --- | --- |"]
-    lines.append(_line("false alarms, recordings without a change", sum(r.false for r in plain), len(plain)))
-    lines.append(_line("false alarms, before the change", sum(r.false for r in changed), len(changed)))
-    delays = sorted(row.delay for row in changed if row.delay is not None)
-    lines.append(_line("changes detected before the end", len(delays), len(changed)))
-    if delays:
-        lines.append(f"\nPushes until the alarm: {', '.join(map(str, delays))}; median {np.median(delays):g}.")
-    seconds = [row.seconds for row in rows]
-    lines.append(f"Calibration: {min(seconds):.1f} to {max(seconds):.1f} s of one core.")
-    return "\n".join(lines) + "\n"
-
-
-def _line(what: str, count: int, of: int) -> str:
-    low, high = wilson(count, of)
-    return f"| {what} | {count} | {of} | {low:.2f} to {high:.2f} |"
 
 
 if __name__ == "__main__":

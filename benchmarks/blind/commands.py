@@ -34,6 +34,7 @@ from benchmarks.blind.library import library_without
 from benchmarks.blind.oracle import oracle_gain
 from benchmarks.blind.recordings import MODEL, Size, make_one
 from benchmarks.blind.scores import markdown_of, score_of
+from benchmarks.support.making import apart
 from push_predictor.models.train_learnt import MEANS
 
 CYCLE = (*["none"] * 6, *["wrench"] * 2, *["library"] * 7, *["outside"] * 2, *["measurement"] * 2, "variance")
@@ -96,13 +97,6 @@ def score(options: argparse.Namespace) -> None:
     if options.markdown:
         options.markdown.write_text(text)
     print(text)
-
-
-def apart(data: Path, truth: Path) -> None:
-    """Raise SystemExit if one folder lies in the other: the trace must not find the truth."""
-    one, other = data.resolve(), truth.resolve()
-    if one == other or one in other.parents or other in one.parents:
-        raise SystemExit(f"--truth: {truth} and {data} must not contain each other")
 
 
 def trace_one(folder: Path, alpha: float, without: str | None) -> dict[str, Any]:

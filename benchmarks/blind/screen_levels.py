@@ -20,20 +20,29 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blind.levels import ALPHAS, later_windows, trained_rig
+from benchmarks.blind.recordings import later_spec, rig_of
 from benchmarks.blind.scores import wilson
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MEANS
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.evidence.loading import cut_again
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.gate import Gate
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array
 
+ALPHAS = (0.2, 0.05, 0.01)
+TRAINING = 500  # pushes
 UNEVEN = 0.4  # standard deviation of the logarithm of a push's spread
 
 
@@ -42,14 +51,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     found: dict[int, list[float]] = {pushes: [] for pushes in options.pushes}
     for number in range(options.rigs):
-        rig = trained_rig(options, number)
+        rig = _trained_rig(options, number)
         for pushes in options.pushes:
-            design = _design(rig.model, later_windows(rig, pushes).table)
+            design = _design(rig.model, _later_windows(rig, pushes))
             found[pushes] += list(_smallest(design, rig.rng, options.draws))
     if options.json:
         options.json.write_text(json.dumps(found))
     print(_table(f"{options.base}, {options.mean}" if options.base != "analytical" else options.base, found))
     return 0
+
+
+@dataclass(frozen=True, eq=False)
+class _TrainedRig:
+    """A simulated rig, the model trained on its first recording, and the generator of its later ones."""
+
+    plain: SimulationSpec
+    rig: Rig
+    model: PushModel
+    rng: np.random.Generator
+
+
+def _trained_rig(options: argparse.Namespace, number: int) -> _TrainedRig:
+    """Draw a rig by options.seed and number, and train options.base on options.rows windows of its pushes."""
+    rng = np.random.default_rng([options.seed, number])
+    plain = rig_of(rng, f"{number:03d}", TRAINING)
+    training = simulate(replace(plain, name="training"))
+    assert training.rig is not None  # the simulator knows its rig
+    table = windows_to_table(find_windows(training, training.rig))
+    trained = TrainingOptions(n_train=min(options.rows, len(table)), seed=options.seed, mean=options.mean,
+                              fit=options.base == "analytical")  # fmt: skip
+    model = train_model(table, training.rig, options.base, name=plain.name, options=trained)
+    return _TrainedRig(plain, training.rig, model, rng)
+
+
+def _later_windows(rig: _TrainedRig, pushes: int) -> PushTable:
+    """The windows of a later recording, in which nothing has changed."""
+    later = simulate(replace(later_spec(rig.plain, rig.rng, pushes), name="new"))
+    return cut_again([later], rig.rig)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@
 """Recordings of planar pushing on a simulated rig that shares no code with the project, with hidden changes.
 
     python -m benchmarks.foreign make --out DATA --truth TRUTH --seed S --count N
-        [--engine own|mujoco|mixed] [--training 500] [--later 600] [--cores 1]
+        [--training 500] [--later 600] [--cores 1]
     python -m benchmarks.foreign train --data DATA [--rows 500] [--cores 1]
 
 For each number NNN of 0 to N - 1 `make` writes DATA/NNN/training and DATA/NNN/new, two bags of one rig, and
@@ -14,8 +14,7 @@ command again continues an interrupted run.
 
 The physics differ on purpose from limit-surface mechanics. The slider's base is a set of patches with uneven
 pressure that rub on a slightly uneven table with rate-dependent friction. The tip is compliant. The slider has
-inertia. Load and frictions vary at random between and within pushes. `--engine mixed` makes every tenth recording
-with MuJoCo (module `mujoco_engine`), which `pip install '.[foreign]'` installs.
+inertia. Load and frictions vary at random between and within pushes.
 
 Keys of a truth file: number, group (none, input_shift, wrench, measurement, variance, library, outside), seed,
 engine, shape, surface, friction (mean coefficient of the table), pushes (of the new recording), training_pushes,
@@ -28,11 +27,13 @@ displacements over 0.2 s windows, in units of their difference between two draws
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks.foreign.make import make
+from benchmarks.foreign.recording import RecordingSpec, make_recording
+from benchmarks.support.making import add_make, truth_file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,6 +41,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     work: Callable[[argparse.Namespace], int] = options.work
     return work(options)
+
+
+def make(options: argparse.Namespace, number: int) -> None:
+    """Make one pair from scratch; what an interrupted run left of it is removed."""
+    folder = options.out / f"{number:03d}"
+    shutil.rmtree(folder, ignore_errors=True)
+    spec = RecordingSpec(options.seed, number, options.count, options.training, options.later)
+    make_recording(spec, folder, truth_file(options, number))
 
 
 def _train(options: argparse.Namespace) -> int:
@@ -55,16 +64,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m benchmarks.foreign", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(required=True)
-    command = commands.add_parser("make", help="make recordings and their truth")
-    command.set_defaults(work=make)
-    command.add_argument("--out", type=Path, required=True, help="folder of the recordings")
-    command.add_argument("--truth", type=Path, required=True, help="folder of the truth files")
-    command.add_argument("--seed", type=int, required=True)
-    command.add_argument("--count", type=int, required=True, help="number of recordings")
-    command.add_argument("--engine", choices=["own", "mujoco", "mixed"], default="own")
-    command.add_argument("--training", type=int, default=500, help="pushes of each training recording")
-    command.add_argument("--later", type=int, default=600, help="pushes of each new recording")
-    command.add_argument("--cores", type=int, default=1, help="processes")
+    add_make(commands.add_parser("make", help="make recordings and their truth"), make)
     command = commands.add_parser("train", help="train the default model of each training recording")
     command.set_defaults(work=_train)
     command.add_argument("--data", type=Path, required=True, help="folder of the recordings")

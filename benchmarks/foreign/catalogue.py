@@ -51,7 +51,6 @@ class ChangeKind:
     signed: bool = False
     scale: str = ""
     constant_form: str = "constant"
-    in_mujoco: bool = False
 
 
 _DRIFTS = ("push_index", "elapsed_time", "slid_distance", "elapsed_time")
@@ -65,8 +64,7 @@ def _named(
 ) -> ChangeKind:
     """A change that the library of mechanisms knows."""
     signed = name in ("contact_friction", "pressure_spread")
-    simple = name in ("contact_friction", "centre_of_friction", "tilted_surface")
-    return ChangeKind("library", sizes, unit, drivers, constant, (name,), signed=signed, in_mujoco=simple)
+    return ChangeKind("library", sizes, unit, drivers, constant, (name,), signed=signed)
 
 
 def _unnamed(
@@ -86,7 +84,7 @@ def _fault(name: str, sizes: tuple[float, float, float], unit: str, covariates: 
     twins = ("frame_shift", "tool_offset")
     names = (name, *(twin for twin in twins if twin != name)) if name in twins else (name,)
     drivers = ("constant", "constant", "constant", "step")
-    return ChangeKind("measurement", sizes, unit, drivers, covariates, names, in_mujoco=True)
+    return ChangeKind("measurement", sizes, unit, drivers, covariates, names)
 
 
 CHANGE_KINDS: dict[str, ChangeKind] = {
@@ -104,14 +102,13 @@ CHANGE_KINDS: dict[str, ChangeKind] = {
         SESSION,
         ("surface_friction",),
         signed=True,
-        in_mujoco=True,
     ),
     "clock_offset": _fault("clock_offset", (0.005, 0.015, 0.04), "s", SESSION),
     "frame_rotation": _fault("frame_rotation", (0.01, 0.03, 0.08), "rad", (*WORLD, "slider_x", "slider_y")),
     "frame_shift": _fault("frame_shift", (0.0003, 0.001, 0.0025), "m", WORLD),
     "tool_offset": _fault("tool_offset", (0.0003, 0.001, 0.0025), "m", WORLD),
     "wrench_bias": _fault("wrench_bias", (0.1, 0.2, 0.5), "N", WORLD),
-    "noise": ChangeKind("variance", (1.2, 1.5, 2.0), "ratio", ("constant",), SESSION, (), in_mujoco=True),
+    "noise": ChangeKind("variance", (1.2, 1.5, 2.0), "ratio", ("constant",), SESSION, ()),
     "cable": _unnamed((0.15, 0.3, 0.5), "N", _LATER, (*WORLD, "slider_x", "slider_y"), form="constant", scale="force"),
     "magnet": _unnamed((0.2, 0.4, 0.7), "N", ("constant",), ("slider_x", "slider_y", "session"), "map", "force"),
     "rubber_band": _unnamed(

@@ -76,15 +76,11 @@ def draw_distribution(rng: np.random.Generator, group: str) -> tuple[PushDistrib
     return replace(usual, contacts=(first, first + 0.25), angles=angles), answer
 
 
-def draw_change(rng: np.random.Generator, group: str, rig: Rig, facts: PushFacts, simple: bool) -> Change:
-    """Draw a change of a group; `simple` keeps to what the MuJoCo engine can express."""
+def draw_change(rng: np.random.Generator, group: str, rig: Rig, facts: PushFacts) -> Change:
+    """Draw a change of a group."""
     if group in ("none", "input_shift"):
         return Change(group)
-    candidates = [
-        kind for kind, traits in CHANGE_KINDS.items() if traits.group == group and (traits.in_mujoco or not simple)
-    ]
-    if not candidates:
-        return draw_change(rng, "library", rig, facts, simple)
+    candidates = [kind for kind, traits in CHANGE_KINDS.items() if traits.group == group]
     count = 2 if group == "library" and rng.random() < catalogue.TWO_EFFECTS / 0.8 else 1
     kinds = [str(kind) for kind in rng.choice(candidates, count, replace=False)]
     if group == "variance":

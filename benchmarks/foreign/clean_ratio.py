@@ -9,15 +9,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, rotate
 from benchmarks.foreign.faults import Fault, clock_lag, tracked
 from benchmarks.foreign.motion import PushMotion
 from benchmarks.foreign.rig import Rig
+from benchmarks.support.plane import Array, rotate
 
 WINDOW = 0.2  # s
 
 
-def outcomes(rig: Rig, motion: PushMotion, touch: Floats, faults: Sequence[Fault]) -> Floats:
+def outcomes(rig: Rig, motion: PushMotion, touch: Array, faults: Sequence[Fault]) -> Array:
     """Displacements (dx, dy, dtheta) of all windows of all pushes, without sensor noise, shape (windows, 3)."""
     rows = []
     for push in range(len(touch)):
@@ -30,7 +30,7 @@ def outcomes(rig: Rig, motion: PushMotion, touch: Floats, faults: Sequence[Fault
     return np.concatenate(rows)
 
 
-def change_over_noise(changed: Floats, unchanged: Floats, other_noise: Floats) -> float:
+def change_over_noise(changed: Array, unchanged: Array, other_noise: Array) -> float:
     """Root-mean-square change of outcomes in units of their difference between two draws of the noise."""
     spread = np.sqrt(np.mean((other_noise - unchanged) ** 2, axis=0))
     return float(np.sqrt(np.mean(((changed - unchanged) / spread) ** 2)))

@@ -9,24 +9,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, Integers
 from benchmarks.foreign.noise import ProcessNoise, load_modes
 from benchmarks.foreign.rig import Rig
+from benchmarks.support.plane import Array, IntArray
 
 
 @dataclass(frozen=True)
 class PushFacts:
     """What is known of each push before it begins; SI units, one entry per push."""
 
-    index: Floats
-    time: Floats
-    slid: Floats
-    temperature: Floats
-    rest: Floats
-    speed: Floats
-    edge: Floats
+    index: Array
+    time: Array
+    slid: Array
+    temperature: Array
+    rest: Array
+    speed: Array
+    edge: Array
 
-    def rows(self, rows: Integers) -> PushFacts:
+    def rows(self, rows: IntArray) -> PushFacts:
         """The facts of some pushes."""
         return PushFacts(**{name: values[rows] for name, values in vars(self).items()})
 
@@ -35,9 +35,9 @@ class PushFacts:
 class State:
     """Where the pushes of a batch are at one instant: slider pose (m, m, rad), tip contact, travel since touch (m)."""
 
-    pose: Floats
-    contact: Floats
-    travelled: Floats
+    pose: Array
+    contact: Array
+    travelled: Array
     facts: PushFacts
 
 
@@ -51,14 +51,14 @@ class Conditions:
     centre.
     """
 
-    load: Floats
-    table_friction: Floats
-    tensor: Floats | None
-    tip_friction: Floats
-    stiffness: Floats
-    normal_tilt: Floats
-    force: Floats
-    torque: Floats
+    load: Array
+    table_friction: Array
+    tensor: Array | None
+    tip_friction: Array
+    stiffness: Array
+    normal_tilt: Array
+    force: Array
+    torque: Array
 
 
 def ordinary_conditions(rig: Rig, noise: ProcessNoise, state: State) -> Conditions:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats
 from benchmarks.foreign.conditions import State
+from benchmarks.support.plane import Array
 
 PATCH_WIDTH = 0.035  # m, standard deviation of a place on the table
 
@@ -30,7 +30,7 @@ class Driver:
     high: float = 1.0
     place: tuple[float, float] = (0.0, 0.0)
 
-    def strength(self, state: State) -> Floats:
+    def strength(self, state: State) -> Array:
         """Strength for each push of a batch."""
         if self.name == "place":
             apart = state.pose[:, :2] - np.array(self.place)
@@ -48,12 +48,12 @@ class Driver:
             return np.asarray(np.log1p(facts.rest) / np.log1p(5.0))
         return self._drift(self._quantity(state))
 
-    def _quantity(self, state: State) -> Floats:
+    def _quantity(self, state: State) -> Array:
         facts = state.facts
         known = {"push_index": facts.index, "elapsed_time": facts.time, "slid_distance": facts.slid}
         return (known | {"temperature": facts.temperature, "speed": facts.speed})[self.name]
 
-    def _drift(self, quantity: Floats) -> Floats:
+    def _drift(self, quantity: Array) -> Array:
         """Rise from 0 to about 1 over the recorded range."""
         share = np.clip((quantity - self.low) / (self.high - self.low), 0.0, 1.5)
         return np.asarray(1 - np.exp(-4 * share) if self.form == "saturating" else share)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.foreign import tip
-from benchmarks.foreign.arrays import Floats, Integers, rotate
 from benchmarks.foreign.conditions import Conditions, PushFacts, State, ordinary_conditions
 from benchmarks.foreign.effects import Effect, changed
 from benchmarks.foreign.motion import Line, PushMotion, empty_motion, push_lines, start_waves, torque_about_tip
@@ -23,6 +22,7 @@ from benchmarks.foreign.noise import ProcessNoise
 from benchmarks.foreign.plan import Plan
 from benchmarks.foreign.rig import Rig
 from benchmarks.foreign.sliding import base_friction, patch_moments
+from benchmarks.support.plane import Array, IntArray, rotate
 
 STEPS = 400
 ITERATIONS = 12
@@ -45,7 +45,7 @@ def _simulate_batch(
     facts: PushFacts,
     noise: ProcessNoise,
     effects: Sequence[Effect],
-    rows: Integers,
+    rows: IntArray,
     motion: PushMotion,
 ) -> None:
     """Simulate the pushes `rows` and write them into `motion`."""
@@ -67,8 +67,8 @@ def _simulate_batch(
 class _Slider:
     """Sliders of a batch: poses (m, m, rad), twists in body axes (m/s, rad/s), and their contact with the tip."""
 
-    pose: Floats
-    twist: Floats
+    pose: Array
+    twist: Array
     contact: tip.TipContact
 
 
@@ -78,7 +78,7 @@ class _Batch:
     def __init__(
         self,
         rig: Rig,
-        speed: Floats,
+        speed: Array,
         facts: PushFacts,
         noise: ProcessNoise,
         effects: Sequence[Effect],
@@ -94,7 +94,7 @@ class _Batch:
         self._mass = np.array([rig.mass, rig.mass, rig.inertia])
         self._scale = rig.table.coefficient * rig.weight * np.array([1.0, 1.0, 0.03])
 
-    def advance(self, slider: _Slider, travelled: Floats, step: Floats) -> _Slider:
+    def advance(self, slider: _Slider, travelled: Array, step: Array) -> _Slider:
         """The sliders after the tips travelled another `step` m, to `travelled` m in all."""
         contact = self._rig.outline.contact_of(slider.contact.point)
         state = State(slider.pose, contact, travelled, self._facts)
@@ -102,7 +102,7 @@ class _Batch:
         conditions = changed(conditions, self._effects, state, self._rig)
         return self._solve(slider, conditions, self._line.at(travelled), step / self._speed)
 
-    def _solve(self, before: _Slider, conditions: Conditions, robot: Floats, duration: Floats) -> _Slider:
+    def _solve(self, before: _Slider, conditions: Conditions, robot: Array, duration: Array) -> _Slider:
         """Solve one implicit step; a step of Newton that does not help is replaced by a safe one."""
         rig, guess, inertia = self._rig, before.twist, self._mass / duration[:, None]
         damping = rig.tip_damping / duration
@@ -127,14 +127,14 @@ class _Batch:
         return _Slider(_moved(before.pose, guess, duration), guess, contact)
 
 
-def _moved(pose: Floats, twist: Floats, duration: Floats) -> Floats:
+def _moved(pose: Array, twist: Array, duration: Array) -> Array:
     """Poses after `duration` s of a body twist."""
     turn = duration * twist[:, 2]
     shift = rotate(twist[:, :2], pose[:, 2] + turn / 2) * duration[:, None]
     return np.column_stack([pose[:, :2] + shift, pose[:, 2] + turn])
 
 
-def _contact_matrix(contact: tip.TipContact, robot: Floats, duration: Floats) -> Floats:
+def _contact_matrix(contact: tip.TipContact, robot: Array, duration: Array) -> Array:
     """Negated derivative of the tip's wrench by the body twist."""
     motion = np.zeros((len(robot), 2, 3))
     motion[:, 0, 0] = motion[:, 1, 1] = 1.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, rotate, unit
+from benchmarks.support.plane import Array, direction, rotate
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,16 @@ class Fault:
     axis: float = 0.0
     since: float = -np.inf
 
-    def size(self, time: Floats) -> Floats:
+    def size(self, time: Array) -> Array:
         """The fault's value at each instant."""
         return np.where(time >= self.since, self.value, 0.0)
 
-    def vector(self, time: Floats) -> Floats:
+    def vector(self, time: Array) -> Array:
         """The fault as a vector along its axis."""
-        return np.asarray(self.size(time)[:, None] * unit(np.array(self.axis)))
+        return np.asarray(self.size(time)[:, None] * direction(np.array(self.axis)))
 
 
-def clock_lag(faults: Sequence[Fault], time: Floats) -> Floats:
+def clock_lag(faults: Sequence[Fault], time: Array) -> Array:
     """By how much the tracker's stamps are late, s."""
     lag = np.zeros(len(time))
     for fault in faults:
@@ -40,7 +40,7 @@ def clock_lag(faults: Sequence[Fault], time: Floats) -> Floats:
     return lag
 
 
-def tracked(faults: Sequence[Fault], time: Floats, pose: Floats) -> Floats:
+def tracked(faults: Sequence[Fault], time: Array, pose: Array) -> Array:
     """Slider poses as seen by a tracker whose frame is turned or shifted."""
     place, heading = pose[:, :2], pose[:, 2]
     for fault in faults:
@@ -51,7 +51,7 @@ def tracked(faults: Sequence[Fault], time: Floats, pose: Floats) -> Floats:
     return np.column_stack([place, heading])
 
 
-def reported(faults: Sequence[Fault], time: Floats, tip: Floats) -> Floats:
+def reported(faults: Sequence[Fault], time: Array, tip: Array) -> Array:
     """Tip positions as reported with a wrong tool length."""
     for fault in faults:
         if fault.kind == "tool_offset":
@@ -59,7 +59,7 @@ def reported(faults: Sequence[Fault], time: Floats, tip: Floats) -> Floats:
     return tip
 
 
-def biased(faults: Sequence[Fault], time: Floats, force: Floats) -> Floats:
+def biased(faults: Sequence[Fault], time: Array, force: Array) -> Array:
     """Forces of a sensor with a bias, N."""
     for fault in faults:
         if fault.kind == "wrench_bias":

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, Integers, cross, rotate, unit
 from benchmarks.foreign.plan import Plan
 from benchmarks.foreign.rig import PUSHER_RADIUS, Rig
+from benchmarks.support.plane import Array, IntArray, cross, direction, rotate
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,14 @@ class PushMotion:
     the push direction (rad).
     """
 
-    time: Floats
-    pose: Floats
-    force: Floats
-    torque: Floats
-    touch: Floats
-    heading: Floats
+    time: Array
+    pose: Array
+    force: Array
+    torque: Array
+    touch: Array
+    heading: Array
 
-    def rows(self, rows: Integers) -> PushMotion:
+    def rows(self, rows: IntArray) -> PushMotion:
         """The motion of some pushes."""
         return PushMotion(**{name: values[rows] for name, values in vars(self).items()})
 
@@ -52,15 +52,15 @@ def empty_motion(plan: Plan, steps: int) -> PushMotion:
 class Line:
     """Straight lines of the robot: position at first touch (m, world) and direction (rad)."""
 
-    touch: Floats
-    heading: Floats
+    touch: Array
+    heading: Array
 
-    def at(self, travelled: Floats) -> Floats:
+    def at(self, travelled: Array) -> Array:
         """Robot positions `travelled` m after first touch."""
-        return np.asarray(self.touch + travelled[:, None] * unit(self.heading))
+        return np.asarray(self.touch + travelled[:, None] * direction(self.heading))
 
 
-def push_lines(rig: Rig, plan: Plan, rows: Integers, start: Floats) -> Line:
+def push_lines(rig: Rig, plan: Plan, rows: IntArray, start: Array) -> Line:
     """Lines of the pushes `rows`, whose slider starts at the poses `start` (world)."""
     point, outward = rig.outline.boundary(plan.contact[rows])
     inward_angle = np.arctan2(-outward[:, 1], -outward[:, 0])
@@ -68,12 +68,12 @@ def push_lines(rig: Rig, plan: Plan, rows: Integers, start: Floats) -> Line:
     return Line(start[:, :2] + rotate(tip, start[:, 2]), start[:, 2] + inward_angle + plan.angle[rows])
 
 
-def torque_about_tip(point: Floats, tip: Floats, force: Floats) -> Floats:
+def torque_about_tip(point: Array, tip: Array, force: Array) -> Array:
     """Torque of a force about the tip's centre, N m."""
     return cross(point - tip, force)
 
 
-def start_waves(stays: Integers) -> list[Integers]:
+def start_waves(stays: IntArray) -> list[IntArray]:
     """Groups of pushes such that each push starts where a push of an earlier group left the slider."""
     depth = np.zeros(len(stays), int)
     for row in range(1, len(stays)):

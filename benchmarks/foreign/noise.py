@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, Integers
 from benchmarks.foreign.rig import NoiseLevels, Rig
+from benchmarks.support.plane import Array, IntArray
 
 NODE_SPACING = 0.001  # m of travel between two drawn values
 NODES = 70
@@ -22,9 +22,9 @@ CHANNELS = 2 + len(TEXTURE_WAVES) + 2
 class ProcessNoise:
     """Relative changes, shape (pushes, nodes, channels): load tilt x and y, load texture, friction of tip and table."""
 
-    values: Floats
+    values: Array
 
-    def rows(self, rows: Integers) -> ProcessNoise:
+    def rows(self, rows: IntArray) -> ProcessNoise:
         """The noise of some pushes."""
         return ProcessNoise(self.values[rows])
 
@@ -32,7 +32,7 @@ class ProcessNoise:
         """The same noise, larger by `ratio`."""
         return ProcessNoise(ratio * self.values)
 
-    def at(self, travelled: Floats) -> Floats:
+    def at(self, travelled: Array) -> Array:
         """Values after `travelled` m of each push, shape (pushes, channels)."""
         position = np.clip(travelled / NODE_SPACING, 0, NODES - 1.001)
         node = position.astype(int)
@@ -56,7 +56,7 @@ def draw_process_noise(rng: np.random.Generator, levels: NoiseLevels, count: int
     return ProcessNoise(size * (np.sqrt(1 - levels.lasting) * walk + np.sqrt(levels.lasting) * lasting))
 
 
-def load_modes(rig: Rig) -> Floats:
+def load_modes(rig: Rig) -> Array:
     """How the load's noise channels act on the patches, shape (channels of the load, patches)."""
     radius = np.sqrt(np.mean(np.sum(rig.patches**2, axis=1)))
     texture = np.sqrt(2) * np.sin(rig.patches @ TEXTURE_WAVES.T + np.arange(len(TEXTURE_WAVES)))

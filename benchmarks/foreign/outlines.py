@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats, turned_left, unit
+from benchmarks.support.plane import Array, direction, quarter_turn
 
 
 class Outline(Protocol):
@@ -26,7 +26,7 @@ class Outline(Protocol):
         """Name of the shape in the rig's record."""
 
     @property
-    def vertices(self) -> Floats:
+    def vertices(self) -> Array:
         """Vertices (n, 2), m."""
 
     @property
@@ -37,13 +37,13 @@ class Outline(Protocol):
     def parameters(self) -> dict[str, float | str] | None:
         """The record's shape_parameters of a smooth outline."""
 
-    def boundary(self, contact: Floats) -> tuple[Floats, Floats]:
+    def boundary(self, contact: Array) -> tuple[Array, Array]:
         """Points and outward normals at fractions `contact` of the perimeter."""
 
-    def closest(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+    def closest(self, points: Array) -> tuple[Array, Array, Array]:
         """Closest outline points, outward normals there, and signed distances (positive outside)."""
 
-    def contact_of(self, points: Floats) -> Floats:
+    def contact_of(self, points: Array) -> Array:
         """Fractions of the perimeter of outline points."""
 
 
@@ -58,10 +58,10 @@ class Polygon:
     parameters: None = None
 
     @cached_property
-    def vertices(self) -> Floats:
+    def vertices(self) -> Array:
         """The corners (n, 2), m."""
         angles = self.phase + 2 * np.pi * np.arange(self.corners) / self.corners
-        return np.asarray(self.circumradius * unit(angles))
+        return np.asarray(self.circumradius * direction(angles))
 
     @property
     def edges(self) -> int:
@@ -69,21 +69,21 @@ class Polygon:
         return self.corners
 
     @cached_property
-    def _sides(self) -> tuple[Floats, Floats, Floats, float]:
+    def _sides(self) -> tuple[Array, Array, Array, float]:
         """Start points, unit tangents, outward normals and the common side length."""
         along = np.roll(self.vertices, -1, axis=0) - self.vertices
         length = float(np.linalg.norm(along[0]))
         tangents = along / length
-        return self.vertices, tangents, -turned_left(tangents), length
+        return self.vertices, tangents, -quarter_turn(tangents), length
 
-    def boundary(self, contact: Floats) -> tuple[Floats, Floats]:
+    def boundary(self, contact: Array) -> tuple[Array, Array]:
         """Points and outward normals at fractions `contact` of the perimeter."""
         starts, tangents, normals, length = self._sides
         side = np.minimum((contact * self.corners).astype(int), self.corners - 1)
         along = (contact * self.corners - side) * length
         return starts[side] + along[:, None] * tangents[side], normals[side]
 
-    def closest(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+    def closest(self, points: Array) -> tuple[Array, Array, Array]:
         """Closest outline points, outward normals there, and signed distances (positive outside)."""
         starts, tangents, normals, length = self._sides
         height = points @ normals.T - np.sum(starts * normals, axis=1)
@@ -98,7 +98,7 @@ class Polygon:
         rounded = apart / np.maximum(distance, 1e-12)[:, None]
         return foot, np.where(outside[:, None], rounded, normal), np.where(outside, distance, signed)
 
-    def contact_of(self, points: Floats) -> Floats:
+    def contact_of(self, points: Array) -> Array:
         """Fractions of the perimeter of outline points."""
         starts, tangents, normals, length = self._sides
         height = points @ normals.T - np.sum(starts * normals, axis=1)
@@ -123,32 +123,32 @@ class Ellipse:
         return {"type": "ellipse", "a": self.a, "b": self.b}
 
     @cached_property
-    def vertices(self) -> Floats:
+    def vertices(self) -> Array:
         """Points (n, 2) at equal steps of the ellipse's parameter, m."""
         return self._point(np.linspace(0, 2 * np.pi, self.samples, endpoint=False))
 
-    def _point(self, parameter: Floats) -> Floats:
+    def _point(self, parameter: Array) -> Array:
         return np.stack([self.a * np.cos(parameter), self.b * np.sin(parameter)], axis=-1)
 
-    def _normal(self, parameter: Floats) -> Floats:
+    def _normal(self, parameter: Array) -> Array:
         raw = np.stack([self.b * np.cos(parameter), self.a * np.sin(parameter)], axis=-1)
         return np.asarray(raw / np.linalg.norm(raw, axis=-1, keepdims=True))
 
     @cached_property
-    def _arc_table(self) -> tuple[Floats, Floats]:
+    def _arc_table(self) -> tuple[Array, Array]:
         """Curve parameter and the fraction of the perimeter passed up to it."""
         parameter = np.linspace(0, 2 * np.pi, 2001)
         steps = np.linalg.norm(np.diff(self._point(parameter), axis=0), axis=1)
         passed = np.concatenate([[0.0], np.cumsum(steps)])
         return parameter, passed / passed[-1]
 
-    def boundary(self, contact: Floats) -> tuple[Floats, Floats]:
+    def boundary(self, contact: Array) -> tuple[Array, Array]:
         """Points and outward normals at fractions `contact` of the perimeter."""
         parameter, passed = self._arc_table
         at = np.interp(contact, passed, parameter)
         return self._point(at), self._normal(at)
 
-    def closest(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+    def closest(self, points: Array) -> tuple[Array, Array, Array]:
         """Closest outline points, outward normals there, and signed distances (positive outside)."""
         at = np.arctan2(points[:, 1] * self.a, points[:, 0] * self.b)
         for _ in range(4):
@@ -162,7 +162,7 @@ class Ellipse:
         foot, normal = self._point(at), self._normal(at)
         return foot, normal, np.asarray(np.sum((points - foot) * normal, axis=1))
 
-    def contact_of(self, points: Floats) -> Floats:
+    def contact_of(self, points: Array) -> Array:
         """Fractions of the perimeter of outline points."""
         parameter, passed = self._arc_table
         at = np.arctan2(points[:, 1] / self.b, points[:, 0] / self.a) % (2 * np.pi)
@@ -177,7 +177,7 @@ OUTLINES: dict[str, Outline] = {
 }
 
 
-def patch_grid(outline: Outline, count: int = 64) -> Floats:
+def patch_grid(outline: Outline, count: int = 64) -> Array:
     """About `count` points spread evenly over the outline's area, centred on the origin, shape (patches, 2), m."""
     reach = float(np.max(np.abs(outline.vertices)))
     spacing = reach

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Flags, Floats, Integers
 from benchmarks.foreign.rig import Rig
+from benchmarks.support.plane import Array, BoolArray, IntArray
 
 SPEEDS = (0.01, 0.02, 0.03)  # m/s
 SPEED_SHARES = (0.25, 0.45, 0.30)
@@ -43,24 +43,24 @@ class Plan:
     `stays` marks pushes that start where the previous one left the slider; `reset_pose` counts for the others.
     """
 
-    speed: Floats
-    contact: Floats
-    angle: Floats
-    travel: Floats
-    approach: Floats
-    reset_pose: Floats
-    stays: Flags
-    hold: Floats
-    pause: Floats
-    unrecorded: Floats
-    start: Floats
-    touch: Floats
-    release: Floats
+    speed: Array
+    contact: Array
+    angle: Array
+    travel: Array
+    approach: Array
+    reset_pose: Array
+    stays: BoolArray
+    hold: Array
+    pause: Array
+    unrecorded: Array
+    start: Array
+    touch: Array
+    release: Array
 
     def __len__(self) -> int:
         return len(self.speed)
 
-    def rows(self, rows: Integers, start: Floats) -> Plan:
+    def rows(self, rows: IntArray, start: Array) -> Plan:
         """Some of the pushes, each reset to a pose of `start` before."""
         some = Plan(**{name: values[rows] for name, values in vars(self).items()})
         return replace(some, reset_pose=start, stays=np.zeros(len(rows), bool))
@@ -96,19 +96,19 @@ def draw_plan(rng: np.random.Generator, rig: Rig, count: int, distribution: Push
     )
 
 
-def _draw_pauses(rng: np.random.Generator, count: int) -> Floats:
+def _draw_pauses(rng: np.random.Generator, count: int) -> Array:
     """Pauses between pushes, s: mostly short, a few long."""
     pause = np.minimum(np.exp(rng.normal(np.log(0.3), 0.8, count)), 4.0) + 0.1
     return np.where(rng.random(count) < 0.02, rng.uniform(4, 15, count), pause)
 
 
-def _draw_poses(rng: np.random.Generator, count: int) -> Floats:
+def _draw_poses(rng: np.random.Generator, count: int) -> Array:
     """Poses to which the slider is reset."""
     places = rng.uniform(-TABLE_REACH, TABLE_REACH, (count, 2))
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
 
 
-def _draw_consecutive(rng: np.random.Generator, share: float, count: int) -> Flags:
+def _draw_consecutive(rng: np.random.Generator, share: float, count: int) -> BoolArray:
     """Mark pushes that follow without a reset, at most two in a row so that the slider stays on the table."""
     stays = rng.random(count) < share
     stays[0] = False

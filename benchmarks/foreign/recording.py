@@ -6,20 +6,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.foreign import engine
-from benchmarks.foreign.bag import write_bag
 from benchmarks.foreign.catalogue import CHANNELS
 from benchmarks.foreign.change import Answer, Change, draw_change, draw_distribution, group_at
 from benchmarks.foreign.clean_ratio import change_over_noise, outcomes
 from benchmarks.foreign.conditions import PushFacts
-from benchmarks.foreign.effects import Effect
 from benchmarks.foreign.motion import PushMotion
 from benchmarks.foreign.noise import ProcessNoise, draw_process_noise
 from benchmarks.foreign.plan import Plan, PushDistribution, draw_plan
@@ -27,12 +23,11 @@ from benchmarks.foreign.rig import Rig, draw_rig
 from benchmarks.foreign.scalars import draw_scalars
 from benchmarks.foreign.sensing import sense
 from benchmarks.foreign.session import Track, lay_out
+from benchmarks.support.bags import write_bag
 
 FIRST_DAY = 1_790_000_000_000_000_000  # ns since 1970
 DAY = 86_400_000_000_000  # ns
 JUDGED = 150  # pushes of the new recording from which the clean ratio is computed
-
-Simulate = Callable[[Rig, Plan, PushFacts, ProcessNoise, Sequence[Effect]], PushMotion]
 
 
 @dataclass(frozen=True)
@@ -42,7 +37,6 @@ class RecordingSpec:
     seed: int
     number: int
     count: int
-    engine: str
     training: int
     later: int
 
@@ -61,10 +55,9 @@ def make_recording(spec: RecordingSpec, data: Path, truth: Path) -> None:
     """Write the bags `data`/training and `data`/new and the truth file."""
     seeds = np.random.SeedSequence([spec.seed, spec.number]).spawn(7)
     rig_rng, change_rng, training_rng, new_rng, first_rng, second_rng, other_rng = map(np.random.default_rng, seeds)
-    simulate = _engine(spec.engine)
-    rig = draw_rig(rig_rng, "rect1" if spec.engine == "mujoco" else None)
+    rig = draw_rig(rig_rng)
     training = draw_inputs(training_rng, rig, spec.training, PushDistribution())
-    motion = simulate(rig, training.plan, training.facts, training.noise, ())
+    motion = engine.simulate(rig, training.plan, training.facts, training.noise, ())
     write_session(
         first_rng, data / "training", rig, training, motion, Change("none"), FIRST_DAY + 3 * spec.number * DAY
     )
@@ -72,24 +65,16 @@ def make_recording(spec: RecordingSpec, data: Path, truth: Path) -> None:
     group = group_at(_share_of(spec))
     distribution, shifted = draw_distribution(change_rng, group)
     new = draw_inputs(new_rng, rig, spec.later, distribution)
-    change = draw_change(change_rng, group, rig, new.facts, spec.engine == "mujoco")
-    motion = simulate(rig, new.plan, new.facts, new.noise.scaled(change.noise_ratio), change.effects)
+    change = draw_change(change_rng, group, rig, new.facts)
+    motion = engine.simulate(rig, new.plan, new.facts, new.noise.scaled(change.noise_ratio), change.effects)
     write_session(second_rng, data / "new", rig, new, motion, change, FIRST_DAY + (3 * spec.number + 1) * DAY)
 
-    ratio = clean_ratio(other_rng, simulate, rig, new, motion, change)
+    ratio = clean_ratio(other_rng, rig, new, motion, change)
     answers = (shifted,) if group == "input_shift" else change.answers
     facts = _truth(spec, rig, change.group, new, answers, ratio)
     unfinished = truth.with_suffix(".part")
     unfinished.write_text(json.dumps(facts, indent=1) + "\n")
     unfinished.rename(truth)
-
-
-def _engine(name: str) -> Simulate:
-    if name == "own":
-        return engine.simulate
-    # Imported on demand: MuJoCo is not needed for the rig's own engine.
-    simulate: Simulate = import_module("benchmarks.foreign.mujoco_engine").simulate
-    return simulate
 
 
 def _share_of(spec: RecordingSpec) -> float:
@@ -131,12 +116,11 @@ def write_session(
 ) -> None:
     """Write the bag of a simulated recording; start: ns since 1970."""
     session = lay_out(rig, inputs.plan, motion)
-    write_bag(folder, rig, sense(rng, rig, session, inputs.scalars, change.faults), start)
+    sensed = sense(rng, rig, session, inputs.scalars, change.faults)
+    write_bag(folder, sensed.serialised(start), rig.record(), "foreign")
 
 
-def clean_ratio(
-    rng: np.random.Generator, simulate: Simulate, rig: Rig, new: SessionInputs, motion: PushMotion, change: Change
-) -> float:
+def clean_ratio(rng: np.random.Generator, rig: Rig, new: SessionInputs, motion: PushMotion, change: Change) -> float:
     """Change of the outcomes in units of the noise, for some of the new pushes from where they really started."""
     if change.empty:
         return 0.0
@@ -145,8 +129,8 @@ def clean_ratio(
     plan = new.plan.rows(rows, start)
     facts, touch = new.facts.rows(rows), new.plan.touch[rows]
     other = draw_process_noise(rng, rig.noise_levels, len(rows))
-    without = outcomes(rig, simulate(rig, plan, facts, new.noise.rows(rows), ()), touch, ())
-    elsewhere = outcomes(rig, simulate(rig, plan, facts, other, ()), touch, ())
+    without = outcomes(rig, engine.simulate(rig, plan, facts, new.noise.rows(rows), ()), touch, ())
+    elsewhere = outcomes(rig, engine.simulate(rig, plan, facts, other, ()), touch, ())
     return change_over_noise(outcomes(rig, motion.rows(rows), touch, change.faults), without, elsewhere)
 
 
@@ -160,7 +144,7 @@ def _truth(
         "number": spec.number,
         "group": group,
         "seed": spec.seed,
-        "engine": spec.engine,
+        "engine": "own",
         "shape": rig.shape,
         "surface": rig.surface,
         "friction": rig.table.coefficient,

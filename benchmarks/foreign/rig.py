@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats
 from benchmarks.foreign.outlines import OUTLINES, Outline, patch_grid
+from benchmarks.support.plane import Array
 
 PUSHER_RADIUS = 0.00475  # m
 GRAVITY = 9.81  # m/s^2
@@ -31,9 +32,9 @@ class TableFriction:
     fade: float
     slope: float
     creep: float
-    waves: Floats
+    waves: Array
 
-    def unevenness(self, place: Floats) -> Floats:
+    def unevenness(self, place: Array) -> Array:
         """Friction at `place`, shape (n, 2) m, relative to its mean."""
         phases = place @ self.waves[:, 1:3].T + self.waves[:, 3]
         return np.asarray(1.0 + np.sin(phases) @ self.waves[:, 0])
@@ -72,7 +73,7 @@ class Sensors:
     wrench_rate: float
     wrench_noise: float
     torque_noise: float
-    wrench_axes: Floats
+    wrench_axes: Array
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,8 @@ class Rig:
     surface: str
     mass: float
     inertia: float
-    patches: Floats
-    load: Floats
+    patches: Array
+    load: Array
     table: TableFriction
     contact_friction: float
     stiffness: float
@@ -110,17 +111,17 @@ class Rig:
         """The slider's weight, N."""
         return self.mass * GRAVITY
 
-    def record(self) -> dict[str, object]:
-        """What the `push_rig` record of a recording states of this rig."""
-        facts: dict[str, object] = {
+    def record(self) -> dict[str, str]:
+        """The `push_rig` record of a recording of this rig."""
+        facts = {
             "shape": self.shape,
-            "outline": self.outline.vertices.tolist(),
-            "pusher_radius": PUSHER_RADIUS,
+            "outline": json.dumps(self.outline.vertices.tolist()),
+            "pusher_radius": json.dumps(PUSHER_RADIUS),
             "surface": self.surface,
-            "object_mass": round(self.mass, 4),
+            "object_mass": json.dumps(round(self.mass, 4)),
         }
         if self.outline.parameters is not None:
-            facts["shape_parameters"] = self.outline.parameters
+            facts["shape_parameters"] = json.dumps(self.outline.parameters)
         return facts
 
 
@@ -150,7 +151,7 @@ def draw_rig(rng: np.random.Generator, shape: str | None = None) -> Rig:
     )
 
 
-def _warped_load(rng: np.random.Generator, patches: Floats) -> Floats:
+def _warped_load(rng: np.random.Generator, patches: Array) -> Array:
     """Load shares of a warped base: a few smooth random modes in body coordinates."""
     radius = np.sqrt(np.mean(np.sum(patches**2, axis=1)))
     scaled = patches / radius

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.foreign import faults as faulty
-from benchmarks.foreign.arrays import Floats
 from benchmarks.foreign.faults import Fault
 from benchmarks.foreign.rig import Rig, Sensors
 from benchmarks.foreign.session import Session, Track
+from benchmarks.support import bags
+from benchmarks.support.plane import Array, IntArray
 
+LOG_DELAY = 300_000  # ns between a stamp and its arrival at the recorder
 SLIDER_HEIGHT = 0.015  # m
 MISSED = 0.0005  # share of frames that the tracker misses
 
@@ -24,8 +26,17 @@ MISSED = 0.0005  # share of frames that the tracker misses
 class Samples:
     """Stamps (s from the start) and values, one row each."""
 
-    time: Floats
-    values: Floats
+    time: Array
+    values: Array
+
+    def stamps(self, start: int) -> IntArray:
+        """The stamps in ns since 1970; `start` is the recording's first instant."""
+        return np.asarray(start + np.round(self.time * 1e9).astype(np.int64))
+
+    @property
+    def short(self) -> Array:
+        """Values rounded to single precision, as sensors deliver them."""
+        return self.values.astype(np.float32).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -36,6 +47,15 @@ class SensedSession:
     pusher: Samples
     wrench: Samples
     scalars: dict[str, Samples]
+
+    def serialised(self, start: int) -> list[bags.Topic]:
+        """The topics of a bag; `start` is the recording's first instant in ns since 1970."""
+        bodies = [("/slider/pose", self.slider), ("/pusher/pose", self.pusher)]
+        return [
+            *(bags.poses(name, of.stamps(start), of.short[:, :3], of.values[:, 3], LOG_DELAY) for name, of in bodies),
+            bags.wrenches("/pusher/wrench", self.wrench.stamps(start), self.wrench.short, LOG_DELAY),
+            *(bags.scalars(name, of.stamps(start) + LOG_DELAY, of.values) for name, of in self.scalars.items()),
+        ]
 
 
 def sense(
@@ -50,13 +70,13 @@ def sense(
     )
 
 
-def slider_as_tracked(sensors: Sensors, session: Session, faults: Sequence[Fault], time: Floats) -> Floats:
+def slider_as_tracked(sensors: Sensors, session: Session, faults: Sequence[Fault], time: Array) -> Array:
     """Slider poses at the stamps `time`, with latency and faults but without noise."""
     true_time = time - sensors.tracker_latency - faulty.clock_lag(faults, time)
     return faulty.tracked(faults, time, session.slider.at(true_time))
 
 
-def _stamps(rng: np.random.Generator, session: Session, rate: float, missed: float = 0.0) -> Floats:
+def _stamps(rng: np.random.Generator, session: Session, rate: float, missed: float = 0.0) -> Array:
     time = (np.arange(int(session.duration * rate)) + rng.random()) / rate
     time = time + rng.uniform(-0.02, 0.02, len(time)) / rate
     return np.asarray(time[session.recorded(time) & (rng.random(len(time)) >= missed)])
@@ -71,7 +91,7 @@ def _slider(rng: np.random.Generator, sensors: Sensors, session: Session, faults
     return Samples(time, np.insert(pose, 2, SLIDER_HEIGHT, axis=1) + white)
 
 
-def _wander(rng: np.random.Generator, time: Floats, lasting: float) -> Floats:
+def _wander(rng: np.random.Generator, time: Array, lasting: float) -> Array:
     """Three slow random signals of unit variance that decorrelate within `lasting` s."""
     knots = np.arange(0.0, time[-1] + lasting, lasting / 2)
     keep = np.exp(-0.5)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Flags, Floats, unit, wrapped
 from benchmarks.foreign.motion import PushMotion
 from benchmarks.foreign.plan import CLEARANCE_TIME, ENTRY_TIME, TRANSFER_TIME, Plan
 from benchmarks.foreign.rig import Rig
+from benchmarks.support.plane import Array, BoolArray, direction, wrapped
 
 LOW, HIGH = 0.012, 0.055  # m, heights of the tip
 CIRCLE = 0.32  # m, radius on which a tip that drives back goes around the table
@@ -20,17 +20,17 @@ RESET_TIME = 0.4  # s
 UNLOADING_TIME = {"lift": 0.015, "drive_back": 0.003}  # s, until the force of the last contact is gone
 UNTOUCHED = 0.0005  # s before first touch at which the force is still zero
 
-Knots = list[tuple[float, Floats]]
+Knots = list[tuple[float, Array]]
 
 
 @dataclass(frozen=True)
 class Track:
     """A signal that is linear between its knots: `time` s, `values` shape (knots, components)."""
 
-    time: Floats
-    values: Floats
+    time: Array
+    values: Array
 
-    def at(self, time: Floats) -> Floats:
+    def at(self, time: Array) -> Array:
         """Values at `time`, held constant beyond the ends."""
         columns = [np.interp(time, self.time, column) for column in self.values.T]
         return np.stack(columns, axis=-1)
@@ -47,9 +47,9 @@ class Session:
     slider: Track
     force: Track
     duration: float
-    gaps: Floats
+    gaps: Array
 
-    def recorded(self, time: Floats) -> Flags:
+    def recorded(self, time: Array) -> BoolArray:
         """Which instants lie outside the gaps of the recording."""
         keep = np.ones(len(time), bool)
         for first, last in self.gaps:
@@ -73,7 +73,7 @@ def lay_out(rig: Rig, plan: Plan, motion: PushMotion) -> Session:
 
 def _pusher_track(rig: Rig, plan: Plan, motion: PushMotion) -> Track:
     """Path of the robot: along the push, clear of the slider, over or around to the next push."""
-    ahead = unit(motion.heading)
+    ahead = direction(motion.heading)
     begin = motion.touch - plan.approach[:, None] * ahead
     end = motion.touch + plan.travel[:, None] * ahead
     transfer = _around if rig.retreat == "drive_back" else _over
@@ -89,21 +89,21 @@ def _pusher_track(rig: Rig, plan: Plan, motion: PushMotion) -> Track:
     return Track(np.array([time for time, _ in knots]), np.array([place for _, place in knots]))
 
 
-def _low(place: Floats) -> Floats:
+def _low(place: Array) -> Array:
     return np.append(place, LOW)
 
 
-def _high(place: Floats) -> Floats:
+def _high(place: Array) -> Array:
     return np.append(place, HIGH)
 
 
-def _outside(place: Floats, ahead: Floats) -> Floats:
+def _outside(place: Array, ahead: Array) -> Array:
     """Where the line through `place` comes in from the circle around the table."""
     along = float(place @ ahead)
     return np.asarray(place - (along + np.sqrt(along**2 + CIRCLE**2 - place @ place)) * ahead)
 
 
-def _over(leave: float, arrive: float, end: Floats, begin: Floats, _away: Floats, _ahead: Floats) -> Knots:
+def _over(leave: float, arrive: float, end: Array, begin: Array, _away: Array, _ahead: Array) -> Knots:
     """Lift, wait, cross above the slider, come down."""
     down = arrive - ENTRY_TIME["lift"]
     return [
@@ -113,14 +113,14 @@ def _over(leave: float, arrive: float, end: Floats, begin: Floats, _away: Floats
     ]
 
 
-def _around(leave: float, arrive: float, end: Floats, begin: Floats, away: Floats, ahead: Floats) -> Knots:
+def _around(leave: float, arrive: float, end: Array, begin: Array, away: Array, ahead: Array) -> Knots:
     """Drive back to the circle, wait, follow the circle, come in on the next push's line."""
     out, back = _outside(end, away), _outside(begin, ahead)
     angle, target = np.arctan2(out[1], out[0]), np.arctan2(back[1], back[0])
     swept = angle + wrapped(target - angle) * np.linspace(0, 1, 13)
     inward = arrive - ENTRY_TIME["drive_back"]
     times = np.linspace(inward - TRANSFER_TIME["drive_back"], inward, 13)
-    arc = [(float(time), _low(CIRCLE * unit(np.array(at)))) for time, at in zip(times, swept, strict=True)]
+    arc = [(float(time), _low(CIRCLE * direction(np.array(at)))) for time, at in zip(times, swept, strict=True)]
     return [(leave + CLEARANCE_TIME["drive_back"], _low(out)), *arc]
 
 

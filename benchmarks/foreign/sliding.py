@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Floats
 from benchmarks.foreign.conditions import Conditions
 from benchmarks.foreign.rig import Rig
+from benchmarks.support.plane import Array
 
 
-def patch_moments(patches: Floats) -> Floats:
+def patch_moments(patches: Array) -> Array:
     """Columns 1, x, y, x^2, x y, y^2 of the patches."""
     x, y = patches.T
     return np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
 
-def base_friction(rig: Rig, moments: Floats, conditions: Conditions, twist: Floats) -> tuple[Floats, Floats, Floats]:
+def base_friction(rig: Rig, moments: Array, conditions: Conditions, twist: Array) -> tuple[Array, Array, Array]:
     """Friction wrench on the slider for body twists, and two parts of its negated derivative.
 
     The first part alone is positive definite and always safe for a step; the second part, subtracted from it,
@@ -39,14 +39,14 @@ def base_friction(rig: Rig, moments: Floats, conditions: Conditions, twist: Floa
     return wrench, secant, (pulled * curvature[:, None, :]) @ plain.transpose(0, 2, 1)
 
 
-def _pulled(plain: Floats, tensor: Floats, patches: Floats) -> Floats:
+def _pulled(plain: Array, tensor: Array, patches: Array) -> Array:
     """Patch velocities after the friction tensor, with their moment about the centre."""
     force = np.einsum("nij,njp->nip", tensor, plain[:, :2])
     moment = patches[:, 0] * force[:, 1] - patches[:, 1] * force[:, 0]
     return np.concatenate([force, moment[:, None, :]], axis=1)
 
 
-def _assemble(sums: Floats, tensor: Floats | None) -> Floats:
+def _assemble(sums: Array, tensor: Array | None) -> Array:
     """Sum over patches of J' A J with J = [[1, 0, -y], [0, 1, x]] from the weighted moments."""
     one, x, y, xx, xy, yy = sums.T
     if tensor is None:

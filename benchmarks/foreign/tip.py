@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.arrays import Flags, Floats, cross, turned_left
 from benchmarks.foreign.outlines import Outline
 from benchmarks.foreign.rig import PUSHER_RADIUS
+from benchmarks.support.plane import Array, BoolArray, cross, quarter_turn
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,12 @@ class TipContact:
     force by the robot's position, N/m.
     """
 
-    tip: Floats
-    touching: Flags
-    force: Floats
-    point: Floats
-    deflection: Floats
-    stiffness: Floats
+    tip: Array
+    touching: BoolArray
+    force: Array
+    point: Array
+    deflection: Array
+    stiffness: Array
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class TipMounting:
     `damping` is the spring's relaxation time over the length of the step: the normal force resists compression too.
     """
 
-    stiffness: Floats
-    damping: Floats
-    tip_friction: Floats
-    normal_tilt: Floats
+    stiffness: Array
+    damping: Array
+    tip_friction: Array
+    normal_tilt: Array
 
 
 def free(count: int) -> TipContact:
@@ -54,7 +54,7 @@ def free(count: int) -> TipContact:
     return TipContact(zeros, np.zeros(count, bool), zeros, zeros, np.zeros(count), np.zeros((count, 2, 2)))
 
 
-def resolve(outline: Outline, before: TipContact, robot: Floats, mounting: TipMounting) -> TipContact:
+def resolve(outline: Outline, before: TipContact, robot: Array, mounting: TipMounting) -> TipContact:
     """Contact after the robot's end of the spring moved to `robot` (pushes, 2), given the contact before."""
     foot, outward, distance = outline.closest(robot)
     inside = distance < PUSHER_RADIUS
@@ -63,7 +63,7 @@ def resolve(outline: Outline, before: TipContact, robot: Floats, mounting: TipMo
     compression = np.sum((robot - start) * _inward(outline, start, mounting), axis=1) - before.deflection
     damped = mounting.damping * compression
     tip, inward, sliding, side = _slide(outline, start, robot, damped, mounting)
-    along = turned_left(inward)
+    along = quarter_turn(inward)
     deflection = np.sum((robot - tip) * inward, axis=1)
     normal = mounting.stiffness * (deflection + damped)
     tangential = mounting.stiffness * np.sum((robot - tip) * along, axis=1)
@@ -84,15 +84,15 @@ def resolve(outline: Outline, before: TipContact, robot: Floats, mounting: TipMo
 
 
 def _slide(
-    outline: Outline, start: Floats, robot: Floats, damped: Floats, mounting: TipMounting
-) -> tuple[Floats, Floats, Flags, Floats]:
+    outline: Outline, start: Array, robot: Array, damped: Array, mounting: TipMounting
+) -> tuple[Array, Array, BoolArray, Array]:
     """Tip centre, inward normal, whether it slides, and the side to which friction acts, after two corrections."""
     tip = start
     inward = _inward(outline, tip, mounting)
     sliding = np.zeros(len(tip), bool)
     side = np.zeros(len(tip))
     for _ in range(2):
-        along = turned_left(inward)
+        along = quarter_turn(inward)
         normal = np.sum((robot - tip) * inward, axis=1) + damped
         tangential = np.sum((robot - tip) * along, axis=1)
         excess = np.abs(tangential) - mounting.tip_friction * np.maximum(normal, 0.0)
@@ -105,16 +105,16 @@ def _slide(
     return tip, inward, sliding, side
 
 
-def _inward(outline: Outline, tip: Floats, mounting: TipMounting) -> Floats:
+def _inward(outline: Outline, tip: Array, mounting: TipMounting) -> Array:
     return _tilted(-outline.closest(tip)[1], mounting.normal_tilt)
 
 
-def _tilted(inward: Floats, normal_tilt: Floats) -> Floats:
+def _tilted(inward: Array, normal_tilt: Array) -> Array:
     if not np.any(normal_tilt):
         return inward
-    return np.asarray(np.cos(normal_tilt)[:, None] * inward + np.sin(normal_tilt)[:, None] * turned_left(inward))
+    return np.asarray(np.cos(normal_tilt)[:, None] * inward + np.sin(normal_tilt)[:, None] * quarter_turn(inward))
 
 
-def wrench(contact: TipContact) -> Floats:
+def wrench(contact: TipContact) -> Array:
     """Force and torque of the tip on the slider about its centre, shape (pushes, 3), body axes."""
     return np.column_stack([contact.force, cross(contact.point, contact.force)])

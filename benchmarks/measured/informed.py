@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/results/informed.md.
+"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/results/prior.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.informed --data FOLDER [--bags bags] [--sizes N ...]
         [--models vhgp:zero vhgp:mechanics ...]
@@ -23,7 +23,7 @@ from typing import cast
 
 import numpy as np
 
-from benchmarks.measured.scores import WITHIN
+from benchmarks.measured.scores import within
 from benchmarks.measured.square import imported_square
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_exact_nlpd, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
@@ -116,8 +116,7 @@ def _learnt(model: PushModel) -> int:
 
 def _cells(scores: PushScores) -> str:
     nmse, exact = by_push(scores, total_nmse), by_push(scores, total_exact_nlpd)
-    within = " ".join(f"{share:.2f}" for share in scores.totals().coverage[0, :, WITHIN])
-    return f"{nmse.text('.3f')} | {by_push(scores, total_nlpd).value:.2f} | {exact.text('.2f')} | {within}"
+    return f"{nmse.text('.3f')} | {by_push(scores, total_nlpd).value:.2f} | {exact.text('.2f')} | {within(scores)}"
 
 
 def _differences(first: PushScores, second: PushScores) -> str:
@@ -132,21 +131,22 @@ def measured_cases(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
     if data is not None:
         with tempfile.TemporaryDirectory() as work:
             square = imported_square(data, Path(work))
-        yield "mit_square, by push", _folds(square.table, square.rig)
+        yield "mit_square, by push", folds_of(square.table, square.rig)
 
 
 def simulated_cases(bags: Path | None) -> Iterator[tuple[str, list[Case]]]:
     """The recordings of `bags/`, by name of what is tested on; nothing without them."""
     if bags is None:
         return
-    training, rig = _loaded(bags / "square_abs_train")
+    training, rig = with_rig(bags / "square_abs_train")
     order = np.random.default_rng(0).permutation(len(training))
-    yield "square_abs_test", [Case(training.take(order), _loaded(bags / "square_abs_test")[0], rig, 0)]
+    yield "square_abs_test", [Case(training.take(order), with_rig(bags / "square_abs_test")[0], rig, 0)]
     for name in OWN_FOLDS:
-        yield f"{name}, by push", _folds(*_loaded(bags / name))
+        yield f"{name}, by push", folds_of(*with_rig(bags / name))
 
 
-def _folds(table: PushTable, rig: Rig) -> list[Case]:
+def folds_of(table: PushTable, rig: Rig) -> list[Case]:
+    """Five folds of whole pushes, the training rows in the order in which they are drawn."""
     return [_case(table, rig, split_by_push(table, k), k) for k in range(FOLDS)]
 
 
@@ -154,7 +154,8 @@ def _case(table: PushTable, rig: Rig, split: Split, fold: int) -> Case:
     return Case(table.take(split.training), table.take(split.test), rig, fold)
 
 
-def _loaded(path: Path) -> tuple[PushTable, Rig]:
+def with_rig(path: Path) -> tuple[PushTable, Rig]:
+    """A recording or push table, and its rig."""
     rig = load_rig_for([path])
     return load_data([path], rig), rig
 

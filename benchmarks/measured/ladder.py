@@ -124,7 +124,7 @@ def report(base: PushModel, data: LoadedData) -> None:
     scores = [push_scores(compared(model, table, base.training_mean)) for model in models_of(found)]
     names = [base.name, *(f"+ {named(effect)}" for effect in found.terms)]
     for before, after, name in zip([None, *scores], scores, names, strict=False):
-        print(_row(before, after, name), flush=True)
+        print(step_row(before, after, name), flush=True)
     print()
     p_values = {(reported.mechanism, reported.covariate): reported.p_value for reported in found.effects}
     for effect in found.terms:
@@ -166,7 +166,8 @@ def _column(effect: Effect, k: int) -> str:
     return f"column {k + 1} of {effect.basis.name}"
 
 
-def _row(before: PushScores | None, after: PushScores, name: str) -> str:
+def step_row(before: PushScores | None, after: PushScores, name: str) -> str:
+    """The row of a step under HEAD, with paired differences from the step before."""
     outputs = " ".join(f"{value:.3f}" for value in after.totals().nmse[0])
     cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
     for figure in (total_nmse, total_nlpd):

@@ -19,8 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.measured.ladder import LADDERS
-from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
+from benchmarks.measured.ladder import HEAD, LADDERS, step_row
 from push_predictor.evaluation.ladder.ladder_text import parameter_lines
 from push_predictor.evaluation.ladder.scored_ladder import score_ladder
 from push_predictor.evaluation.push_scores import PushScores, push_scores
@@ -39,8 +38,6 @@ from push_predictor.residuals.extension.held_out_gain import compared
 from push_predictor.types import Array
 
 QUICK_ROWS = 200
-HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |
-|---|---|---|---|---|"""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -73,7 +70,7 @@ def report(loaded: LoadedData, supports: Mapping[int, Array], options: TrainingO
     scores = [_scores(_of_step(model, rung), held, model.training_mean) for rung in ladder]
     names = [step.change for step in score_ladder(model, ladder).steps]
     for before, after, name in zip([None, *scores], scores, names, strict=False):
-        print(_row(before, after, name), flush=True)
+        print(step_row(before, after, name), flush=True)
     print("\n" + "\n".join(parameter_lines(score_ladder(model, ladder).final)))
 
 
@@ -88,14 +85,6 @@ def _of_step(model: PushModel, rung: Rung) -> PushModel:
 
 def _scores(model: PushModel, held: PushTable, reference: Array) -> PushScores:
     return push_scores(compared(model, held, reference))
-
-
-def _row(before: PushScores | None, after: PushScores, name: str) -> str:
-    outputs = " ".join(f"{value:.3f}" for value in after.totals().nmse[0])
-    cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
-    for figure, form in ((total_nmse, "+.3f"), (total_nlpd, "+.3f")):
-        cells.append("" if before is None else difference_by_push(before, after, figure).text(form))
-    return f"| {name} | {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ def figures(push_scores: PushScores) -> str:
     nmse, nlpd = by_push(push_scores, total_nmse), by_push(push_scores, total_nlpd)
     exact = "" if _gaussian(push_scores) else f"{total(push_scores, 'exact_nlpd'):.2f}"
     cells: tuple[str, ...] = (f"{nmse.value:.3f} ({_listed(totals.nmse[0], '.3f')})", _between(nmse, ".2f"))
-    cells += (f"{nlpd.value:.2f}", _between(nlpd, ".2f"), exact, _listed(totals.coverage[0, :, WITHIN], ".2f"))
+    cells += (f"{nlpd.value:.2f}", _between(nlpd, ".2f"), exact, within(push_scores))
     return " | ".join(cells)
 
 
@@ -71,6 +71,11 @@ def difference(first: PushScores, second: PushScores) -> str:
     nmse, nlpd = (difference_by_push(first, second, figure) for figure in (total_nmse, total_nlpd))
     exact = "" if _gaussian(second) else f"{total(second, 'exact_nlpd') - total(first, 'nlpd'):+.2f}"
     return f"{nmse.value:+.3f} | {_between(nmse, '+.3f')} | {nlpd.value:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"
+
+
+def within(push_scores: PushScores) -> str:
+    """Share of the outcomes within the 95 % intervals, by output."""
+    return _listed(push_scores.totals().coverage[0, :, WITHIN], ".2f")
 
 
 def total(push_scores: PushScores, key: str) -> float:

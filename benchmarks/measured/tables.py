@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models on pushes measured by others: prints the tables of docs/results/measured.md.
+"""Models on pushes measured by others: prints the tables of docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
 
@@ -21,8 +21,6 @@ import numpy as np
 
 from benchmarks.measured.scores import HEAD, PLAIN, Fold, figures, pooled, total, trained
 from benchmarks.measured.square import mit_square_tables
-from push_predictor.evaluation.metrics import nmse
-from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.train import TrainingOptions
 from push_predictor.recordings.importers import import_source
@@ -72,7 +70,6 @@ def mcube_tables(data: Path, work: Path, quick: bool) -> None:
         print(f"\n{name}\n\n| model | trained on | {HEAD} | in domain, NMSE there | NMSE run by run |\n{10 * '|---'}|")
         for kind, fit, stride in MCUBE_MODELS:
             print(_leave_one_out_row(block, kind, fit, stride), flush=True)
-        print(f"\n{_physics_in_words(block)}")
 
 
 def leave_one_run_out(
@@ -128,27 +125,6 @@ def _nmse_in_domain(folds: Sequence[Fold]) -> float:
     error = np.concatenate([(c.observed - c.mean)[inside] ** 2 for c, inside in rows])
     spread = np.concatenate([(c.observed - c.training_mean)[inside] ** 2 for c, inside in rows])
     return float(np.sum(error.sum(axis=0) / spread.sum(axis=0)))
-
-
-def _physics_in_words(runs: Sequence[Path]) -> str:
-    """The fitted parameters, and the part of the textbook model's error in dx due to acceleration within a window."""
-    rig, table = load_rig_for(runs), load_data(runs)
-    physics = analytical_mechanics(rig.outline, rig.pusher_radius)
-    push = np.unique(table.push_id, return_inverse=True)[1]
-    rows = FitRows(table.inputs, table.duration, table.outcomes, push)
-    fitted = fit_jointly(physics.mechanics, rows, ("contact_friction", "pressure_spread")).values
-    even = physics.ellipsoid.length
-    recordings = [read_recording(run) for run in runs]
-    speeds = [mean_speed(r, w.start, w.end) for r in recordings for w in find_windows(r, rig)]
-    mean_speeds = np.column_stack([speeds, table.inputs[:, 1:]])
-    predicted = [physics.displacement(inputs, table.duration) for inputs in (table.inputs, mean_speeds)]
-    dx = [nmse(mean, table.outcomes, table.outcomes.mean(axis=0))[0] for mean in predicted]
-    turn = np.sum(predicted[0][:, 2] * np.sign(table.outcomes[:, 2])) / np.sum(np.abs(table.outcomes[:, 2]))
-    return (
-        f"fitted to all four: friction {fitted['contact_friction']:.2f}, c "
-        f"{1e3 * even * np.exp(fitted['pressure_spread']):.1f} mm (even pressure {1e3 * even:.1f} mm). Textbook: turns "
-        f"{turn:.2f} times the observed; NMSE of dx {dx[0]:.3f}, with the mean speed of each window {dx[1]:.3f}"
-    )
 
 
 # --- mit ------------------------------------------------------------------------------------------------------

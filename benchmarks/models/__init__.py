@@ -1,7 +1,4 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Cost and quality of training and prediction in one process, next to other libraries.
-
-Each module is a script; `peers` and `training` also offer their helpers to the others.
-"""
+"""Cost and quality of training and prediction in one process. RESULTS.md has the tables."""

@@ -9,7 +9,7 @@
 
 --data: the folder of the measured data: whole pushes of mit_square are chosen from four of five folds, and the fifth is
 predicted. --rigs: simulated ones, each with a pool of 300 pushes and 100 others to predict. `run` appends one line per
-trained model to FILE; `table` prints the tables of docs/results/suggest.md.
+trained model to FILE; `table` prints the tables of docs/results/prior.md.
 
 Every way starts with its own first batch and grows to the sizes below; the model is trained again after each batch. The
 pushes that matter are those of the pool, of which a way sees the inputs of all and the outcomes of those it has chosen.
@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -53,8 +53,7 @@ MODELS: dict[str, tuple[str, MeanChoice]] = {
     "gp, mechanics": ("gp", "mechanics"),
     "vhgp, mechanics": ("vhgp", "mechanics"),
 }
-WAYS = ("random", "Sobol", "suggest", "other start", "variance", "BAIT")
-WITH_MECHANICS = ("random", "Sobol", "suggest", "other start")
+WAYS = ("random", "Sobol", "suggest")
 WINDOWS = {"mit_square": 12, "simulated": 3}  # of a push that a model is trained on
 LOOKED_AT = {"mit_square": 6, "simulated": 3}  # windows of a push of the pool, and of those that matter, in the design
 MATTER = 128
@@ -91,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     for case in _cases(options.data, options.rigs):
         for model in options.models:
-            for way in (way for way in options.ways if model == "gp" or way in WITH_MECHANICS):
+            for way in options.ways:
                 for draw in range(options.draws if way == "random" else 1):
                     _grow(case, model, way, draw, options.sizes or SIZES[case.kind], options.out)
 
@@ -158,44 +157,6 @@ def _append(out: Path, case: Case, model: str, way: str, draw: int, n: int, trai
 # --- ways of choosing ---------------------------------------------------------------------------------------------
 
 
-class MeanVariance(Information):
-    """The posterior of the weights; a candidate counts by the mean variance that it removes."""
-
-    def gains(self) -> Array:
-        """The fall of the mean variance (c,) of what matters."""
-        return np.asarray(self.reductions().mean(axis=1))
-
-
-class MaximumVariance(Information):
-    """The posterior of the weights; a candidate counts by the mean variance of its own outcomes."""
-
-    def gains(self) -> Array:
-        """The mean variance (c,) of each candidate's outcomes."""
-        return np.asarray(np.trace(self.covariance, axis1=1, axis2=2) / self.features.any(axis=2).sum(axis=1))
-
-
-def _independent(found: Information) -> Information:
-    """BAIT (Ash et al. 2021): the trace of the Fisher information's inverse, windows taken for independent."""
-    return MeanVariance(found.features, _unit(found), found.matter)
-
-
-def _most_variable(found: Information) -> Information:
-    return MaximumVariance(found.features, _unit(found), found.matter)
-
-
-def _unit(found: Information) -> Array:
-    count, k = found.features.shape[:2]
-    return np.broadcast_to(np.eye(k), (count, k, k))
-
-
-DESIGNS: dict[str, Callable[[Information], Information]] = {
-    "suggest": lambda found: found,
-    "other start": lambda found: found,
-    "BAIT": _independent,
-    "variance": _most_variable,
-}
-
-
 def _chosen(
     case: Case,
     model: str,
@@ -217,14 +178,14 @@ def _chosen(
     if way == "random" or trained is None:
         return rng.choice(left, count, replace=False)
     tried, matter = _pool_courses(case, left), _pool_windows(case)
-    return left[distinct(DESIGNS[way](information_of(trained, tried, matter)), count)]
+    return left[distinct(information_of(trained, tried, matter), count)]
 
 
 def _spread_evenly(model: str, way: str, taken: int) -> bool:
-    """Whether the next pushes are of the Sobol' sequence, as `suggest` has it or as its alternative does."""
-    if way == "suggest" and model == "prior":
-        return taken >= CHOSEN_OF_PRIOR
-    return way == ("suggest" if model == "gp" else "other start") and taken < FIRST
+    """Whether `suggest` takes the next pushes from the Sobol' sequence."""
+    if way != "suggest":
+        return False
+    return taken >= CHOSEN_OF_PRIOR if model == "prior" else model == "gp" and taken < FIRST
 
 
 def distinct(information: Information, count: int) -> IntArray:

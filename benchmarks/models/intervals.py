@@ -1,14 +1,13 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Coverage of the intervals for new pushes, without and with tails: docs/results/intervals.md.
+"""Coverage of the intervals for new pushes, without and with tails: docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.intervals [--data FOLDER] [--bags bags] [--sets]
-        [--runs FOLDER] [--sizes N ...] [--means mechanics zero] [--kind vhgp]
+        [--sizes N ...] [--means mechanics zero] [--kind vhgp]
 
 --data and --bags: as in benchmarks/measured/informed.py; a size beyond the training windows of a recording takes all.
 --sets: the 16 pairs of shape and surface of the paper, simulated, in two of five folds of pushes, and all together.
---runs: the measured data with the four long pushes of an aluminium and a steel block; each is left out once.
 "gaussian" is the model without tails, "student" and "conformal" are the intervals with. The last column has paired
 differences of the exact NLPD from the model without tails. All intervals resample whole pushes.
 """
@@ -16,10 +15,8 @@ differences of the exact NLPD from the model without tails. All intervals resamp
 from __future__ import annotations
 
 import argparse
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +24,6 @@ from push_predictor_paper.data.corpus import learning_set
 from push_predictor_paper.plan import FULL
 
 from benchmarks.measured.informed import Case, measured_cases, simulated_cases, trained
-from benchmarks.measured.tables import BLOCKS, STRIDE
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.estimate import by_push, difference_by_push, of_draws, total_exact_nlpd
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, standardised
@@ -36,9 +32,6 @@ from push_predictor.evaluation.splits import push_bootstrap, split_by_push
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.tails import joint_radius
-from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.load import load_data, load_rig_for
-from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
 
 SIZES = (100, 200, 500, 1000)
@@ -67,13 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--data", type=Path, help="the folder of the measured data")
     parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
     parser.add_argument("--sets", action="store_true", help="the simulated pairs of shape and surface")
-    parser.add_argument("--runs", type=Path, help="the folder of the measured data, for its long pushes")
     parser.add_argument("--sizes", nargs="+", type=int, default=SIZES)
     parser.add_argument("--means", nargs="+", default=MEANS)
     parser.add_argument("--kind", default="vhgp", choices=("vhgp", "gp"))
     options = parser.parse_args(arguments)
-    given = (measured_cases(options.data), simulated_cases(options.bags), run_cases(options.runs))
-    for name, cases in chain(*given):
+    for name, cases in (*measured_cases(options.data), *simulated_cases(options.bags)):
         print_cases(name, cases, options)
     if options.sets:
         each = [print_cases(name, cases, options) for name, cases in set_cases()]
@@ -107,22 +98,6 @@ def set_cases() -> Iterator[tuple[str, list[Case]]]:
             f"{shape} on {surface}",
             [Case(table.take(s.training), table.take(s.test), pushes.rig, k) for k, s in enumerate(folds)],
         )
-
-
-def run_cases(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
-    """The long pushes of each metal block, one left out at a time, with overlapping training windows."""
-    if data is None:
-        return
-    with tempfile.TemporaryDirectory() as work:
-        runs = sorted(import_source("mcube", [data / "mcube_preliminary"], Path(work)).written)
-        for prefix, name in BLOCKS.items():
-            block = [run for run in runs if run.name.startswith(prefix)]
-            yield f"{name} block, by run", [_left_out(run, block) for run in block]
-
-
-def _left_out(run: Path, block: Sequence[Path]) -> Case:
-    training = load_data([other for other in block if other != run], None, WindowOptions(stride=STRIDE))
-    return Case(training, load_data([run]), load_rig_for(block), 0)
 
 
 def found(cases: Sequence[Case], n: int, kind: str, mean: str) -> Found:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models that were trained at one speed and are asked at others: docs/results/informed.md.
+"""Models that were trained at one speed and are asked at others: docs/results/accuracy.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.other_speeds [--rigs simulated foreign points] [--count 3]
         [--rows 300] [--work FOLDER]
@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measured.scores import WITHIN
+from benchmarks.measured.scores import within
 from benchmarks.models.rigs_at_speeds import RIGS, session
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_exact_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
@@ -137,11 +137,6 @@ def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int)
         count = int(default.windows.sum())
         own, best_there = (by_push(scores, total_exact_nlpd).text(".2f") for scores in (default, there))
         print(f"| {1e3 * speed:g} | {count} | {own} | {within(default)} | {best_there} |", flush=True)
-
-
-def within(scores: PushScores) -> str:
-    """Share of the outcomes within the 95 % intervals, by output."""
-    return " ".join(f"{share:.2f}" for share in scores.totals().coverage[0, :, WITHIN])
 
 
 if __name__ == "__main__":

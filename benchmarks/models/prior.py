@@ -26,8 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measured.informed import OWN_FOLDS, Case
-from benchmarks.measured.scores import WITHIN
+from benchmarks.measured.informed import OWN_FOLDS, Case, with_rig
+from benchmarks.measured.scores import WITHIN, within
 from benchmarks.measured.square import imported_square
 from benchmarks.models.rigs_at_speeds import session
 from push_predictor.evaluation.estimate import by_push, total_exact_nlpd, total_nmse
@@ -36,7 +36,6 @@ from push_predictor.evaluation.splits import FOLDS, push_folds
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 
@@ -88,8 +87,7 @@ def _rows(cases: Sequence[Case], n: int, kinds: Sequence[str]) -> PushScores | N
 
 def _cells(scores: PushScores) -> str:
     nmse, nlpd = by_push(scores, total_nmse), by_push(scores, total_exact_nlpd)
-    within = " ".join(f"{share:.2f}" for share in scores.totals().coverage[0, :, WITHIN])
-    return f"{nmse.text('.3f')} | {nlpd.text('.2f')} | {within}"
+    return f"{nmse.text('.3f')} | {nlpd.text('.2f')} | {within(scores)}"
 
 
 def _scored(case: Case, n: int, kind: str) -> tuple[PushScores, int, float]:
@@ -109,7 +107,7 @@ def _scored(case: Case, n: int, kind: str) -> tuple[PushScores, int, float]:
 def _simulated(bags: Path | None) -> Iterator[tuple[str, list[Case]]]:
     if bags is None:
         return
-    loaded = {name: _loaded(bags / name) for name in (SQUARE_TRAINING, *SQUARE_TESTS, *OWN_FOLDS)}
+    loaded = {name: with_rig(bags / name) for name in (SQUARE_TRAINING, *SQUARE_TESTS, *OWN_FOLDS)}
     training, rig = loaded[SQUARE_TRAINING]
     for name in SQUARE_TESTS:
         yield name, [Case(training, loaded[name][0], rig, seed) for seed in range(SEEDS)]
@@ -125,7 +123,7 @@ def _measured(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
     yield "mit_square", _folds(square.table, square.rig)
     with tempfile.TemporaryDirectory() as work:
         import_source("mlab", [data / "mlab" / "sensor_log"], Path(work))
-        logs = {path.stem: _loaded(path) for path in sorted(Path(work).glob("*.csv"))}
+        logs = {path.stem: with_rig(path) for path in sorted(Path(work).glob("*.csv"))}
     for name, (table, rig) in logs.items():
         yield f"mlab {name}", [Case(empty_table(), table, rig, 0)]
 
@@ -141,11 +139,6 @@ def _others(count: int) -> Iterator[tuple[str, list[Case]]]:
 def _folds(table: PushTable, rig: Rig) -> list[Case]:
     fold = push_folds(table)
     return [Case(table.take(fold != k), table.take(fold == k), rig, k) for k in range(FOLDS)]
-
-
-def _loaded(path: Path) -> tuple[PushTable, Rig]:
-    rig = load_rig_for([path])
-    return load_data([path], rig), rig
 
 
 if __name__ == "__main__":

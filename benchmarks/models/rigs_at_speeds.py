@@ -19,11 +19,11 @@ from benchmarks.foreign.change import Change
 from benchmarks.foreign.plan import PushDistribution
 from benchmarks.foreign.recording import FIRST_DAY, draw_inputs, write_session
 from benchmarks.foreign.rig import draw_rig as draw_foreign_rig
-from benchmarks.points_rig.bags import write_bag
 from benchmarks.points_rig.pairs import EPOCH, record
 from benchmarks.points_rig.rigs import draw_rig as draw_points_rig
 from benchmarks.points_rig.scenarios import Scenario
 from benchmarks.points_rig.sessions import plan_session
+from benchmarks.support.bags import write_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -69,7 +69,8 @@ def _points(folder: Path, number: int, which: int, pushes: int, speeds: Sequence
     rig, rng = draw_points_rig(np.random.default_rng([number])), np.random.default_rng([number, 1, which])
     rig = replace(rig, speeds=tuple(speeds))
     planned = plan_session(rng, rig, pushes)
-    write_bag(folder, record(rng, rig, planned, Scenario("none")), rig.record(), float(EPOCH))
+    streams = record(rng, rig, planned, Scenario("none"))
+    write_bag(folder, streams.serialised(float(EPOCH)), rig.record(), "points_rig")
 
 
 RIGS: dict[str, Write] = {"simulated": _simulated, "foreign": _foreign, "points": _points}

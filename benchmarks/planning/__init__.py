@@ -3,5 +3,5 @@
 
 """Rollouts and planned pushes against the rig simulator.
 
-`rollout`, `planner`, `planner_promises`, `risk` and `risk_picture` are scripts; the other modules belong to them.
+`rollout`, `risk` and `risk_picture` are scripts; the other modules belong to them.
 """

@@ -24,22 +24,27 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.planning.planner import IDLE, VELOCITY, WINDOW, trained
 from benchmarks.planning.risk_table import VARIANTS, tables
 from benchmarks.planning.risk_tasks import TASKS, Problem, Task, inner_target, problem
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.model_repertoire import candidate_pushes, persistent_fraction
 from push_predictor.planning.obstacles.around_obstacles import PlannedPushes, plan_around_obstacles
 from push_predictor.planning.repertoire import Repertoire, repertoire
 from push_predictor.planning.unscented import PusherGeometry
+from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.simulation.interactive_rig import push_motion
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array
 
+TRAINING = Path(__file__).resolve().parents[2] / "bags" / "square_abs_train"
+WINDOW = 0.2  # s
+VELOCITY = 0.02  # m/s, of most of the training pushes
+IDLE = (0.125, 0.0, 0.001)  # contact, angle, travel of a push on a slider whose run is over; its outcome is ignored
 WINDOWS = (2, 4, 6, 8, 12, 16)  # 8 to 64 mm
 MOST = 8  # pushes of a plan
 LOOSEST = 0.5  # risk above which no plan is made
@@ -84,6 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             numbers = range(first, min(first + PIECE, stop))
             _run_piece(options.out / "runs.jsonl", task, numbers, variants, model)
     return 0
+
+
+def trained(tails: bool = False) -> PushModel:
+    """A plain VHGP of the training recording."""
+    options = TrainingOptions(tails=tails, mean="zero")
+    return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="square_abs", options=options)
 
 
 def repertoires(model: PushModel) -> dict[str, Repertoire]:

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.planning.planner import WINDOW, trained
-from benchmarks.planning.risk import SEED, STRIDE, plan, repertoires
+from benchmarks.planning.risk import SEED, STRIDE, WINDOW, plan, repertoires, trained
 from benchmarks.planning.risk_table import VARIANTS
 from benchmarks.planning.risk_tasks import TASKS, Problem, problem
 from push_predictor.geometry.frames import to_world

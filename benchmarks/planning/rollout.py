@@ -25,6 +25,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from benchmarks.planning.risk import trained
 from benchmarks.planning.rollout_picture import draw_rollout
 from benchmarks.planning.rollout_truth import (
     REGIONS,
@@ -40,15 +41,12 @@ from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
 from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import rollout
 from push_predictor.planning.straight_drive import start_drive
-from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.types import Array
 
-TRAINING = Path(__file__).resolve().parents[2] / "bags" / "square_abs_train"
 SPEED, LENGTHS = 0.02, (0.004, 0.02, 0.06, 0.1)  # m/s; distances (m) after which poses are compared
 CONTACTS, ANGLES = (0.03, 0.08, 0.125, 0.15, 0.2), (-0.5, 0.0, 0.4)
 ARM = 0.09 / np.sqrt(6.0)  # m, of the square
@@ -62,7 +60,7 @@ Steps: TypeAlias = Sequence[Sequence[float]]  # velocity m/s, contact, angle rad
 def main() -> int:
     """Simulate, roll out, print the table."""
     options = _arguments()
-    model = load_model(options.model) if options.model else trained()
+    model = load_model(options.model) if options.model else trained(tails=True)
     tabulated = tabulate(model)
     print(f"{model.name}: {model.kind}, {len(model.training)} windows; {tabulated.how}")
     print("persistence over 4, 8, 16, 40 mm of travel, dx dy dtheta:", *_persistence(model))
@@ -79,17 +77,6 @@ def main() -> int:
     if options.picture:
         draw_rollout(tabulated, options.picture)
     return 0
-
-
-def trained() -> PushModel:
-    """Train the default VHGP on the training recording."""
-    return train_model(
-        load_data([TRAINING], None),
-        load_rig_for([TRAINING], None),
-        "vhgp",
-        name="square_abs",
-        options=TrainingOptions(mean="zero"),
-    )
 
 
 def _repeated(number: int, contact: float, angle: float, count: int) -> Repeats:

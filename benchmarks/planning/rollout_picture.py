@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from push_predictor_paper.statistics.unimodality import dip, p_values
 
 from benchmarks.planning.rollout_truth import repeats
 from push_predictor.geometry.frames import rotate, to_world
@@ -28,11 +27,10 @@ TIMES = np.array([0.2, 5.0, 9.4])  # s
 COUNT = 500  # samples, and repeats on the simulator
 DRAWN = 40  # outlines of each
 BINS = 20
-DIP_DRAWS = 5000
 
 
 def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
-    """Draw the push, and print p values of Hartigan's dip test for one mode of the heading."""
+    """Draw the push."""
     outline = tabulated.model.rig.outline
     inward = outline.inward_normal(np.array([CONTACT]))[0]
     ahead = np.arctan2(inward[1], inward[0])
@@ -40,11 +38,6 @@ def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
     steps = [np.array([[SPEED, CONTACT, ANGLE, float(time)]]) for time in TIMES]
     # One seed: the samples of a shorter push are those of the longer one at that time.
     predicted = [rollout(tabulated, np.zeros(3), np.zeros((3, 3)), step, COUNT).samples for step in steps]
-    for time, samples, seen in zip(TIMES, predicted, truth, strict=True):
-        p = p_values(np.concatenate([dip(samples[None, :, 2]), dip(seen[None, :, 2])]), COUNT, DIP_DRAWS)
-        print(
-            f"{1e3 * SPEED * time:.0f} mm: dip test of the heading: p = {p[0]:.2g} (samples), {p[1]:.2g} (repetitions)"
-        )
     draw(path, (9.0, 5.6), lambda figure: _paint(figure, outline, ahead, predicted, truth))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, BoolArray, IntArray, dot, quarter_turn
+from benchmarks.support.plane import Array, BoolArray, IntArray, dot, quarter_turn
 
 SMOOTHING = 0.01  # of the tip's speed: below it, friction falls linearly to zero
 TOLERANCE = 1e-7  # of the residual, in units of the slider's friction

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, IntArray
 from benchmarks.points_rig.rigs import Rig
 from benchmarks.points_rig.sessions import Session
+from benchmarks.support.plane import Array, IntArray
 
 DriverKind = Literal["constant", "step", "linear", "saturating", "topic", "patch", "heading", "edge", "speed"]
 MEASURES = {"time": "elapsed_time", "pushes": "push_index", "distance": "slid_distance"}

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, cross, direction, rotate
 from benchmarks.points_rig.drivers import LASTING, Driver, DriverKind, View
 from benchmarks.points_rig.rigs import Rig
+from benchmarks.support.plane import Array, cross, direction, rotate
 
 ANY_DRIVER: tuple[DriverKind, ...] = (*LASTING, "topic", "patch", "heading", "edge", "speed")
 SPOT_RADIUS, STRIP_HALF_WIDTH, LOST_RADIUS, DENT_PATH = 0.025, 0.015, 0.02, 0.008  # m

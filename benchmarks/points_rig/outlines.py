@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, BoolArray, IntArray, cross, dot, quarter_turn
+from benchmarks.support.plane import Array, BoolArray, IntArray, cross, dot, quarter_turn
 
 ELLIPSE_VERTICES = 128
 

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.points_rig.bags import write_bag
 from benchmarks.points_rig.pieces import clean_ratio
 from benchmarks.points_rig.rigs import Rig, draw_rig
 from benchmarks.points_rig.scenarios import Scenario, describe, draw_scenario
 from benchmarks.points_rig.sensors import Streams, sense
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import draw_noise, simulate
+from benchmarks.support.bags import write_bag
 
 EPOCH = 1_760_000_000  # s, absolute time of the first training session
 
@@ -61,7 +61,7 @@ def write_pair(pair: Pair, data: Path, truth: Path) -> None:
     number = f"{pair.truth['number']:03d}"
     for name, streams, start in zip(("training", "new"), (pair.training, pair.new), pair.starts, strict=True):
         shutil.rmtree(data / number / name, ignore_errors=True)
-        write_bag(data / number / name, streams, pair.rig.record(), start)
+        write_bag(data / number / name, streams.serialised(start), pair.rig.record(), "points_rig")
     truth.mkdir(parents=True, exist_ok=True)
     draft = truth / f"{number}.json.draft"
     draft.write_text(json.dumps(pair.truth, indent=2) + "\n", encoding="utf-8")

@@ -5,11 +5,11 @@
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, IntArray, rotate
 from benchmarks.points_rig.effects import Effect
 from benchmarks.points_rig.rigs import Rig
 from benchmarks.points_rig.sessions import Session
 from benchmarks.points_rig.simulation import Tracks, draw_noise, simulate
+from benchmarks.support.plane import Array, IntArray, rotate
 
 PIECE = 0.2  # s
 JUDGED_PUSHES = 120

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import GRAVITY, Array
 from benchmarks.points_rig.outlines import Outline, ellipse, hexagon, rectangle
+from benchmarks.support.plane import Array
 
+GRAVITY = 9.81  # m/s^2
 PUSHER_RADIUS = 0.00475  # m
 SURFACES = ("plywood", "glass", "pvc", "aluminium", "felt")
 TOPICS = ("surface/temperature", "room/humidity", "motor/current")

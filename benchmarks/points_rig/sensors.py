@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, IntArray, cross, direction, rotate
 from benchmarks.points_rig.rigs import PUSHER_RADIUS, Rig
 from benchmarks.points_rig.scenarios import Fault
 from benchmarks.points_rig.sessions import AFTER, BEFORE, Session
 from benchmarks.points_rig.simulation import STEP, Tracks
+from benchmarks.support import bags
+from benchmarks.support.plane import Array, IntArray, cross, direction, rotate
 
+LATENCY = {"slider": 4_000_000, "tip": 1_000_000, "wrench": 1_500_000}  # ns from stamp to arrival
 RATE = 250.0  # Hz, of the tip's pose and of the force sensor
 TRACKER_NOISE, HEADING_NOISE = 0.00007, 0.0001  # m, rad
 TIP_NOISE, FORCE_NOISE, TORQUE_NOISE = 0.00002, 0.1, 0.002  # m, N, N m
@@ -27,6 +29,10 @@ class Readings:
     stamps: Array
     values: Array
 
+    def nanoseconds(self, epoch: float) -> IntArray:
+        """The stamps in ns since 1970."""
+        return np.int64(epoch) * 1_000_000_000 + np.rint(self.stamps * 1e9).astype(np.int64)
+
 
 @dataclass(frozen=True)
 class Streams:
@@ -36,6 +42,18 @@ class Streams:
     tip: Readings
     wrench: Readings
     topics: dict[str, Readings]
+
+    def serialised(self, epoch: float) -> list[bags.Topic]:
+        """The topics of a bag; `epoch` (s) is the absolute time of the session's start."""
+        slider, tip, (x, y, torque) = self.slider.values, self.tip.values, self.wrench.values.T
+        place, level = np.column_stack([slider[:, :2], np.zeros(len(slider))]), np.zeros(len(tip))
+        wrench = np.column_stack([x, y, *np.zeros((3, len(x))), torque])
+        return [
+            bags.poses("/slider/pose", self.slider.nanoseconds(epoch), place, slider[:, 2], LATENCY["slider"]),
+            bags.poses("/pusher/pose", self.tip.nanoseconds(epoch), tip, level, LATENCY["tip"]),
+            bags.wrenches("/pusher/wrench", self.wrench.nanoseconds(epoch), wrench, LATENCY["wrench"]),
+            *(bags.scalars(f"/{name}", of.nanoseconds(epoch), of.values) for name, of in self.topics.items()),
+        ]
 
 
 @dataclass(frozen=True)

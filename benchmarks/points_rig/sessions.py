@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from benchmarks.points_rig.arrays import Array, BoolArray, IntArray
 from benchmarks.points_rig.rigs import Rig
+from benchmarks.support.plane import Array, BoolArray, IntArray
 
 BEFORE, AFTER = 0.15, 0.25  # s recorded before the tip sets off and after it stops
 REACH = 0.08  # m, the slider is put back within this distance of the origin on each axis

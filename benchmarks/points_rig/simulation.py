@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.points_rig.arrays import Array, BoolArray, IntArray, cross, direction, dot, quarter_turn, rotate
 from benchmarks.points_rig.balance import Contact, solve
 from benchmarks.points_rig.drivers import View
 from benchmarks.points_rig.effects import Conditions, Effect
 from benchmarks.points_rig.outlines import Nearest
 from benchmarks.points_rig.rigs import PUSHER_RADIUS, Rig
 from benchmarks.points_rig.sessions import Session
+from benchmarks.support.plane import Array, BoolArray, IntArray, cross, direction, dot, quarter_turn, rotate
 
 STEP = 0.00025  # m of the tip's path
 MEMORY = 0.006  # m of path over which the frictions vary

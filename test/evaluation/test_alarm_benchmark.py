@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.blind import null_streams
+from benchmarks.blind import alarm
 from benchmarks.blind.alarm import Row
-from benchmarks.blind.null_streams import Stream
 
 
 def row(change: int | None, fired: int | None) -> Row:
-    return Row(0, "rect1 on abs", 300, change, fired, "dy" if fired else None, 2.0)
+    return Row(0, "rect1 on abs", "vhgp", change, fired, "dy" if fired else None)
 
 
 def test_alarm_before_the_change_is_false_and_after_it_has_a_delay() -> None:
@@ -29,14 +28,14 @@ def test_alarm_before_the_change_is_false_and_after_it_has_a_delay() -> None:
     assert row(None, 7).delay is None
 
 
-def test_streams_that_are_there_are_not_judged_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_that_are_there_are_not_judged_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged: list[int] = []
 
-    def streams_of(seed: int, count: int) -> list[Stream]:
+    def rows(seed: int, count: int) -> list[Row]:
         judged.append(seed)
-        return [Stream(seed, "hex on pu", "vhgp", None, None, -0.2)] * count
+        return [Row(seed, "hex on pu", "vhgp", None, None, None)] * count
 
-    monkeypatch.setattr(null_streams, "streams_of", streams_of)
+    monkeypatch.setattr(alarm, "rows_without_change", rows)
     for models in ("2", "3"):
-        null_streams.main(["--out", str(tmp_path), "--models", models, "--streams", "4", "--first", "7"])
+        alarm.main(["unchanged", "--out", str(tmp_path), "--models", models, "--streams", "4", "--first", "7"])
     assert judged == [7, 8, 9] and len(list(tmp_path.iterdir())) == 3

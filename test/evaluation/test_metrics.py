@@ -104,7 +104,7 @@ def test_split_by_push_tests_every_row_once_and_never_trains_on_tested_pushes() 
 
 
 def test_folds_do_not_depend_on_the_order_of_rows() -> None:
-    """As docs/results/measured.md tells: default_rng(0).permutation(pushes) % 5, push 9 before push 10."""
+    """As docs/results/accuracy.md tells: default_rng(0).permutation(pushes) % 5, push 9 before push 10."""
     numbers = np.random.default_rng(3).permutation(np.repeat(np.arange(23), 2))
     n = len(numbers)
     table = PushTable(np.full((n, 3), 0.1), np.full(n, 0.2), np.zeros((n, 3)), numbers.astype(np.str_))

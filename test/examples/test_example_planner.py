@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import ros_harness as harness
 
-from benchmarks.planning.planner_table import Regime, Runs, table
 from examples import plan_pushes, processes
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.store.model_file import save_model
@@ -80,14 +79,3 @@ def test_the_example_reaches_its_goal(model, tmp_path, monkeypatch, capsys):
     sure = re.findall(r"with probability (\d\.\d\d) \(by rollout_pushes: (\d\.\d\d)\)", output)
     assert sure and all(abs(float(ours) - float(theirs)) < 0.2 for ours, theirs in sure)
     assert (tmp_path / "pushes.png").stat().st_size > 10_000
-
-
-def test_the_benchmarks_table_counts_goals_and_promises():
-    """95 of 100 goals within the limit: Wilson's interval is 88.8 to 97.8 %; the other variant needs one push more."""
-    needed = np.repeat([1, 2, 7], [45, 50, 5])
-    first = Runs(needed, np.full(100, 0.0012), np.array([0.95, 0.97]), np.array([True, False]))
-    other = Runs(needed + 1, np.full(100, 0.002), np.zeros(0), np.zeros(0, dtype=bool))
-    lines = table(Regime("made up", 0.02, 0.3, 0.001, 0.03), {"own": first, "other": other}).splitlines()
-    cells = [line.strip("| ").split(" | ") for line in lines if line.startswith(("| own", "| other"))]
-    assert cells[0][4] == "95 % (89 to 98)" and cells[0][7:] == ["1.20", "2", "0.96", "50 % (9 to 91)"]
-    assert cells[1][1] == "0 % (0 to 4)" and cells[1][6] == "+1.00 (+1.00 to +1.00)" and cells[1][8] == "0"

@@ -9,16 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
-from benchmarks.points_rig.arrays import GRAVITY, dot, quarter_turn, rotate
 from benchmarks.points_rig.drivers import Driver
 from benchmarks.points_rig.effects import Effect
 from benchmarks.points_rig.outlines import rectangle
 from benchmarks.points_rig.pairs import make_pair, write_pair
 from benchmarks.points_rig.pieces import clean_ratio
-from benchmarks.points_rig.rigs import Rig, draw_rig
+from benchmarks.points_rig.rigs import GRAVITY, Rig, draw_rig
+from benchmarks.points_rig.sensors import Readings, Streams
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import STEP, Tracks, draw_noise, simulate
+from benchmarks.support.bags import write_bag
+from benchmarks.support.plane import dot, quarter_turn, rotate
+from push_predictor import read_recording
 
 TRUTH_KEYS = {
     "number", "group", "seed", "engine", "shape", "surface", "friction", "pushes", "kind", "channel", "names",
@@ -89,6 +93,29 @@ def test_friction_never_returns_power(tracks: Tracks) -> None:
     arm = tip + 0.00475 * tracks.normal - tracks.pose[:-1, :, :2]
     work = dot(-tracks.force, moved[..., :2] + moved[..., 2:] * quarter_turn(arm))
     assert work.min() >= -1e-9
+
+
+def test_bags_contain_the_readings(rig: Rig, tmp_path: Path) -> None:
+    """As the project's own reader, which shares no code with the writer, decodes them."""
+    time, steps = np.array([0.0, 0.25, 0.5]), np.arange(3.0)
+    slider = Readings(time, np.column_stack([0.1 + steps, 0.2 - steps, [3.0, -3.0, 0.5]]))
+    tip = Readings(time, np.column_stack([0.3 + steps, 0.4 - steps, 0.01 * steps]))
+    wrench = Readings(time + 0.1, np.array([[1.0, 2.0, 0.3]] * 3))
+    streams = Streams(slider, tip, wrench, {"room/humidity": Readings(time[:2], np.array([[45.5], [46.5]]))})
+    topics = streams.serialised(7.0)
+    assert [int(topic.arrival[0]) - 7_000_000_000 for topic in topics] == [4_000_000, 1_000_000, 101_500_000, 0]
+    write_bag(tmp_path / "bag", topics, rig.record(), "points_rig")
+    with (tmp_path / "bag/bag_0.mcap").open("rb") as file:
+        arrivals = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
+    assert len(arrivals) == 11 and arrivals == sorted(arrivals)
+    read = read_recording(tmp_path / "bag/bag_0.mcap")
+    np.testing.assert_allclose([read.slider.x, read.slider.y, read.slider.heading], slider.values.T, atol=1e-12)
+    np.testing.assert_allclose([read.pusher.x, read.pusher.y, read.pusher.z], tip.values.T, atol=1e-12)
+    assert read.slider.stamp.tolist() == [7_000_000_000, 7_250_000_000, 7_500_000_000]
+    assert read.wrench is not None and read.rig is not None
+    assert [read.wrench.fx[0], read.wrench.fy[0], read.wrench.torque[0]] == [1.0, 2.0, 0.3]
+    assert [scalar.value.tolist() for scalar in read.scalars.values()] == [[45.5, 46.5]]
+    assert read.rig.object_mass == pytest.approx(rig.mass, abs=1e-3)
 
 
 @pytest.mark.long

@@ -3,7 +3,7 @@
 
 """The whole chain on pushes measured by others: import, replay through the nodes, windows, validation.
 
-Figures of these data with their intervals: docs/results/measured.md. Eight long pushes show that the chain is right
+Figures of these data with their intervals: docs/results/accuracy.md. Eight long pushes show that the chain is right
 (frames, contact, signs, online equals offline); they are too few to rank models.
 """
 

@@ -42,6 +42,7 @@ REFERENCE = DOCS / "reference"
 DOCUMENTS = [
     *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "bags/README.md")),
     *sorted(DOCS.rglob("*.md")),
+    *sorted((REPOSITORY / "benchmarks").glob("*/RESULTS.md")),
 ]
 PYTHON_FILES = [
     path.relative_to(REPOSITORY).as_posix()

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pushes measured by others: the data in a user's folder that the paper's tables can use (docs/results/measured.md)."""
+"""Pushes measured by others: the data in a user's folder that the paper's tables can use (docs/results/accuracy.md)."""
 
 from __future__ import annotations
 

@@ -1,9 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write a recording as a rosbag2 folder: one MCAP file with CDR messages and metadata.yaml."""
+"""Write a recording of an independent rig as a rosbag2 folder: one MCAP file with CDR messages and metadata.yaml."""
+
+from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +14,39 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
-from benchmarks.points_rig.arrays import Array, IntArray
-from benchmarks.points_rig.schemas import DEFINITIONS
-from benchmarks.points_rig.sensors import Readings, Streams
+from benchmarks.support.plane import Array, IntArray
 
 POSE, WRENCH, SCALAR = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped", "std_msgs/msg/Float64"
-LATENCY = {"slider/pose": 4_000_000, "pusher/pose": 1_000_000, "pusher/wrench": 1_500_000}  # ns from stamp to arrival
 _CDR = ("cdr", "S4")  # encapsulation header: little-endian CDR
 _HEADER = [_CDR, ("sec", "<i4"), ("nanosec", "<u4"), ("frame_length", "<u4"), ("frame", "S12")]
+_PARTS = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Quaternion": "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+}
+_STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
+
+
+def _definition(text: str, *parts: str) -> str:
+    """A ros2msg definition followed by those of the types that it uses."""
+    return text + "".join(f"{'=' * 80}\nMSG: {part}\n{_PARTS[part]}" for part in parts)
+
+
+_DEFINITIONS = {
+    POSE: _definition(
+        "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
+        *(*_STAMPED, "geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"),
+    ),
+    WRENCH: _definition(
+        "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
+        *(*_STAMPED, "geometry_msgs/Wrench", "geometry_msgs/Vector3"),
+    ),
+    SCALAR: "float64 data\n",
+}
 
 
 @dataclass(frozen=True)
@@ -36,41 +64,35 @@ class Topic:
         return [data[begin : begin + size] for begin in range(0, len(data), size)]
 
 
-def write_bag(folder: Path, streams: Streams, rig_record: dict[str, str], epoch: float) -> None:
-    """Write a bag folder; `epoch` (s) is the absolute time of the session's start."""
+def poses(name: str, stamps: IntArray, place: Array, yaw: Array, latency: int) -> Topic:
+    """PoseStamped in frame `world`: stamps (n,) and latency in ns, place (n, 3) in m, yaw (n,) in rad."""
+    zeros, half = np.zeros((len(yaw), 2)), yaw / 2
+    return _stamped(name, POSE, stamps, np.column_stack([place, zeros, np.sin(half), np.cos(half)]), latency)
+
+
+def wrenches(name: str, stamps: IntArray, force_torque: Array, latency: int) -> Topic:
+    """WrenchStamped in frame `world` from force and torque (n, 6), N and N m."""
+    return _stamped(name, WRENCH, stamps, force_torque, latency)
+
+
+def scalars(name: str, arrival: IntArray, values: Array) -> Topic:
+    """Float64, which has no stamp, from values (n, 1)."""
+    return Topic(name, SCALAR, arrival, _rows([_CDR], values))
+
+
+def write_bag(folder: Path, topics: Sequence[Topic], rig_record: Mapping[str, str], library: str) -> None:
+    """Write a bag folder; `library` is the program that the file names as its writer."""
     folder.mkdir(parents=True, exist_ok=True)
-    topics = _topics(streams, epoch)
     name = f"{folder.name}_0.mcap"
-    _write_mcap(folder / name, topics, rig_record)
+    _write_mcap(folder / name, topics, rig_record, library)
     (folder / "metadata.yaml").write_text(_metadata(topics, name, rig_record), encoding="utf-8")
 
 
-def _topics(streams: Streams, epoch: float) -> list[Topic]:
-    slider, tip, (x, y, torque) = streams.slider.values, streams.tip.values, streams.wrench.values.T
-    flat, upright = np.zeros((len(slider), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(tip), 1))
-    half = slider[:, 2] / 2
-    poses = np.column_stack([slider[:, :2], flat, np.sin(half), np.cos(half)])
-    return [
-        _stamped("slider/pose", POSE, streams.slider, poses, epoch),
-        _stamped("pusher/pose", POSE, streams.tip, np.column_stack([tip, upright]), epoch),
-        _stamped(
-            "pusher/wrench", WRENCH, streams.wrench, np.column_stack([x, y, *np.zeros((3, len(x))), torque]), epoch
-        ),
-        *(_scalar(name, readings, epoch) for name, readings in streams.topics.items()),
-    ]
-
-
-def _stamped(name: str, kind: str, readings: Readings, columns: Array, epoch: float) -> Topic:
-    """Messages of a header in frame `world` and numbers (M, D)."""
-    stamps = _nanoseconds(readings.stamps, epoch)
+def _stamped(name: str, kind: str, stamps: IntArray, columns: Array, latency: int) -> Topic:
     rows = _rows(_HEADER, columns)
     rows["sec"], rows["nanosec"] = np.divmod(stamps, 1_000_000_000)
     rows["frame_length"], rows["frame"] = 6, b"world"
-    return Topic(f"/{name}", kind, stamps + LATENCY[name], rows)
-
-
-def _scalar(name: str, readings: Readings, epoch: float) -> Topic:
-    return Topic(f"/{name}", SCALAR, _nanoseconds(readings.stamps, epoch), _rows([_CDR], readings.values))
+    return Topic(name, kind, stamps + latency, rows)
 
 
 def _rows(layout: list[tuple[str, str]], columns: Array) -> NDArray[np.void]:
@@ -79,11 +101,7 @@ def _rows(layout: list[tuple[str, str]], columns: Array) -> NDArray[np.void]:
     return rows
 
 
-def _nanoseconds(stamps: Array, epoch: float) -> IntArray:
-    return np.int64(epoch) * 1_000_000_000 + np.rint(stamps * 1e9).astype(np.int64)
-
-
-def _write_mcap(path: Path, topics: list[Topic], rig_record: dict[str, str]) -> None:
+def _write_mcap(path: Path, topics: Sequence[Topic], rig_record: Mapping[str, str], library: str) -> None:
     """Write all messages in order of arrival."""
     arrival = np.concatenate([topic.arrival for topic in topics])
     source = np.repeat(np.arange(len(topics)), [len(topic.rows) for topic in topics])
@@ -91,9 +109,9 @@ def _write_mcap(path: Path, topics: list[Topic], rig_record: dict[str, str]) -> 
     order = np.argsort(arrival, kind="stable")
     with path.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.LZ4)
-        writer.start(profile="ros2", library="points_rig")
-        writer.add_metadata("push_rig", rig_record)
-        schemas = {kind: writer.register_schema(kind, "ros2msg", text.encode()) for kind, text in DEFINITIONS.items()}
+        writer.start(profile="ros2", library=library)
+        writer.add_metadata("push_rig", dict(rig_record))
+        schemas = {kind: writer.register_schema(kind, "ros2msg", text.encode()) for kind, text in _DEFINITIONS.items()}
         channels = [
             writer.register_channel(topic.name, "cdr", schemas[topic.type], {"offered_qos_profiles": "[]"})
             for topic in topics
@@ -103,7 +121,7 @@ def _write_mcap(path: Path, topics: list[Topic], rig_record: dict[str, str]) -> 
         writer.finish()
 
 
-def _metadata(topics: list[Topic], name: str, rig_record: dict[str, str]) -> str:
+def _metadata(topics: Sequence[Topic], name: str, rig_record: Mapping[str, str]) -> str:
     """The text of metadata.yaml, in YAML's flow style."""
     begin, end = min(int(topic.arrival[0]) for topic in topics), max(int(topic.arrival[-1]) for topic in topics)
     span = {
@@ -118,5 +136,5 @@ def _metadata(topics: list[Topic], name: str, rig_record: dict[str, str]) -> str
     ]
     information = {"version": 9, "storage_identifier": "mcap", **span, "topics_with_message_count": listed}
     information |= {"compression_format": "", "compression_mode": "", "relative_file_paths": [name]}
-    information |= {"files": [{"path": name, **span}], "custom_data": rig_record, "ros_distro": "jazzy"}
+    information |= {"files": [{"path": name, **span}], "custom_data": dict(rig_record), "ros_distro": "jazzy"}
     return json.dumps({"rosbag2_bagfile_information": information}, indent=2) + "\n"
