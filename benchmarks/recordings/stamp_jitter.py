@@ -29,7 +29,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.windows import stamp_noise
+from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 
@@ -53,11 +53,11 @@ def with_jitter(recording: Recording, kind: str, scale: float, rng: np.random.Ge
 @contextmanager
 def raw_stamps() -> Iterator[None]:
     """No stamp is replaced."""
-    share, stamp_noise.SHARE = stamp_noise.SHARE, np.inf
+    share, regular_stamps.SHARE = regular_stamps.SHARE, np.inf
     try:
         yield
     finally:
-        stamp_noise.SHARE = share
+        regular_stamps.SHARE = share
 
 
 def scores(model: PushModel, recording: Recording, calibration: Calibration | None) -> list[float]:

@@ -18,7 +18,6 @@ from push_predictor.commands.common.options import (
 )
 from push_predictor.commands.common.output import check_data, check_output, write_json
 from push_predictor.commands.common.progress import progress
-from push_predictor.commands.common.rig_out import check_rig_out, write_corrected_rig
 from push_predictor.errors import RecordingError
 
 
@@ -35,12 +34,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage")
     add_strict(parser)
-    parser.add_argument(
-        "--rig-out",
-        type=Path,
-        metavar="FILE.yaml",
-        help="write the rig; outline and tip are corrected; for one recording",
-    )
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
@@ -56,7 +49,6 @@ def run(options: argparse.Namespace) -> None:
 
     check_data(options.data)
     check_output("--page", options.page, force=options.force)
-    check_rig_out(options)
     if options.page is not None:
         html.check_installed("--page")
     rig = load_rig(options.rig) if options.rig else None
@@ -79,6 +71,5 @@ def run(options: argparse.Namespace) -> None:
                 print("\n".join(finding.lines))
         if options.page is not None:
             print(f"page: {options.page}")
-    write_corrected_rig(options, {path: of.findings for path, of in checked.items()})
     if wrong:
         raise RecordingError(", ".join(wrong))

@@ -35,7 +35,7 @@ def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
 
 
 CALLS = list(parsers(build_parser()))
-TAKES_A_MODEL = ("predict", "suggest", "evaluate", "validate", "trace", "report validation", "doctor")
+TAKES_A_MODEL = ("predict", "suggest", "evaluate", "validate", "trace", "report validation")
 
 
 def meaning(action: argparse.Action) -> tuple[object, ...]:

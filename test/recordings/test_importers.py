@@ -19,8 +19,7 @@ from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.importers.mlab.push_logs import first_touch
-from push_predictor.recordings.importers.mlab.rig import load_shares, triangle
+from push_predictor.recordings.importers.mlab import first_touch, load_shares, triangle
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table_file import read_table
@@ -195,7 +194,7 @@ def test_square_table_reverses_dy_and_uses_edge_0(tmp_path: Path) -> None:
 
 def test_invalid_square_table_is_rejected_with_line_or_index(tmp_path: Path) -> None:
     bad = {**SQUARE, "dx": [0.004, "x", 0.002]}
-    with pytest.raises(ImportSourceError, match=r"csv\.gz:3: dx_m is 'x'"):
+    with pytest.raises(ImportSourceError, match=r"csv\.gz line 3: column dx_m is 'x'"):
         import_source("mit-square", [_square_csv(tmp_path / "t.csv.gz", bad)], tmp_path / "out")
     with pytest.raises(ImportSourceError, match=r"c\[1\] is 1\.5"):
         import_source(

@@ -23,11 +23,10 @@ from push_predictor.recordings.streams import PoseStream, Recording, ScalarStrea
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTracks
+from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray
 
 SENSORS = ("slider", "pusher", "wrench")
-STREAM_FAULTS = ("repeated", "late", "ahead", "not_finite", "jumps", "dropouts", "refused", "resets", "clock_set_back")
-WINDOW_FAULTS = ("not_a_push", "inside", "left_behind", "outran")
 
 
 def find_windows(recording: Recording, rig: Rig, options: WindowOptions | None = None) -> list[PushWindow]:
@@ -56,9 +55,7 @@ class WindowFinder:
         """Number of faults by kind so far."""
         found = self._counts + self._session.counts
         found["refused"] += self._scalars.discarded
-        return {kind: found[kind] for kind in (*STREAM_FAULTS, *WINDOW_FAULTS)} | {
-            k: n for k, n in sorted(found.items()) if " " in k
-        }
+        return {kind: found[kind] for kind in FAULTS} | {k: n for k, n in sorted(found.items()) if " " in k}
 
     @property
     def stamp_jitter(self) -> dict[str, float]:
