@@ -114,7 +114,7 @@ setup(
         "threadpoolctl>=3",
     ],
     extras_require={
-        "report": ["matplotlib>=3.6", "jinja2>=3.1", "rich>=13"],
+        "report": ["matplotlib>=3.6", "jinja2>=3.1"],
         "live": ["rich>=13"],
         "completion": ["argcomplete>=3"],
         "parquet": ["pyarrow>=14"],

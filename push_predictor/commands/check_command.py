@@ -10,9 +10,9 @@ from pathlib import Path
 
 from push_predictor.commands.common.options import (
     add_command,
-    add_rig,
-    add_strict,
-    add_topics,
+    add_data,
+    add_reading,
+    given_rig,
     save_topics_of,
     topics_of,
 )
@@ -31,11 +31,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "standard deviation.",
         "push_predictor check bags/square_abs_train",
     )
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    add_data(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage")
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -44,14 +42,13 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.check_page.answer import pushed
     from push_predictor.evaluation.check_page.page import check_json, write_check_page
     from push_predictor.recordings.checks.checked import checked_data
-    from push_predictor.recordings.rig import load_rig
     from push_predictor.reporting import html
 
     check_data(options.data)
     check_output("--page", options.page, force=options.force)
     if options.page is not None:
         html.check_installed("--page")
-    rig = load_rig(options.rig) if options.rig else None
+    rig = given_rig(options)
     with progress("check"):
         checked = {str(path): checked_data(path, rig, topics_of(options)) for path in options.data}
         save_topics_of(options, [path for path in options.data if not checked[str(path)].refused])

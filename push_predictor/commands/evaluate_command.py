@@ -6,14 +6,13 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from push_predictor.commands.common.options import (
     add_command,
+    add_data,
     add_model,
-    add_rig,
-    add_strict,
-    add_topics,
+    add_reading,
+    given_rig,
     save_topics_of,
     topics_of,
 )
@@ -30,10 +29,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
     )
     add_model(parser)
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_data(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -47,10 +44,9 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.models.train_mechanics import on_supports
     from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, known_rig, load_data
-    from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
-    given = load_rig(options.rig) if options.rig else None
+    given = given_rig(options)
     checks = DataChecks(options.strict, warn)
     check_data(options.data)
     with progress("evaluate"):

@@ -15,10 +15,9 @@ from push_predictor.commands.common.options import (
     add_command,
     add_model,
     add_out,
+    add_reading,
     add_recording,
-    add_rig,
-    add_strict,
-    add_topics,
+    given_rig,
     save_topics_of,
     topics_of,
 )
@@ -67,9 +66,7 @@ def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "*", note="; the report compares the others with the first")
     add_recording(parser, "give one that was not used for training")
     _add_common(parser)
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=_validation)
 
 
@@ -151,14 +148,13 @@ def _validation(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.offline import report_recording
     from push_predictor.models.store.model_file import load_model
     from push_predictor.recordings.checks.data_checks import DataChecks
-    from push_predictor.recordings.rig import load_rig
 
     if bool(options.model) != (options.recording is not None):
         missing = "--recording" if options.model else "MODEL"
         raise RequestError(missing, "missing", "both MODEL and --recording, or neither")
     simulated = () if options.model else ("train", "test")
     _make_folder(options, ("report.html", "report.json", "validation.json", *simulated))
-    rig = load_rig(options.rig) if options.rig else None
+    rig = given_rig(options)
     with progress("report") as watch:
         if not options.model:
             models, recording = _simulated(options.out, 60 if options.quick else 300, part_of(watch, 0.0, 0.5))

@@ -15,10 +15,8 @@ from typing import TYPE_CHECKING
 from push_predictor.commands.common.options import (
     add_command,
     add_out,
-    add_rig,
+    add_reading,
     add_seed,
-    add_strict,
-    add_topics,
     save_topics_of,
     topics_of,
 )
@@ -89,9 +87,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("--name", help="name: of the model in the services (default: the name of the file)")
     add_out(parser, "the model, FILE.pushmodel")
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
 
 

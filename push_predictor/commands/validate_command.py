@@ -8,15 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_rig,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import add_command, add_model, add_reading, save_topics_of, topics_of
 from push_predictor.commands.common.output import check_output, warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
@@ -46,9 +38,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
     )
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
