@@ -8,14 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_data,
-    add_reading,
-    given_rig,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_data, add_reading
 from push_predictor.commands.common.output import check_data, check_output, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RecordingError
@@ -48,10 +41,10 @@ def run(options: argparse.Namespace) -> None:
     check_output("--page", options.page, force=options.force)
     if options.page is not None:
         html.check_installed("--page")
-    rig = given_rig(options)
+    reading = Reading(options)
     with progress("check"):
-        checked = {str(path): checked_data(path, rig, topics_of(options)) for path in options.data}
-        save_topics_of(options, [path for path in options.data if not checked[str(path)].refused])
+        checked = {str(path): checked_data(path, reading.rig, reading.topics) for path in options.data}
+        reading.save_topics([path for path in options.data if not checked[str(path)].refused])
         if options.page is not None:
             write_check_page(options.page, checked)
     mistakes = [(path, each) for path, of in checked.items() for each in of.findings if each.severity != "note"]

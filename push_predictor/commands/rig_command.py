@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> None:
     save_rig(rig, options.out)
     if options.picture is not None:
         write_text(options.picture, rig_svg(rig))
-    content = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
+    content: dict[str, object] = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
     if options.recording is not None:
         content["findings"] = [finding.record() for finding in findings]
     if not write_json(options, content):
@@ -180,8 +180,8 @@ def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, 
     from push_predictor.geometry.shapes import ellipse, rectangle
     from push_predictor.recordings.new_rig import length_of, new_rig, read_polygon
 
-    moved, notes, name = np.zeros(2), (), shape
-    given = getattr(options, shape)
+    moved, name, given = np.zeros(2), shape, getattr(options, shape)
+    notes: tuple[str, ...] = ()
     if shape == "polygon":
         polygon = read_polygon(given, options.keep_origin)
         outline, moved, notes, name = polygon.outline, polygon.moved, polygon.notes, given.stem

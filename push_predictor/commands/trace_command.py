@@ -10,16 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_data,
-    add_model,
-    add_reading,
-    add_seed,
-    given_rig,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_data, add_model, add_reading, add_seed
 from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
@@ -59,25 +50,24 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Trace, write JSON and model, print the verdict, then draw the report: what can fail late comes last."""
-    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.residuals.trace import trace_data
 
     _check(options)
     names = None if options.covariates is None else _names(options.covariates)
-    rig = given_rig(options)
+    reading = Reading(options)
     with progress("trace") as watch:
         found = trace_data(
             options.data,
             options.model,
             alpha=options.alpha,
             covariates=names,
-            rig=rig,
+            rig=reading.rig,
             seed=options.seed,
-            topics=topics_of(options),
+            topics=reading.topics,
             watch=watch,
-            checks=DataChecks(options.strict, warn),
+            checks=reading.checks,
         )
-    save_topics_of(options, options.data)
+    reading.save_topics(options.data)
     saved = False
     try:
         saved = _write_results(options, found)

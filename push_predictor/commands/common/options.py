@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.commands.common.output import warn
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -170,6 +171,24 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     )
     add_rig(parser)
     add_topics(parser)
+
+
+class Reading:
+    """How a command reads data, by the options of `add_reading`: rig (None without --rig), topics, and the checks.
+
+    Raises RigError, and RequestError for an empty topic.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        from push_predictor.recordings.checks.data_checks import DataChecks
+
+        self.rig, self.topics = given_rig(options), topics_of(options)
+        self.checks = DataChecks(options.strict, warn)
+        self._options = options
+
+    def save_topics(self, paths: Sequence[Path]) -> None:
+        """Save the topics next to the recordings, if asked; see `save_topics_of`."""
+        save_topics_of(self._options, paths)
 
 
 def add_covariate(parser: argparse.ArgumentParser) -> None:

@@ -123,7 +123,7 @@ def refit(first: OutlineFit, contacts: Contacts, rig: Rig, further: int, without
 
     With the tip's radius, contacts at corners are dropped: real corners are rounded, and would decide.
     """
-    parameters = {*_fitted(first), further} - {without}
+    parameters = [each for each in (*_fitted(first), further) if each != without]
     if further == TIP and (sides := ~_at_corner(contacts, rig.outline, first)).any():
         contacts = contacts.at(sides)
     return _fit(contacts, rig, parameters, lambda problem: [first.estimate])
@@ -174,7 +174,7 @@ def _away_from_corners(outline: Outline, contact: Array) -> Array:
 
 
 def _fit(
-    contacts: Contacts, rig: Rig, parameters: Collection[int | None], starts: Callable[[Problem], Sequence[Array]]
+    contacts: Contacts, rig: Rig, parameters: Collection[int], starts: Callable[[Problem], Sequence[Array]]
 ) -> OutlineFit:
     problem = Problem(contacts.drawn(MOST_SAMPLES), rig, parameters)
     estimate = problem.best(starts(problem))
@@ -203,7 +203,7 @@ class Problem:
     shifts nothing, so that both are known as well as they can be.
     """
 
-    def __init__(self, contacts: Contacts, rig: Rig, parameters: Collection[int | None]) -> None:
+    def __init__(self, contacts: Contacts, rig: Rig, parameters: Collection[int]) -> None:
         self._contacts, self._middle, self._radius = contacts, rig.outline.centroid, rig.pusher_radius
         self.outline = transformed(rig.outline, shift=(-self._middle[0], -self._middle[1]))
         self.push = contacts.push
