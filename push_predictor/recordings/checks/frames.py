@@ -19,6 +19,7 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.motion import body_velocity, motion_of
 from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
 from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.units import reach
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
@@ -92,7 +93,7 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
 
 def _findings_of_large_gap(recording: Recording, rig: Rig, contacts: Contacts, fit: OutlineFit) -> list[Finding]:
     """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
-    far = FAR * _reach(rig)
+    far = FAR * reach(rig)
     explained = min(BETTER * fit.gap, far)
     if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
@@ -147,10 +148,6 @@ def _mirror_gaps(contacts: Contacts, rig: Rig) -> dict[str, float]:
     return gaps
 
 
-def _reach(rig: Rig) -> float:
-    return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
-
-
 def _gap_as_recorded(contacts: Contacts, rig: Rig) -> float:
     return float(np.median(np.abs(rig.outline.project(contacts.tips).distance - rig.pusher_radius)))
 
@@ -173,7 +170,7 @@ def tip_follows(recording: Recording, rig: Rig) -> bool:
 
 def _is_implausible(fit: OutlineFit, rig: Rig) -> bool:
     """Whether the correction is another slider rather than a mistake in this one's outline."""
-    return bool(np.hypot(*fit.estimate[[X, Y]]) > _reach(rig) or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
+    return bool(np.hypot(*fit.estimate[[X, Y]]) > reach(rig) or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
 
 
 def _reflected(contacts: Contacts, mirror: Mirror) -> Contacts:
