@@ -200,6 +200,9 @@ def test_invalid_square_table_is_rejected_with_line_or_index(tmp_path: Path) -> 
         import_source(
             "mit-square", [_square_csv(tmp_path / "t.csv.gz", {**SQUARE, "c": [0, 1.5, 1]})], tmp_path / "out"
         )
+    np.savez(tmp_path / "nan.npz", **{**SQUARE, "dx": [0.004, np.nan, 0.002]})
+    with pytest.raises(ImportSourceError, match=r"dx\[1\] is nan"):
+        import_source("mit-square", [tmp_path / "nan.npz"], tmp_path / "out")
     np.savez(tmp_path / "less.npz", c=np.zeros(3))
     with pytest.raises(ImportSourceError, match="lacks beta"):
         import_source("mit-square", [tmp_path / "less.npz"], tmp_path / "out")
