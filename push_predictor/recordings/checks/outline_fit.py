@@ -124,8 +124,11 @@ def refit(first: OutlineFit, contacts: Contacts, rig: Rig, further: int, without
     With the tip's radius, contacts at corners are dropped: real corners are rounded, and would decide.
     """
     parameters = [each for each in (*_fitted(first), further) if each != without]
-    if further == TIP and (sides := ~_at_corner(contacts, rig.outline, first)).any():
-        contacts = contacts.at(sides)
+    if further == TIP:
+        problem = Problem(contacts, rig, ())
+        _, size, nearest = problem.placed(first.estimate)
+        sides = size * _away_from_corners(problem.outline, nearest.contact) >= CORNER
+        contacts = contacts.at(sides) if sides.any() else contacts
     return _fit(contacts, rig, parameters, lambda problem: [first.estimate])
 
 
@@ -156,14 +159,6 @@ def _turned_starts(problem: Problem) -> list[Array]:
 
 def _fitted(fit: OutlineFit) -> list[int]:
     return [int(each) for each in np.flatnonzero(fit.sd)]
-
-
-def _at_corner(contacts: Contacts, outline: Outline, fit: OutlineFit) -> BoolArray:
-    """Which contacts (n,) are near a corner of the corrected outline."""
-    yaw, x, y, growth, lag = fit.estimate[list(SIMILARITY)].tolist()
-    corrected = transformed(outline, yaw, (x, y), 1.0 + growth)
-    contact = corrected.project(contacts.tips - lag * contacts.velocities).contact
-    return np.asarray(_away_from_corners(corrected, contact) < CORNER)
 
 
 def _away_from_corners(outline: Outline, contact: Array) -> Array:
