@@ -91,6 +91,17 @@ def test_damaged_file_in_a_folder_or_zip_is_reported(tmp_path: Path) -> None:
     assert len(report.dropped) == 1 and f"{_mit_name(push=1)}.json:2" in report.dropped[0]
 
 
+def test_damaged_file_that_was_named_or_an_empty_archive_is_rejected(tmp_path: Path) -> None:
+    (tmp_path / f"{_mit_name(push=1)}.json").write_text("{")
+    sources = [_write_mit(tmp_path, _mit_streams(), push=0), tmp_path / f"{_mit_name(push=1)}.json"]
+    with pytest.raises(ImportSourceError, match="1: not JSON"):
+        import_source("mit", sources, tmp_path / "out")
+    with zipfile.ZipFile(tmp_path / "empty.zip", "w") as archive:
+        archive.writestr("README", "")
+    with pytest.raises(ImportSourceError, match=r"empty\.zip: the archive contains no \.json"):
+        import_source("mit", [tmp_path / "empty.zip"], tmp_path / "out")
+
+
 def test_irregularities_of_the_mit_set_are_repaired_and_reported(tmp_path: Path) -> None:
     streams = _mit_streams()
     streams["tip_pose"].insert(10, list(streams["tip_pose"][9]))

@@ -164,8 +164,6 @@ def _forces(wrench: Track, times: Array, tare: Array | None, normal: Array) -> d
 
     tare: what the sensor reads without contact (2,); it is subtracted, and kept to judge the sensor's bias.
     """
-    if not len(wrench):
-        return {}
     zero = {} if tare is None else {"free_force_x": float(tare[0]), "free_force_y": float(tare[1])}
     begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
     if begin >= end:
