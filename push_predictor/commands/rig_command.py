@@ -9,7 +9,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import add_command, add_out, add_rig, add_topics, save_topics_of, topics_of
+from push_predictor.commands.common.options import (
+    add_command,
+    add_out,
+    add_rig,
+    add_topics,
+    given_rig,
+    save_topics_of,
+    topics_of,
+)
 from push_predictor.commands.common.output import check_data, check_output, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError, RigError
@@ -37,7 +45,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     _add_shapes(parser)
     _add_measured(parser)
-    _add_recording(parser)
+    add_rig(parser)
+    add_topics(parser)
     add_out(parser, "the rig file, FILE.yaml")
     parser.add_argument("--picture", type=Path, metavar="FILE.svg", help="draw outline, axes and tip to scale")
     parser.set_defaults(run=run)
@@ -45,10 +54,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def _add_shapes(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
-        "shape of the slider, seen from above",
+        "shape of the slider, seen from above, or a recording that corrects a rig",
         "The origin is the centroid. x and y are the axes of the tracked frame.",
     )
-    one = group.add_mutually_exclusive_group()
+    one = group.add_mutually_exclusive_group(required=True)
     one.add_argument("--square", type=float, metavar="SIDE")
     one.add_argument("--rectangle", type=float, nargs=2, metavar=("X", "Y"), help="sizes along x and along y")
     one.add_argument("--circle", type=float, metavar="DIAMETER", help="the diameter, not the radius")
@@ -59,6 +68,13 @@ def _add_shapes(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
         "of [x, y]",
+    )
+    one.add_argument(
+        "--from",
+        dest="recording",
+        type=Path,
+        metavar="RECORDING",
+        help="correct outline or tip radius by at least 8 pushes; the rig to correct is that of --rig, or recorded",
     )
     group.add_argument(
         "--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"
@@ -83,22 +99,6 @@ def _add_measured(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group(
-        "correct by a recording",
-        "Give the rig to correct by a shape or by --rig; otherwise it is the recorded one.",
-    )
-    group.add_argument(
-        "--from",
-        dest="recording",
-        type=Path,
-        metavar="RECORDING",
-        help="correct yaw, place and size of the outline, or the tip radius, by at least 8 pushes",
-    )
-    add_rig(parser)
-    add_topics(parser)
-
-
 def run(options: argparse.Namespace) -> None:
     """Write the rig file. Raises RequestError or RigError that names the option or file."""
     from push_predictor.recordings.new_rig import rig_lines
@@ -111,16 +111,12 @@ def run(options: argparse.Namespace) -> None:
         raise RequestError("--picture", str(options.picture), f"a file that ends with {PICTURES}")
     shape = next((name for name in SHAPES if getattr(options, name) is not None), None)
     _check_call(options, shape)
-    rig, notes = (None, ()) if shape is None else _measured(options, shape)
-    findings: tuple[Finding, ...] = ()
-    if options.recording is not None:
-        rig, findings = _corrected(options, rig)
-    assert rig is not None, "a call without shape and recording is refused"
+    rig, notes, findings = _corrected(options) if shape is None else _measured(options, shape)
     save_rig(rig, options.out)
     if options.picture is not None:
         write_text(options.picture, rig_svg(rig))
     content: dict[str, object] = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
-    if options.recording is not None:
+    if shape is None:
         content["findings"] = [finding.record() for finding in findings]
     if not write_json(options, content):
         print("\n".join([f"{options.out}: {rig.shape} on {rig.surface}", *rig_lines(rig)]))
@@ -134,47 +130,39 @@ def run(options: argparse.Namespace) -> None:
 
 def _check_call(options: argparse.Namespace, shape: str | None) -> None:
     """Raise RequestError for options that are missing, or that nothing would use."""
-    if options.recording is None:
-        if shape is None:
-            raise RequestError(
-                "shape", None, f"one of {', '.join(f'--{name}' for name in SHAPES)}, or --from RECORDING"
-            )
-        if options.rig is not None:
-            raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
     if shape is not None and options.rig is not None:
-        raise RequestError("--rig", str(options.rig), f"either it or --{shape}")
+        raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
     if options.keep_origin and shape != "polygon":
         raise RequestError("--keep-origin", True, "it only with --polygon")
-    for name, meaning in MEASURED.items():
-        if shape is not None and getattr(options, name) is None:
-            raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
     for name in (*MEASURED, "mass", "name", "contact_friction", "surface_friction", "support_point"):
-        if shape is None and getattr(options, name) is not None:
-            raise RequestError(f"--{name.replace('_', '-')}", getattr(options, name), "it only with a shape")
+        given, option = getattr(options, name), f"--{name.replace('_', '-')}"
+        if shape is None and given is not None:
+            raise RequestError(option, given, "it only with a shape")
+        if shape is not None and given is None and name in MEASURED:
+            raise RequestError(option, None, MEASURED[name])
 
 
-def _corrected(options: argparse.Namespace, rig: Rig | None) -> tuple[Rig, tuple[Finding, ...]]:
-    """The rig corrected by the findings of `check` about the recording, and these findings."""
+def _corrected(options: argparse.Namespace) -> tuple[Rig, tuple[str, ...], tuple[Finding, ...]]:
+    """The rig corrected by the findings of `check` about the recording, no notes, and these findings."""
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.checks.corrected_rig import corrected_rig
     from push_predictor.recordings.read import read_recording, require_rig
-    from push_predictor.recordings.rig import load_rig
 
     check_data([options.recording])
-    given = load_rig(options.rig) if options.rig is not None else rig
     with progress("rig"):
-        recording = read_recording(options.recording, rig=given, topics=topics_of(options))
-        findings = check_recording(recording, require_rig(recording))
+        recording = read_recording(options.recording, rig=given_rig(options), topics=topics_of(options))
+        rig = require_rig(recording)
+        findings = check_recording(recording, rig)
         try:
-            corrected = corrected_rig(require_rig(recording), findings)
+            rig = corrected_rig(rig, findings)
         except RigError as error:
             raise RigError(f"{options.recording}: {error}") from None
         save_topics_of(options, [options.recording])
-    return corrected, findings
+    return rig, (), findings
 
 
-def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, ...]]:
-    """The rig of the given sizes, and notes on what was changed."""
+def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, ...], tuple[Finding, ...]]:
+    """The rig of the given sizes, notes on what was changed, and no findings."""
     import numpy as np
 
     from push_predictor.geometry.shapes import ellipse, rectangle
@@ -191,4 +179,4 @@ def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, 
     points = None if options.support_point is None else np.array(options.support_point) + [*moved, 0.0]
     measured = (options.tip_radius, options.surface, options.mass)
     frictions = (options.contact_friction, options.surface_friction)
-    return new_rig(options.name or name, outline, *measured, points, *frictions), notes
+    return new_rig(options.name or name, outline, *measured, points, *frictions), notes, ()

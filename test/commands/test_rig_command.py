@@ -175,13 +175,22 @@ def test_a_polygon_that_is_round_is_noted(tmp_path: Path, capsys: pytest.Capture
             ["--polygon", "base.svg"],
             "base.svg: is not accepted, give a CSV with the columns x,y, or a YAML or JSON list",
         ),
-        ([], "--square, --rectangle, --circle, --ellipse, --polygon"),
     ],
 )
 def test_a_bad_value_is_refused_by_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert message in refused(capsys, tmp_path, *MEASURED, *arguments)
+
+
+@pytest.mark.parametrize("arguments", [[], ["--square", "0.09", "--from", ROUND_BAG]])
+def test_one_shape_or_a_recording_is_required(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["rig", *arguments, *MEASURED, "--out", str(tmp_path / "rig.yaml")])
+    error = capsys.readouterr().err
+    assert ended.value.code == 2 and "--square" in error and "--from" in error
 
 
 @pytest.mark.parametrize("option", ["--tip-radius", "--surface"])
@@ -235,14 +244,6 @@ def test_a_picture_of_another_format_is_refused(tmp_path: Path, capsys: pytest.C
 # --- estimated from a recording --------------------------------------------------------------------------------------
 
 
-def test_a_recording_corrects_the_given_sizes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rig = made(tmp_path, "--circle", "0.107", "--from", ROUND_BAG)
-    assert rig.outline.semi_axes == pytest.approx((0.0525, 0.0525), abs=1e-4)
-    assert (rig.shape, rig.surface, rig.object_mass) == ("circle", "plywood", 0.8)
-    assert "outline_size" in capsys.readouterr().out
-    assert main(["check", ROUND_BAG, "--rig", str(tmp_path / "rig.yaml"), "--strict"]) == 0
-
-
 def test_a_recording_corrects_a_rig_file_or_its_own_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made(tmp_path, "--circle", "0.107")
     wrong = (tmp_path / "rig.yaml").rename(tmp_path / "wrong.yaml")
@@ -253,7 +254,10 @@ def test_a_recording_corrects_a_rig_file_or_its_own_rig(tmp_path: Path, capsys: 
     (finding,) = content["findings"]
     assert finding["name"] == "outline_size"
     assert finding["values"]["scale"]["value"] == pytest.approx(105 / 107, abs=0.002)
-    assert load_rig(out).surface == "plywood"
+    corrected = load_rig(out)
+    assert corrected.outline.semi_axes == pytest.approx((0.0525, 0.0525), abs=1e-4)
+    assert (corrected.shape, corrected.surface, corrected.object_mass) == ("circle", "plywood", 0.8)
+    assert main(["check", ROUND_BAG, "--rig", str(out), "--strict"]) == 0
     assert main(["rig", "--from", ROUND_BAG, "--out", str(out), "--force"]) == 0
     assert (load_rig(out).shape, load_rig(out).outline.semi_axes) == ("ellip1", (0.0525, 0.0525))
 
@@ -266,7 +270,6 @@ def test_exchanged_topics_give_no_rig(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("arguments", "option"),
     [
-        (["--rig", "rig.yaml", "--square", "0.09", *MEASURED, "--from", ROUND_BAG], "--rig"),
         (["--rig", "rig.yaml", "--square", "0.09", *MEASURED], "--rig"),
         (["--mass", "0.8", "--from", ROUND_BAG], "--mass"),
         (["--from", "nowhere"], "nowhere: no such file or folder"),
