@@ -114,17 +114,15 @@ setup(
         "threadpoolctl>=3",
     ],
     extras_require={
-        "report": ["matplotlib>=3.6", "jinja2>=3.1", "rich>=13"],
+        "report": ["matplotlib>=3.6", "jinja2>=3.1"],
         "live": ["rich>=13"],
         "completion": ["argcomplete>=3"],
         "parquet": ["pyarrow>=14"],
-        "dxf": ["ezdxf>=1.1"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
             "catkin_pkg>=1",
             "Cython>=3.0",
-            "ezdxf>=1.1",
             "pytest>=8",
             "pytest-xdist>=3.5",
             "hypothesis>=6",

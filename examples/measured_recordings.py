@@ -21,11 +21,16 @@ from push_predictor.geometry.frames import rotate
 from push_predictor.models.mechanics.surface import uniform_ellipsoid
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.importers.cleaning import nanoseconds
-from push_predictor.recordings.importers.mlab.force import force_samples
-from push_predictor.recordings.importers.mlab.log_parser import LogPush, read_log
-from push_predictor.recordings.importers.mlab.push_logs import MILLIMETRE, NotAPushError, push_row
-from push_predictor.recordings.importers.mlab.rig import folder_rig
-from push_predictor.recordings.importers.report import Notes
+from push_predictor.recordings.importers.mlab import (
+    MILLIMETRE,
+    LogPush,
+    NotAPushError,
+    folder_rig,
+    force_samples,
+    push_row,
+    read_log,
+)
+from push_predictor.recordings.importers.staging import Notes
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream

@@ -8,17 +8,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_rig,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_data, add_reading
 from push_predictor.commands.common.output import check_data, check_output, write_json
 from push_predictor.commands.common.progress import progress
-from push_predictor.commands.common.rig_out import check_rig_out, write_corrected_rig
 from push_predictor.errors import RecordingError
 
 
@@ -32,17 +24,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "standard deviation.",
         "push_predictor check bags/square_abs_train",
     )
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    add_data(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage")
-    add_strict(parser)
-    parser.add_argument(
-        "--rig-out",
-        type=Path,
-        metavar="FILE.yaml",
-        help="write the rig; outline and tip are corrected; for one recording",
-    )
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -51,18 +35,16 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.check_page.answer import pushed
     from push_predictor.evaluation.check_page.page import check_json, write_check_page
     from push_predictor.recordings.checks.checked import checked_data
-    from push_predictor.recordings.rig import load_rig
     from push_predictor.reporting import html
 
     check_data(options.data)
     check_output("--page", options.page, force=options.force)
-    check_rig_out(options)
     if options.page is not None:
         html.check_installed("--page")
-    rig = load_rig(options.rig) if options.rig else None
+    reading = Reading(options)
     with progress("check"):
-        checked = {str(path): checked_data(path, rig, topics_of(options)) for path in options.data}
-        save_topics_of(options, [path for path in options.data if not checked[str(path)].refused])
+        checked = {str(path): checked_data(path, reading.rig, reading.topics) for path in options.data}
+        reading.save_topics([path for path in options.data if not checked[str(path)].refused])
         if options.page is not None:
             write_check_page(options.page, checked)
     mistakes = [(path, each) for path, of in checked.items() for each in of.findings if each.severity != "note"]
@@ -79,6 +61,5 @@ def run(options: argparse.Namespace) -> None:
                 print("\n".join(finding.lines))
         if options.page is not None:
             print(f"page: {options.page}")
-    write_corrected_rig(options, {path: of.findings for path, of in checked.items()})
     if wrong:
         raise RecordingError(", ".join(wrong))

@@ -1,48 +1,52 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""push_predictor doctor: check the installation and report how to fix it."""
+"""push_predictor doctor: check that the installation imports, predicts and creates a node."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import signal
+import importlib
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 
 from push_predictor import __version__
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_recording,
-    add_rig,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import add_command
 from push_predictor.commands.common.output import write_json
 from push_predictor.commands.common.progress import progress
-from push_predictor.commands.doctor.checks import (
-    compiled_modules,
-    executables,
-    model_predicts,
-    python_and_packages,
-    recording_reads,
-    space,
-)
-from push_predictor.commands.doctor.findings import Finding
+from push_predictor.compiled import REMEDY
 from push_predictor.errors import PushPredictorError
 
-if TYPE_CHECKING:
-    from push_predictor.recordings.rig import Rig
-    from push_predictor.recordings.topics import Topics
+REQUIRED = ("numpy", "scipy", "mcap", "lz4", "zstandard", "yaml", "threadpoolctl")
+COMPILED = (
+    "geometry.boundary",
+    "models.mechanics.kernel.surface",
+    "models.mechanics.kernel.contact",
+    "models.mechanics.kernel.sweep",
+    "models.mechanics.kernel.push",
+    "models.tabulated.spline",
+)
+INSTALL = "pip install ."
+INSTALL_ROS = "pip install 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces, or . install/setup.sh"
+PATIENCE = 90.0  # s that a middleware may take to create a node
 
-PATIENCE = 90.0  # s for all checks of ROS
+
+@dataclass(frozen=True)
+class Finding:
+    """Result of one check; remedy: how to fix it, as a command where possible, empty if all is well."""
+
+    name: str
+    state: str  # ok or missing
+    found: str
+    remedy: str = ""
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines to print: the finding, and how to fix it."""
+        remedy = [f"{'':22s}-> {self.remedy}"] if self.remedy else []
+        return [f"{self.state:8s} {self.name:12s} {self.found}", *remedy]
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -50,76 +54,79 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "doctor",
-        "Check this installation. Tests Python, packages, ROS, interfaces, discovery and security. Calls "
-        "predict_server, predicts with a model and reads a recording. Reports what is missing, why it matters and "
-        "how to fix it.",
-        "push_predictor doctor --recording bags/square_abs_test",
+        "Check this installation. Imports packages and compiled modules, predicts one push, and creates a ROS node.",
+        "push_predictor doctor --json -",
     )
-    add_model(parser, "?", note=" to predict with (default: the shipped one)")
-    add_recording(parser, "default: a simulated one")
-    add_rig(parser)
-    add_topics(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Run all checks and print the findings. Raises PushPredictorError that names what is missing."""
-    from push_predictor.recordings.rig import load_rig
-
     with progress("doctor"):
-        rig = load_rig(options.rig) if options.rig else None
-        findings = list(_findings(options.model, options.recording, topics_of(options), rig))
-        save_topics_of(options, [options.recording] if options.recording else [])
+        findings = [
+            _checked("packages", _packages, INSTALL),
+            compiled_modules(),
+            _checked("prediction", _prediction, INSTALL),
+            ros_node(),
+        ]
     missing = [finding.name for finding in findings if finding.state == "missing"]
-    content = {"version": __version__, "sound": not missing, "checks": [finding.record() for finding in findings]}
+    python = ".".join(map(str, sys.version_info[:3]))
+    content = {"version": __version__, "python": python, "sound": not missing, "checks": list(map(asdict, findings))}
     if not write_json(options, content):
-        print(f"push_predictor {__version__}")
+        print(f"push_predictor {__version__}, Python {python}, {sys.executable}")
         for finding in findings:
             print("\n".join(finding.lines))
     if missing:
         raise PushPredictorError(f"missing or broken: {', '.join(missing)}")
 
 
-def _findings(model: Path | None, recording: Path | None, topics: Topics, rig: Rig | None) -> Iterator[Finding]:
-    yield from python_and_packages()
-    yield compiled_modules()
-    yield from _ros_findings()
-    yield executables()
-    yield model_predicts(model)
-    yield recording_reads(recording, topics, rig)
-    yield space()
+def compiled_modules() -> Finding:
+    """Check that every compiled module can be imported."""
+    return _checked("compiled", _compiled, REMEDY)
 
 
-def _ros_findings() -> Iterator[Finding]:
-    """Findings of push_predictor.nodes.doctor_graph, in its own process because a middleware may hang or crash."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "push_predictor.nodes.doctor_graph"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,  # it starts a node, which must end with it
-    )
-    ended = ""
+def ros_node() -> Finding:
+    """Check that a node can be created, in a process of its own: a middleware may hang or crash."""
+    command = [sys.executable, "-m", "push_predictor.nodes.doctor_graph"]
     try:
-        out, err = process.communicate(timeout=PATIENCE)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired:
-        ended = f"no result within {PATIENCE:.0f} s"
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-    if ended:
-        out, err = process.communicate()
-    yield from _parsed(out, ended or (err.strip().splitlines() or ["no message"])[-1])
+        return Finding("ROS", "missing", f"no result within {PATIENCE:.0f} s", INSTALL_ROS)
+    if done.returncode == 0:
+        return Finding("ROS", "ok", done.stdout.strip())
+    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+    return Finding("ROS", "missing", f"ended with status {done.returncode}: {last}", INSTALL_ROS)
 
 
-def _parsed(out: str, ended: str) -> Iterator[Finding]:
-    """Findings in the output lines. A check that began and did not finish gives a finding that states how it ended."""
-    begun = "rclpy"
-    for line in out.splitlines():
-        record = json.loads(line)
-        begun = "" if "state" in record else record["name"]
-        if "state" in record:
-            yield Finding(**record)
-    if begun:
-        why, remedy = "the nodes will fail in the same way", "python -m push_predictor.nodes.doctor_graph"
-        yield Finding(begun, "missing", f"the check did not finish: {ended}", why, remedy)
+def _prediction() -> str:
+    """Predict one push with the shipped model. Raises PushPredictorError unless the covariance is valid."""
+    import numpy as np
+
+    from push_predictor.models.store.model_file import load_model
+    from push_predictor.resources import DEFAULT_MODEL, share_path
+
+    path = share_path(*DEFAULT_MODEL)
+    model = load_model(path)
+    push = model.examples(1)
+    prediction = model.predict_rows(push.inputs, push.duration, push.covariates)
+    if not (np.isfinite(prediction.mean).all() and np.linalg.eigvalsh(prediction.covariance[0])[0] > 0.0):
+        raise PushPredictorError(f"{path} predicts {prediction.mean[0]}, or an invalid covariance")
+    return f"{path} loads and predicts"
+
+
+def _compiled() -> str:
+    modules = [importlib.import_module(f"push_predictor.{name}") for name in COMPILED]
+    return f"{len(modules)} modules, the first is {modules[0].__file__}"
+
+
+def _packages() -> str:
+    modules = [importlib.import_module(name) for name in REQUIRED]
+    return ", ".join(f"{module.__name__} {getattr(module, '__version__', '')}".rstrip() for module in modules)
+
+
+def _checked(name: str, check: Callable[[], str], remedy: str) -> Finding:
+    try:
+        return Finding(name, "ok", check())
+    except Exception as error:  # an incomplete installation raises exceptions of any kind
+        words = str(error) if isinstance(error, (PushPredictorError, OSError)) else f"{type(error).__name__}: {error}"
+        return Finding(name, "missing", " ".join(words.split()), remedy)

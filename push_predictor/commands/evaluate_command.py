@@ -6,17 +6,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_rig,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_data, add_model, add_reading
 from push_predictor.commands.common.output import check_data, warn, write_json
 from push_predictor.commands.common.progress import progress
 
@@ -30,10 +21,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
     )
     add_model(parser)
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_data(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -45,18 +34,16 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.models.request import check_table
     from push_predictor.models.store.model_file import load_model
     from push_predictor.models.train_mechanics import on_supports
-    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, known_rig, load_data
-    from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
-    given = load_rig(options.rig) if options.rig else None
-    checks = DataChecks(options.strict, warn)
+    reading = Reading(options)
+    given, checks = reading.rig, reading.checks
     check_data(options.data)
     with progress("evaluate"):
         supports = {} if given else different_supports(options.data)
-        table = load_data(options.data, given, numbered=bool(supports), topics=topics_of(options), inspect=checks)
-        save_topics_of(options, options.data)
+        table = load_data(options.data, given, numbered=bool(supports), topics=reading.topics, inspect=checks)
+        reading.save_topics(options.data)
         known = given or known_rig(options.data[0])
         checks.judged_by(options.data, table, known)
         model = on_supports(model, known, supports)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import add_command, add_out, add_rig
+from push_predictor.commands.common.options import add_command, add_out, add_rig, given_rig
 from push_predictor.commands.common.output import check_folder, write_json
 from push_predictor.commands.common.progress import progress
 
@@ -33,10 +33,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Convert the sources and print a report."""
     from push_predictor.recordings.importers import import_source
-    from push_predictor.recordings.rig import load_rig
 
     check_folder("--out", options.out, force=options.force)
-    rig = load_rig(options.rig) if options.rig else None
+    rig = given_rig(options)
     with progress(f"import {options.kind}") as watch:
         report = import_source(
             options.kind, options.sources, options.out, rig=rig, overwrite=options.force, watch=watch

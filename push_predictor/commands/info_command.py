@@ -11,7 +11,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import add_command, add_rig, add_topics, save_topics_of, topics_of
+from push_predictor.commands.common.options import (
+    add_command,
+    add_rig,
+    add_topics,
+    given_rig,
+    save_topics_of,
+    topics_of,
+)
 from push_predictor.commands.common.output import check_output, write_json
 from push_predictor.errors import RequestError
 
@@ -49,7 +56,6 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.errors import RecordingError
     from push_predictor.recordings.bag.csv_streams import PARQUET
     from push_predictor.recordings.describe import describe_recording, describe_table
-    from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.table_file import is_recording
 
     path: Path = options.file
@@ -58,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
     if options.rig_out is not None:
         _write_rig(options)
     if is_recording(path):
-        found = describe_recording(path, topics_of(options), load_rig(options.rig) if options.rig else None)
+        found = describe_recording(path, topics_of(options), given_rig(options))
         save_topics_of(options, [path])
     elif path.name.endswith((".csv", ".csv.gz")):
         found = describe_table(path)

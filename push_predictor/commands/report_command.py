@@ -11,17 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_out,
-    add_recording,
-    add_rig,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading, add_recording
 from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
 from push_predictor.commands.common.progress import JobProgress, progress
 from push_predictor.errors import PushPredictorError, RequestError
@@ -67,9 +57,7 @@ def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "*", note="; the report compares the others with the first")
     add_recording(parser, "give one that was not used for training")
     _add_common(parser)
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=_validation)
 
 
@@ -150,26 +138,24 @@ def _validation(options: argparse.Namespace) -> None:
 
     from push_predictor.evaluation.offline import report_recording
     from push_predictor.models.store.model_file import load_model
-    from push_predictor.recordings.checks.data_checks import DataChecks
-    from push_predictor.recordings.rig import load_rig
 
     if bool(options.model) != (options.recording is not None):
         missing = "--recording" if options.model else "MODEL"
         raise RequestError(missing, "missing", "both MODEL and --recording, or neither")
     simulated = () if options.model else ("train", "test")
     _make_folder(options, ("report.html", "report.json", "validation.json", *simulated))
-    rig = load_rig(options.rig) if options.rig else None
+    reading = Reading(options)
     with progress("report") as watch:
         if not options.model:
             models, recording = _simulated(options.out, 60 if options.quick else 300, part_of(watch, 0.0, 0.5))
             watch = part_of(watch, 0.5, 1.0)
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
-        checks = DataChecks(options.strict, warn)
+        rig, topics, checks = reading.rig, reading.topics, reading.checks
         page, metrics = report_recording(
-            models, recording, options.out, rig, topics_of(options), watch=watch, report=warn, checks=checks
+            models, recording, options.out, rig, topics, watch=watch, report=warn, checks=checks
         )
-        save_topics_of(options, [recording])
+        reading.save_topics([recording])
     write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):
         print(page)

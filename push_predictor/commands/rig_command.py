@@ -9,23 +9,28 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import add_command, add_out, add_rig, add_topics, save_topics_of, topics_of
+from push_predictor.commands.common.options import (
+    add_command,
+    add_out,
+    add_rig,
+    add_topics,
+    given_rig,
+    save_topics_of,
+    topics_of,
+)
 from push_predictor.commands.common.output import check_data, check_output, write_json, write_text
 from push_predictor.commands.common.progress import progress
-from push_predictor.errors import RequestError
+from push_predictor.errors import RequestError, RigError
 
 if TYPE_CHECKING:
+    from push_predictor.recordings.checks.finding import Finding
     from push_predictor.recordings.rig import Rig
-    from push_predictor.recordings.rigs.estimate import RigEstimate
-    from push_predictor.recordings.rigs.polygon_file import Polygon
 
 MEASURED = {
     "tip_radius": "the radius of the pusher's round tip in metres",
     "surface": "a name of the surface, for example plywood",
 }
-SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon", "svg", "dxf")
-FILES = ("polygon", "svg", "dxf")
-UNITS = ("mm", "cm", "m", "in")
+SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
 PICTURES = ".svg"
 
 
@@ -40,7 +45,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     _add_shapes(parser)
     _add_measured(parser)
-    _add_recording(parser)
+    add_rig(parser)
+    add_topics(parser)
     add_out(parser, "the rig file, FILE.yaml")
     parser.add_argument("--picture", type=Path, metavar="FILE.svg", help="draw outline, axes and tip to scale")
     parser.set_defaults(run=run)
@@ -48,10 +54,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def _add_shapes(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
-        "shape of the slider, seen from above",
+        "shape of the slider, seen from above, or a recording that corrects a rig",
         "The origin is the centroid. x and y are the axes of the tracked frame.",
     )
-    one = group.add_mutually_exclusive_group()
+    one = group.add_mutually_exclusive_group(required=True)
     one.add_argument("--square", type=float, metavar="SIDE")
     one.add_argument("--rectangle", type=float, nargs=2, metavar=("X", "Y"), help="sizes along x and along y")
     one.add_argument("--circle", type=float, metavar="DIAMETER", help="the diameter, not the radius")
@@ -64,20 +70,11 @@ def _add_shapes(parser: argparse.ArgumentParser) -> None:
         "of [x, y]",
     )
     one.add_argument(
-        "--svg",
+        "--from",
+        dest="recording",
         type=Path,
-        metavar="FILE",
-        help="a drawing with one closed outline, seen from above: polygon, rect, circle, ellipse, or a path of "
-        "straight segments. Its scale: width in mm or cm with viewBox, or --unit",
-    )
-    one.add_argument(
-        "--dxf",
-        type=Path,
-        metavar="FILE",
-        help="a drawing with one closed outline, seen from above: polyline, lines, circle or ellipse. Needs ezdxf",
-    )
-    group.add_argument(
-        "--unit", choices=UNITS, help="length of one unit of the drawing; default: as the drawing states"
+        metavar="RECORDING",
+        help="correct outline or tip radius by at least 8 pushes; the rig to correct is that of --rig, or recorded",
     )
     group.add_argument(
         "--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"
@@ -102,124 +99,84 @@ def _add_measured(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group(
-        "estimate from a recording",
-        "Give the rig to correct by a shape or by --rig; otherwise it is the recorded one.",
-    )
-    group.add_argument(
-        "--from",
-        dest="recording",
-        type=Path,
-        metavar="RECORDING",
-        help="estimate yaw, place and size of the outline, tip radius and clock lag from at least 8 pushes",
-    )
-    add_rig(parser)
-    add_topics(parser)
-
-
 def run(options: argparse.Namespace) -> None:
     """Write the rig file. Raises RequestError or RigError that names the option or file."""
+    from push_predictor.recordings.new_rig import rig_lines
+    from push_predictor.recordings.rig import save_rig
+    from push_predictor.reporting.rig_picture import rig_svg
+
     check_output("--out", options.out, force=options.force)
     check_output("--picture", options.picture, force=options.force)
     if options.picture is not None and options.picture.suffix != PICTURES:
         raise RequestError("--picture", str(options.picture), f"a file that ends with {PICTURES}")
     shape = next((name for name in SHAPES if getattr(options, name) is not None), None)
     _check_call(options, shape)
-    rig, notes = (None, ()) if shape is None else _measured(options, shape)
-    estimate = None if options.recording is None else _estimate(options, rig)
-    rig = estimate.corrected if estimate is not None else rig
-    assert rig is not None, "a call without shape and recording is refused"
-    _write(options, rig)
-    content = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
-    if not write_json(options, content if estimate is None else content | estimate.record()):
-        lines = [f"note: {note}" for note in notes] + ([] if estimate is None else estimate.lines)
-        print("\n".join(_summary(options, rig) + lines))
+    rig, notes, findings = _corrected(options) if shape is None else _measured(options, shape)
+    save_rig(rig, options.out)
+    if options.picture is not None:
+        write_text(options.picture, rig_svg(rig))
+    content: dict[str, object] = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
+    if shape is None:
+        content["findings"] = [finding.record() for finding in findings]
+    if not write_json(options, content):
+        print("\n".join([f"{options.out}: {rig.shape} on {rig.surface}", *rig_lines(rig)]))
+        if options.picture is not None:
+            print(f"picture: {options.picture}")
+        for note in notes:
+            print(f"note: {note}")
+        for finding in findings:
+            print("\n".join(finding.lines))
 
 
 def _check_call(options: argparse.Namespace, shape: str | None) -> None:
     """Raise RequestError for options that are missing, or that nothing would use."""
-    if options.recording is None:
-        if shape is None:
-            raise RequestError(
-                "shape", None, f"one of {', '.join(f'--{name}' for name in SHAPES)}, or --from RECORDING"
-            )
-        if options.rig is not None:
-            raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
     if shape is not None and options.rig is not None:
-        raise RequestError("--rig", str(options.rig), f"either it or --{shape}")
-    if options.keep_origin and shape not in FILES:
-        raise RequestError("--keep-origin", True, "it only with --polygon, --svg or --dxf")
-    if options.unit is not None and shape not in ("svg", "dxf"):
-        raise RequestError("--unit", options.unit, "it only with --svg or --dxf")
-    for name, meaning in MEASURED.items():
-        if shape is not None and getattr(options, name) is None:
-            raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
+        raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
+    if options.keep_origin and shape != "polygon":
+        raise RequestError("--keep-origin", True, "it only with --polygon")
     for name in (*MEASURED, "mass", "name", "contact_friction", "surface_friction", "support_point"):
-        if shape is None and getattr(options, name) is not None:
-            raise RequestError(f"--{name.replace('_', '-')}", getattr(options, name), "it only with a shape")
+        given, option = getattr(options, name), f"--{name.replace('_', '-')}"
+        if shape is None and given is not None:
+            raise RequestError(option, given, "it only with a shape")
+        if shape is not None and given is None and name in MEASURED:
+            raise RequestError(option, None, MEASURED[name])
 
 
-def _estimate(options: argparse.Namespace, rig: Rig | None) -> RigEstimate:
-    """The rig corrected from the recording."""
+def _corrected(options: argparse.Namespace) -> tuple[Rig, tuple[str, ...], tuple[Finding, ...]]:
+    """The rig corrected by the findings of `check` about the recording, no notes, and these findings."""
+    from push_predictor.recordings.checks.check import check_recording
+    from push_predictor.recordings.checks.corrected_rig import corrected_rig
     from push_predictor.recordings.read import read_recording, require_rig
-    from push_predictor.recordings.rig import load_rig
-    from push_predictor.recordings.rigs.estimate import estimate_rig
 
     check_data([options.recording])
-    given = load_rig(options.rig) if options.rig is not None else rig
     with progress("rig"):
-        recording = read_recording(options.recording, rig=given, topics=topics_of(options))
-        estimate = estimate_rig(recording, require_rig(recording))
+        recording = read_recording(options.recording, rig=given_rig(options), topics=topics_of(options))
+        rig = require_rig(recording)
+        findings = check_recording(recording, rig)
+        try:
+            rig = corrected_rig(rig, findings)
+        except RigError as error:
+            raise RigError(f"{options.recording}: {error}") from None
         save_topics_of(options, [options.recording])
-    return estimate
+    return rig, (), findings
 
 
-def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, ...]]:
-    """The rig of the given sizes, and notes on what was changed."""
+def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, ...], tuple[Finding, ...]]:
+    """The rig of the given sizes, notes on what was changed, and no findings."""
     import numpy as np
 
     from push_predictor.geometry.shapes import ellipse, rectangle
-    from push_predictor.recordings.rigs.new_rig import length_of, new_rig
+    from push_predictor.recordings.new_rig import length_of, new_rig, read_polygon
 
-    moved = np.zeros(2)
+    moved, name, given = np.zeros(2), shape, getattr(options, shape)
     notes: tuple[str, ...] = ()
-    if shape in FILES:
-        polygon = _from_file(options, shape)
-        outline, moved, notes = polygon.outline, polygon.moved, polygon.notes
+    if shape == "polygon":
+        polygon = read_polygon(given, options.keep_origin)
+        outline, moved, notes, name = polygon.outline, polygon.moved, polygon.notes, given.stem
     else:
-        given = getattr(options, shape)
         sizes = [length_of(f"--{shape}", size) for size in (given if isinstance(given, list) else [given, given])]
         outline = ellipse(sizes[0] / 2.0, sizes[1] / 2.0) if shape in ("circle", "ellipse") else rectangle(*sizes)
     points = None if options.support_point is None else np.array(options.support_point) + [*moved, 0.0]
-    name = options.name or (getattr(options, shape).stem if shape in FILES else shape)
     measured = (options.tip_radius, options.surface, options.mass)
-    return new_rig(name, outline, *measured, points, options.contact_friction, options.surface_friction), notes
-
-
-def _from_file(options: argparse.Namespace, shape: str) -> Polygon:
-    from push_predictor.recordings.rigs.dxf_file import read_dxf
-    from push_predictor.recordings.rigs.polygon_file import read_polygon
-    from push_predictor.recordings.rigs.svg_file import read_svg
-
-    if shape == "polygon":
-        return read_polygon(options.polygon, options.keep_origin)
-    read = read_svg if shape == "svg" else read_dxf
-    return read(getattr(options, shape), options.unit, options.keep_origin)
-
-
-def _write(options: argparse.Namespace, rig: Rig) -> None:
-    from push_predictor.recordings.rig import save_rig
-
-    save_rig(rig, options.out)
-    if options.picture is not None:
-        from push_predictor.reporting.rig_picture import rig_svg
-
-        write_text(options.picture, rig_svg(rig))
-
-
-def _summary(options: argparse.Namespace, rig: Rig) -> list[str]:
-    from push_predictor.recordings.rigs.summary import rig_lines
-
-    picture = [] if options.picture is None else [f"picture: {options.picture}"]
-    return [f"{options.out}: {rig.shape} on {rig.surface}", *rig_lines(rig), *picture]
+    frictions = (options.contact_friction, options.surface_friction)
+    return new_rig(options.name or name, outline, *measured, points, *frictions), notes, ()

@@ -10,16 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_rig,
-    add_seed,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_data, add_model, add_reading, add_seed
 from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
@@ -38,7 +29,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor trace abs.pushmodel bags/new --report trace.html --save-model extended.pushmodel",
     )
     add_model(parser)
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    add_data(parser)
     parser.add_argument(
         "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
     )
@@ -53,34 +44,30 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="EXTENDED",
         help="write the extended model to this file, if it improves the log density of held-out pushes",
     )
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Trace, write JSON and model, print the verdict, then draw the report: what can fail late comes last."""
-    from push_predictor.recordings.checks.data_checks import DataChecks
-    from push_predictor.recordings.rig import load_rig
     from push_predictor.residuals.trace import trace_data
 
     _check(options)
     names = None if options.covariates is None else _names(options.covariates)
-    rig = load_rig(options.rig) if options.rig else None
+    reading = Reading(options)
     with progress("trace") as watch:
         found = trace_data(
             options.data,
             options.model,
             alpha=options.alpha,
             covariates=names,
-            rig=rig,
+            rig=reading.rig,
             seed=options.seed,
-            topics=topics_of(options),
+            topics=reading.topics,
             watch=watch,
-            checks=DataChecks(options.strict, warn),
+            checks=reading.checks,
         )
-    save_topics_of(options, options.data)
+    reading.save_topics(options.data)
     saved = False
     try:
         saved = _write_results(options, found)

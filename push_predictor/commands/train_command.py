@@ -12,16 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_out,
-    add_rig,
-    add_seed,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_out, add_reading, add_seed
 from push_predictor.commands.common.output import (
     check_data,
     check_folder,
@@ -89,9 +80,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("--name", help="name: of the model in the services (default: the name of the file)")
     add_out(parser, "the model, FILE.pushmodel")
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
 
 
@@ -99,7 +88,6 @@ def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
     from push_predictor.models.store.table_cache import keep_tables
-    from push_predictor.recordings.checks.data_checks import DataChecks
     from push_predictor.recordings.load import different_supports, load_data, load_rig_for
     from push_predictor.recordings.table import empty_table
     from push_predictor.recordings.windows.push_window import WindowOptions
@@ -108,20 +96,17 @@ def run(options: argparse.Namespace) -> None:
     if not options.data and kind != "prior":
         options.call_is_wrong("the following arguments are required: DATA (only --kind prior needs none)")
     _check(options, kind)
-    rig = load_rig_for(options.data, options.rig)
+    reading = Reading(options)
+    rig, checks = reading.rig or load_rig_for(options.data), reading.checks
     supports = different_supports(options.data) if (options.fit or kind == "prior") and options.rig is None else {}
     windows = WindowOptions(stride=options.stride)
     with progress("read"):
-        numbered, topics = bool(supports), topics_of(options)
-        checks = DataChecks(options.strict, warn)
-        table = (
-            load_data(options.data, rig, windows, numbered=numbered, topics=topics, inspect=checks)
-            if options.data
-            else empty_table()
-        )
+        table, topics = empty_table(), reading.topics
+        if options.data:
+            table = load_data(options.data, rig, windows, numbered=bool(supports), topics=topics, inspect=checks)
         if kind in LEARNT and options.strict:  # an error comes before the work, a warning with its result
             checks.learnt_from(options.data, table, rig)
-        save_topics_of(options, options.data)
+        reading.save_topics(options.data)
     model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     with progress("table for predict_server"):

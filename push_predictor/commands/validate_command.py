@@ -8,15 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_model,
-    add_rig,
-    add_strict,
-    add_topics,
-    save_topics_of,
-    topics_of,
-)
+from push_predictor.commands.common.options import Reading, add_command, add_model, add_reading
 from push_predictor.commands.common.output import check_output, warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
@@ -46,9 +38,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
     )
-    add_strict(parser)
-    add_rig(parser)
-    add_topics(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -63,19 +53,17 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
     from push_predictor.online.files.window_log import write_window_log
-    from push_predictor.recordings.checks.data_checks import DataChecks
-    from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows, force=options.force)
     _check_recording(options.recording)
     model = load_model(options.model)
-    rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
+    reading = Reading(options)
+    rig = reading.rig or recording_rig(options.recording)
     with progress("validate") as watch:
         watch("windows and predictions", 0.0)
-        checks = DataChecks(options.strict, warn)
-        windows, comparison = validate_recording(model, options.recording, rig, warn, topics_of(options), checks)
-        save_topics_of(options, [options.recording])
+        windows, comparison = validate_recording(model, options.recording, rig, warn, reading.topics, reading.checks)
+        reading.save_topics([options.recording])
         table = windows_to_table(windows)
         alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, 1.0))
         metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}

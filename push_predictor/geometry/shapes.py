@@ -18,6 +18,7 @@ SQUARE_SIDE = 0.09
 HEXAGON_CIRCUMRADIUS = 0.0605
 NEAR = 0.08  # of the reach: vertices that one wrong measurement would bring together
 SHAPES = ("rect1", *ELLIPSES, "hex")
+MASSES = {"rect1": 0.837, "ellip1": 0.894, "ellip2": 1.110, "ellip3": 1.334, "hex": 0.983}  # kg; Yu et al. 2016
 
 
 def shape_outline(name: str) -> Outline:

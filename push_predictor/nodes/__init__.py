@@ -3,5 +3,5 @@
 
 """The ROS 2 nodes `predict_server`, `push_replay` and `push_validator`, and what they share.
 
-Each node has a folder for its parts; nothing outside this folder imports from it, except the command `doctor`.
+Each node has a folder for its parts; nothing outside this folder imports from it.
 """

@@ -3,7 +3,7 @@
 
 """Recorded pushes: streams, rigs and push tables, read and written.
 
-Import `read`, `write`, `load`, `streams`, `samples`, `rig` and `table`. The folders are `bag` (files), `fields`
-(messages of any type), `windows` (push windows), `checks` (mistakes), `rigs` (new rig files) and
-`importers` (other formats).
+Import `read`, `write`, `load`, `streams`, `rig`, `new_rig` and `table`. The folders are `bag` (files), `fields`
+(messages of any type), `decoder` (samples), `windows` (push windows), `checks` (mistakes) and `importers` (other
+formats).
 """

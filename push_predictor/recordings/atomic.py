@@ -1,10 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Atomic writing: a file exists completely or not at all."""
+"""Atomic writing: a file, or a line that is appended to one, exists completely or not at all."""
 
 from __future__ import annotations
 
+import errno
 import itertools
 import os
 from collections.abc import Iterable
@@ -32,6 +33,22 @@ def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from None
 
 
+def append_lines(path: Path, lines: Iterable[str]) -> None:
+    """Append lines, each with a single write, also when the process is killed or the disk is full.
+
+    Raises OSError that names the path, for example on a full disk; the file then ends with the last complete line.
+    """
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            for line in lines:
+                _append(descriptor, f"{line}\n".encode())
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+
+
 def _replace(target: Path, content: bytes | Iterable[bytes]) -> None:
     temporary = target.with_name(f".{os.getpid()}-{next(_NUMBERS)}.unfinished")
     try:
@@ -46,3 +63,10 @@ def _replace(target: Path, content: bytes | Iterable[bytes]) -> None:
 
 def _fill(stream: BinaryIO, content: bytes | Iterable[bytes]) -> None:
     stream.writelines((content,) if isinstance(content, bytes) else content)
+
+
+def _append(descriptor: int, data: bytes) -> None:
+    before = os.fstat(descriptor).st_size
+    if os.write(descriptor, data) < len(data):
+        os.ftruncate(descriptor, before)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -37,10 +37,9 @@ def read_table(path: Path) -> PushTable:
     Raises TableError that names file, line, column, value and what is accepted.
     """
     path = Path(path)
-    header, rows, lines = _cells(path)
-    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
-    numbers = {name: _required(path, name, columns[name], lines) for name in NUMBERS}
-    others = [name for name in header if name not in COLUMNS]
+    columns, lines = read_cells(path, COLUMNS)
+    numbers = {name: finite_column(path, name, columns[name], lines) for name in NUMBERS}
+    others = [name for name in columns if name not in COLUMNS]
     covariates = {name: _covariate(path, name, columns[name], lines) for name in others}
     return PushTable(
         inputs=np.stack([numbers[name] for name in INPUTS], axis=1),
@@ -86,8 +85,8 @@ def rig_of_table(path: Path) -> Rig | None:
     return load_rig(file) if (file := rig_path(path)).exists() else None
 
 
-def _cells(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
-    """(header, rows, line number of each row)."""
+def read_cells(path: Path, required: Sequence[str]) -> tuple[dict[str, tuple[str, ...]], list[int]]:
+    """The cells of each column of a CSV by its name, and the line number of each row. Raises TableError."""
     try:
         data = path.read_bytes()
         text = (gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data).decode("utf-8-sig")
@@ -96,19 +95,21 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         raise TableError(f"{path}: cannot be read as CSV ({error})") from None
     if len(found) < 2:
-        raise TableError(f"{path}: contains no rows, give a header with {', '.join(COLUMNS)} and one row per push")
+        raise TableError(f"{path}: contains no rows, give a header with {', '.join(required)} and one row per push")
     header = found[0][1]
     if len(set(header)) != len(header):
         raise TableError(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")
-    if missing := [name for name in COLUMNS if name not in header]:
+    if missing := [name for name in required if name not in header]:
         raise TableError(f"{path} line 1: lacks column {', '.join(missing)}, it has {', '.join(header)!r}")
     for line, row in found[1:]:
         if len(row) != len(header):
             raise TableError(f"{path} line {line}: {len(row)} cells, the header has {len(header)}")
-    return header, [row for _, row in found[1:]], [line for line, _ in found[1:]]
+    lines, rows = zip(*found[1:], strict=True)
+    return dict(zip(header, zip(*rows, strict=True), strict=True)), list(lines)
 
 
-def _required(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:
+def finite_column(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:
+    """The numbers (n,) of a column. Raises TableError with the line of one that is not accepted."""
     accepted, test = ACCEPTED.get(name, ("a finite number", np.isfinite))
     values = np.array([_number(cell) for cell in cells])
     with np.errstate(invalid="ignore"):

@@ -11,10 +11,9 @@ import numpy as np
 
 from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import shape_outline
+from push_predictor.geometry.shapes import MASSES, shape_outline
 from push_predictor.types import Array
 
-MASSES = {"rect1": 0.837, "ellip1": 0.894, "ellip2": 1.110, "ellip3": 1.334, "hex": 0.983}  # kg, the MIT set
 SUPPORT_POINTS = 36  # approximate number; the grid over the outline decides
 BUILD_TILT = 0.10  # standard deviation of the log load from manufacture: real sliders are not exactly symmetric
 

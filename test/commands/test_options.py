@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options: one meaning for each name in all commands, no abbreviations, old spellings with a warning."""
+"""Options: one meaning for each name in all commands, no abbreviations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
 
 
 CALLS = list(parsers(build_parser()))
-TAKES_A_MODEL = ("predict", "suggest", "evaluate", "validate", "trace", "report validation", "doctor")
+TAKES_A_MODEL = ("predict", "suggest", "evaluate", "validate", "trace", "report validation")
 
 
 def meaning(action: argparse.Action) -> tuple[object, ...]:

@@ -37,8 +37,8 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.online.files.window_table import put_aside
-from push_predictor.recordings import atomic_append
-from push_predictor.recordings.atomic_append import append_lines
+from push_predictor.recordings import atomic
+from push_predictor.recordings.atomic import append_lines
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table_file import read_table
 from push_predictor_interfaces.msg import PushResidual
@@ -243,8 +243,8 @@ def test_lines_are_appended_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
         written.append(data)
         return real(descriptor, data if len(written) < 3 else data[:4])
 
-    real = atomic_append.os.write
-    monkeypatch.setattr(atomic_append.os, "write", write)
+    real = atomic.os.write
+    monkeypatch.setattr(atomic.os, "write", write)
     with pytest.raises(OSError, match=r"No space left.*lines"):
         append_lines(path, ["first line", "second line", "third line", "fourth line"])
     assert path.read_text() == "first line\nsecond line\n"

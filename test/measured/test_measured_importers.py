@@ -16,9 +16,8 @@ from scipy.optimize import least_squares
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.importers import ImportReport, import_source
 from push_predictor.recordings.importers.cleaning import in_order, without_repeats
-from push_predictor.recordings.importers.mcube.pushes import read_numbers
-from push_predictor.recordings.importers.mcube.rig import ALUMINIUM, PUSHER_RADIUS, STEEL, TIP_LATE
-from push_predictor.recordings.importers.report import Notes
+from push_predictor.recordings.importers.mcube import ALUMINIUM, PUSHER_RADIUS, STEEL, TIP_LATE, read_numbers
+from push_predictor.recordings.importers.staging import Notes
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import load_rig
 from push_predictor.recordings.streams import Recording

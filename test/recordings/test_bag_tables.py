@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from mistakes import BAGS, force_of_another_time
+from mistakes import BAGS, force_of_another_time, mirrored
 from repository import REPOSITORY
 
 from push_predictor.geometry.shapes import transformed
@@ -20,7 +20,6 @@ from push_predictor.recordings.checks.check import check_table
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.frames import mirrored
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

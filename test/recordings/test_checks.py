@@ -28,6 +28,7 @@ from mistakes import (
     force_turned,
     heading_in_degrees,
     late,
+    mirrored,
     on_hand,
     outline_altered,
     spatial_rows,
@@ -39,7 +40,7 @@ from mistakes import (
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
-from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.checks.frames import swapped
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.read import read_recording

@@ -13,7 +13,7 @@ import pytest
 from mistakes import outline_altered, stream_part
 from repository import REPOSITORY
 
-from push_predictor.recordings.checks.outline.contact_fit import ContactFit, contact_fit
+from push_predictor.recordings.checks.motion import ContactFit, contact_fit
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

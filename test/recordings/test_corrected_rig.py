@@ -12,20 +12,18 @@ from functools import cache
 import numpy as np
 import pytest
 from checked_bags import sample as bag
-from mistakes import stream_part
+from mistakes import mirrored, stream_part
 
-from push_predictor.errors import RecordingError
+from push_predictor.errors import RigError
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import mirror_image, transformed
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames import mirrored, swapped
-from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig, prevents_correction
-from push_predictor.recordings.checks.outline.findings import half_size
+from push_predictor.recordings.checks.corrected_rig import corrected_rig
+from push_predictor.recordings.checks.finding import Finding, Severity, Value
+from push_predictor.recordings.checks.outline_findings import half_size
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.rigs.estimate import estimate_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
@@ -131,10 +129,9 @@ def test_an_almost_square_outline_is_not_turned_by_a_quarter(more: float) -> Non
 def test_an_outline_mirrored_and_turned_is_corrected() -> None:
     rig = require_rig(scalene())
     altered = replace(rig, outline=transformed(mirror_image(rig.outline), 0.2, (0.002, 0.0)))
-    estimate = estimate_rig(scalene(), altered)
-    assert {"outline_mirrored", "outline_turned"} <= {finding.name for finding in estimate.findings}
-    np.testing.assert_allclose(estimate.corrected.outline.vertices, rig.outline.vertices, atol=2e-4)
-    assert estimate.fit.gap < 1e-4
+    findings = check_recording(scalene(), altered)
+    assert {"outline_mirrored", "outline_turned"} <= {finding.name for finding in findings}
+    np.testing.assert_allclose(corrected_rig(altered, findings).outline.vertices, rig.outline.vertices, atol=2e-4)
 
 
 def test_a_mirrored_frame_of_a_slider_without_symmetry_is_no_mirrored_outline() -> None:
@@ -154,11 +151,10 @@ def test_a_wrong_tip_is_separated_from_a_wrong_size_on_an_ellipse() -> None:
 def test_the_clocks_are_no_part_of_the_rig() -> None:
     slider = bag("square_abs_test").slider
     late = replace(bag("square_abs_test"), slider=replace(slider, stamp=slider.stamp + 50_000_000))
-    estimate = estimate_rig(late, require_rig(late))
-    assert estimate.corrected is require_rig(late)
-    (lag,) = (line for line in estimate.lines if "lag of the slider" in line)
-    assert "not part of the rig: correct the clocks" in lag
-    assert 45.0 < float(lag.split()[4]) < 55.0
+    findings = check_recording(late, require_rig(late))
+    assert [finding.name for finding in findings] == ["clocks_apart"]
+    assert 0.045 < findings[0].values["lag"].value < 0.055
+    assert corrected_rig(require_rig(late), findings) is require_rig(late)
 
 
 def finding_of(name: str, **values: float) -> Finding:
@@ -190,24 +186,10 @@ def test_without_a_finding_the_rig_is_the_same() -> None:
     assert corrected_rig(rig, [finding_of("clocks_apart", lag=0.1)]) is rig
 
 
-def test_a_mistake_that_hides_the_outline_prevents_an_estimate() -> None:
-    rig = require_rig(bag(ROUND))
-    assert prevents_correction(check_recording(mirrored(bag(ROUND), -1.0, -1.0), rig)) == ["frame_mirrored"]
-    with pytest.raises(RecordingError, match=r"no rig can be estimated \(topics_swapped\): Slider and pusher"):
-        estimate_rig(swapped(bag(ROUND)), rig)
-
-
-def test_an_outline_that_no_correction_fits_prevents_an_estimate() -> None:
-    assert prevents_correction([finding_of("outline_shifted", x=0.1, y=0.0), finding_of("outline_misfit")])
-    assert not prevents_correction([finding_of("outline_shifted", x=0.1, y=0.0), finding_of("clocks_apart")])
-
-
-def test_an_estimate_states_what_the_contacts_do_not_show() -> None:
-    estimate = estimate_rig(bag(ONE_SIDE), require_rig(bag(ONE_SIDE)))
-    lines = {line[2:20].strip(): line[20:].strip() for line in estimate.lines[1:]}
-    assert lines["shift along y"] == "not determined by these contacts"
-    assert lines["size"] == lines["tip radius"] == "not determined by these contacts"
-    assert lines["shift along x"].endswith("unchanged")
-    record = estimate.record()["estimates"]
-    assert isinstance(record, dict)
-    assert record["y"] is None and record["yaw"]["unit"] == "rad" and abs(record["x"]["value"]) < 1e-4
+@pytest.mark.parametrize(
+    ("name", "severity"), [("topics_swapped", "refused"), ("frame_mirrored", "warning"), ("outline_misfit", "warning")]
+)
+def test_a_mistake_that_hides_the_outline_prevents_a_correction(name: str, severity: Severity) -> None:
+    hiding = Finding(name, severity, "What was found.", "")
+    with pytest.raises(RigError, match=rf"no rig can be estimated \({name}\): What was found"):
+        corrected_rig(require_rig(bag(ROUND)), [finding_of("outline_shifted", x=0.1, y=0.0), hiding])

@@ -33,8 +33,8 @@ from push_predictor.recordings.fields.wrench_bias import estimate_bias, with_pla
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.windows.clock_session import free_motion
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
-from push_predictor.recordings.windows.free_motion import free_motion
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
 

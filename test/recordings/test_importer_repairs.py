@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.geometry.frames import wrap_angle
-from push_predictor.recordings.importers.cleaning import Samples, in_order, nanoseconds, without_repeats
-from push_predictor.recordings.importers.heading import repair_heading
-from push_predictor.recordings.importers.mcube.pushes import headings
-from push_predictor.recordings.importers.report import Notes
+from push_predictor.recordings.importers.cleaning import Samples, in_order, nanoseconds, repair_heading, without_repeats
+from push_predictor.recordings.importers.mcube import headings
+from push_predictor.recordings.importers.staging import Notes
 
 
 def _jumping(size: float, spread: int, at: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -19,8 +19,7 @@ from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.importers.mlab.push_logs import first_touch
-from push_predictor.recordings.importers.mlab.rig import load_shares, triangle
+from push_predictor.recordings.importers.mlab import first_touch, load_shares, triangle
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table_file import read_table
@@ -90,6 +89,17 @@ def test_damaged_file_in_a_folder_or_zip_is_reported(tmp_path: Path) -> None:
     report = import_source("mit", [tmp_path / "set"], tmp_path / "out")
     assert {path.name for path in report.written} == {_mit_name(push=0), _mit_name(push=2)}
     assert len(report.dropped) == 1 and f"{_mit_name(push=1)}.json:2" in report.dropped[0]
+
+
+def test_damaged_file_that_was_named_or_an_empty_archive_is_rejected(tmp_path: Path) -> None:
+    (tmp_path / f"{_mit_name(push=1)}.json").write_text("{")
+    sources = [_write_mit(tmp_path, _mit_streams(), push=0), tmp_path / f"{_mit_name(push=1)}.json"]
+    with pytest.raises(ImportSourceError, match="1: not JSON"):
+        import_source("mit", sources, tmp_path / "out")
+    with zipfile.ZipFile(tmp_path / "empty.zip", "w") as archive:
+        archive.writestr("README", "")
+    with pytest.raises(ImportSourceError, match=r"empty\.zip: the archive contains no \.json"):
+        import_source("mit", [tmp_path / "empty.zip"], tmp_path / "out")
 
 
 def test_irregularities_of_the_mit_set_are_repaired_and_reported(tmp_path: Path) -> None:
@@ -195,12 +205,15 @@ def test_square_table_reverses_dy_and_uses_edge_0(tmp_path: Path) -> None:
 
 def test_invalid_square_table_is_rejected_with_line_or_index(tmp_path: Path) -> None:
     bad = {**SQUARE, "dx": [0.004, "x", 0.002]}
-    with pytest.raises(ImportSourceError, match=r"csv\.gz:3: dx_m is 'x'"):
+    with pytest.raises(ImportSourceError, match=r"csv\.gz line 3: column dx_m is 'x'"):
         import_source("mit-square", [_square_csv(tmp_path / "t.csv.gz", bad)], tmp_path / "out")
     with pytest.raises(ImportSourceError, match=r"c\[1\] is 1\.5"):
         import_source(
             "mit-square", [_square_csv(tmp_path / "t.csv.gz", {**SQUARE, "c": [0, 1.5, 1]})], tmp_path / "out"
         )
+    np.savez(tmp_path / "nan.npz", **{**SQUARE, "dx": [0.004, np.nan, 0.002]})
+    with pytest.raises(ImportSourceError, match=r"dx\[1\] is nan"):
+        import_source("mit-square", [tmp_path / "nan.npz"], tmp_path / "out")
     np.savez(tmp_path / "less.npz", c=np.zeros(3))
     with pytest.raises(ImportSourceError, match="lacks beta"):
         import_source("mit-square", [tmp_path / "less.npz"], tmp_path / "out")

@@ -381,9 +381,7 @@ def test_topics_are_not_saved_before_the_recording_was_read(tmp_path: Path) -> N
     assert not (tmp_path / "lab.recording.yaml").exists()
 
 
-@pytest.mark.parametrize(
-    "command", ["train", "evaluate", "validate", "trace", "suggest", "report validation", "info", "doctor"]
-)
+@pytest.mark.parametrize("command", ["train", "evaluate", "validate", "trace", "suggest", "report validation", "info"])
 def test_every_command_that_reads_recordings_has_the_options(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main([*command.split(), "--help"])

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.recordings.importers.mlab.log_parser import read_log
-from push_predictor.recordings.importers.report import Notes
+from push_predictor.recordings.importers.mlab import read_log
+from push_predictor.recordings.importers.staging import Notes
 
 POSE = "1 2 3 1 0 0 0"
 LINES = ["1", POSE, POSE, "2", "0.5 1e-3 -2", "0.6 1 2", "1", f"0.7 {POSE}"]

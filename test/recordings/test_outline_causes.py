@@ -15,17 +15,17 @@ from checked_bags import found, rig_of
 from checked_bags import sample as bag
 from mistakes import tracked
 
-from push_predictor.errors import RecordingError, RigError
+from push_predictor.errors import RigError
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import ellipse, near_symmetry, rectangle, shape_outline, stretched, transformed
 from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import contacts_of
-from push_predictor.recordings.checks.outline.corrected_rig import corrected_rig
-from push_predictor.recordings.checks.outline.findings import fit_rig, outline_findings
+from push_predictor.recordings.checks.outline_findings import outline_findings
+from push_predictor.recordings.checks.outline_fit import fit_outline
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.rigs.estimate import estimate_rig
 from push_predictor.recordings.streams import Recording
 
 BAGS = ("circle_pu", "ellipse_plywood", "hexagon_delrin", "square_abs_repeats", "square_abs_test")
@@ -89,10 +89,8 @@ def test_a_shift_of_the_slider_is_separated_from_one_between_the_frames() -> Non
 
 
 def test_frames_apart_are_no_part_of_the_rig() -> None:
-    estimate = estimate_rig(other_world(bag(ROUND), 0.0, (0.002, 0.0)), rig_of(ROUND))
-    assert estimate.corrected is rig_of(ROUND)
-    (tip,) = (line for line in estimate.lines if line.startswith("  tip radius"))
-    assert float(tip.split()[2]) == pytest.approx(4.75, abs=0.05)
+    findings = check_recording(other_world(bag(ROUND), 0.0, (0.002, 0.0)), rig_of(ROUND))
+    assert corrected_rig(rig_of(ROUND), findings) is rig_of(ROUND)
 
 
 # --- axes mirrored or exchanged --------------------------------------------------------------------------------------
@@ -138,40 +136,22 @@ def test_a_wrong_tip_radius_is_found_with_both_readings(name: str, more: float) 
         assert "or, if it is right, the sizes: 128.6 x 102.7 mm" in finding.advice
 
 
-@pytest.mark.parametrize("name", [ROUND, OVAL, HEXAGON])
-def test_the_estimate_states_size_and_radius_each_as_if_the_other_were_right(name: str) -> None:
-    estimate = estimate_rig(bag(name), rig_of(name))
-    record = estimate.record()["estimates"]
-    assert isinstance(record, dict)
-    assert record["tip_radius"]["value"] == pytest.approx(0.00475, abs=5e-5) and 0.0 < record["tip_radius"]["sd"] < 5e-5
-    assert record["size"]["value"] == pytest.approx(1.0, abs=1e-3) and 0.0 < record["size"]["sd"] < 5e-4
-    text = "\n".join(estimate.lines)
-    assert "if the tip radius is right: unchanged" in text and "if the size is right: unchanged" in text
-    both = record["size_and_tip_radius"]
-    assert ("not separated by these contacts" in text) == (both is None)
-    if name == OVAL:
-        assert both["tip_radius"]["value"] == pytest.approx(0.00475, abs=1e-4)
-        assert both["tip_radius"]["sd"] > 3.0 * record["tip_radius"]["sd"]
-
-
-def test_the_estimate_of_a_wrong_tip_of_an_ellipse_corrects_the_tip_alone() -> None:
+def test_a_wrong_tip_of_an_ellipse_is_corrected_alone() -> None:
     rig = rig_of(OVAL)
-    estimate = estimate_rig(bag(OVAL), replace(rig, pusher_radius=rig.pusher_radius - 0.0011))
-    assert estimate.corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=5e-5)
-    assert estimate.corrected.outline.area == pytest.approx(rig.outline.area)
-    lines = [line.split(": ")[-1] for line in estimate.lines if line.startswith(("  size  ", "  size,"))]
-    assert lines == ["unchanged", "corrected in the rig"]
+    altered = replace(rig, pusher_radius=rig.pusher_radius - 0.0011)
+    corrected = corrected_rig(altered, check_recording(bag(OVAL), altered))
+    assert corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=5e-5)
+    assert corrected.outline.area == pytest.approx(rig.outline.area)
 
 
 def test_a_wrong_size_and_a_wrong_tip_are_corrected_together() -> None:
     rig = rig_of(OVAL)
     altered = replace(rig, pusher_radius=rig.pusher_radius + 0.0015, outline=transformed(rig.outline, size=1.03))
-    estimate = estimate_rig(bag(OVAL), altered)
-    assert [finding.name for finding in estimate.findings] == ["outline_size", "tip_radius"]
-    assert estimate.corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
-    assert estimate.corrected.outline.area == pytest.approx(rig.outline.area, rel=2e-3)
-    lines = [line.split(": ")[-1] for line in estimate.lines if line.startswith(("  size", "  tip"))]
-    assert lines == ["unchanged", "unchanged", "corrected in the rig"]
+    findings = check_recording(bag(OVAL), altered)
+    assert [finding.name for finding in findings] == ["outline_size", "tip_radius"]
+    corrected = corrected_rig(altered, findings)
+    assert corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
+    assert corrected.outline.area == pytest.approx(rig.outline.area, rel=2e-3)
 
 
 # --- shape -----------------------------------------------------------------------------------------------------------
@@ -187,8 +167,8 @@ def test_a_wrong_axis_of_an_ellipse_is_a_wrong_shape_with_both_sizes(more: float
     assert lengths == pytest.approx([2.0 * a, 2.0 * b], abs=1.5e-4)
     assert "130.8 x 105.0 mm" in finding.sentence
     if more == 0.0013:
-        with pytest.raises(RecordingError, match=r"no rig can be estimated \(outline_shape\): The outline's shape is"):
-            estimate_rig(bag(OVAL), altered)
+        with pytest.raises(RigError, match=r"no rig can be estimated \(outline_shape\): The outline's shape is"):
+            corrected_rig(altered, [finding])
 
 
 def test_a_wrong_side_of_a_square_is_a_wrong_shape_with_both_sizes() -> None:
@@ -244,7 +224,7 @@ def test_a_single_push_needs_to_be_far_off(off: float, names: list[str]) -> None
     assert contacts is not None
     away = np.where(contacts.push == contacts.push[-1], off, 0.0) / np.linalg.norm(contacts.tips, axis=1)
     moved = replace(contacts, tips=contacts.tips * (1.0 + away[:, None]))
-    assert [finding.name for finding in outline_findings(moved, rig, fit_rig(moved, rig))] == names
+    assert [finding.name for finding in outline_findings(moved, rig, fit_outline(moved, rig))] == names
 
 
 def finding_of(name: str, **values: float) -> Finding:

@@ -13,7 +13,7 @@ from repository import REPOSITORY
 from synthetic import square_pushes
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.recordings.checks.pushed_part import MEANING, pushed_part
+from push_predictor.recordings.checks.coverage import MEANING, pushed_part
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table import PushTable, empty_table

@@ -27,8 +27,15 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.recordings.windows.regular_stamps import AROUND, RegularStamps
-from push_predictor.recordings.windows.stamp_noise import DECIDING, MOST_WIDTH, missing_before, stamp_noise, width
+from push_predictor.recordings.windows.regular_stamps import (
+    AROUND,
+    DECIDING,
+    MOST_WIDTH,
+    RegularStamps,
+    missing_before,
+    stamp_noise,
+    width,
+)
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.types import IntArray
 

@@ -26,7 +26,7 @@ from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, 
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import Topics, load_topics, save_topics
-from push_predictor.recordings.windows.free_motion import free_motion
+from push_predictor.recordings.windows.clock_session import free_motion
 
 BIAS = np.array([0.5, -0.3, 1.2, 0.02, 0.01, -0.03])
 WEIGHT, LEVER = 3.0, np.array([0.1, -0.05, 0.2])

@@ -14,7 +14,7 @@ from repository import REPOSITORY
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.checks.frames import swapped
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig
@@ -31,6 +31,12 @@ Mistake = Callable[[Recording], Recording]
 def outline_altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
     """The rig with an outline turned, then shifted, then scaled; for polygons."""
     return replace(rig, outline=Outline(size * (rotate(rig.outline.vertices, np.array(yaw)) + shift)))
+
+
+def mirrored(recording: Recording, y: float, heading: float) -> Recording:
+    """The recording with the slider's y and heading multiplied by the given signs."""
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, y=y * slider.y, heading=heading * slider.heading))
 
 
 def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:

@@ -16,7 +16,7 @@ from push_predictor.evaluation.metrics import nmse
 from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density, gaussian_log_density
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
-from push_predictor.recordings.importers.mit.square_windows import read_mit_square, square_rig
+from push_predictor.recordings.importers.mit_square import read_mit_square, square_rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 

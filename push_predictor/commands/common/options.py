@@ -12,9 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.commands.common.output import warn
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
+    from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.topics import Topics
 
 HELP_WIDTH = 100  # characters
@@ -45,6 +47,11 @@ def add_model(parser: argparse.ArgumentParser, nargs: str | None = None, *, note
     parser.add_argument("model", type=Path, nargs=nargs, metavar="MODEL", help=f"a model file{note}")
 
 
+def add_data(parser: argparse.ArgumentParser) -> None:
+    """Add the argument DATA, one or several."""
+    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+
+
 def add_out(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the required option --out; what: a noun phrase for the file or folder that is written."""
     parser.add_argument("--out", required=True, type=Path, metavar="PATH", help=f"output: {what}")
@@ -72,6 +79,13 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", type=Path, metavar="FILE.yaml", help="rig file, needed if the data contain no push_rig record"
     )
+
+
+def given_rig(options: argparse.Namespace) -> Rig | None:
+    """The rig of --rig, None without the option. Raises RigError."""
+    from push_predictor.recordings.rig import load_rig
+
+    return load_rig(options.rig) if options.rig else None
 
 
 def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
@@ -150,11 +164,31 @@ def save_topics_of(options: argparse.Namespace, paths: Sequence[Path]) -> None:
         print(f"topics: {saved}", file=sys.stderr)
 
 
-def add_strict(parser: argparse.ArgumentParser) -> None:
-    """Add the option --strict, under which a warning of the checks of data is an error."""
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that judge the data which they read: --strict, --rig and the topics."""
     parser.add_argument(
         "--strict", action="store_true", help="exit with status 1 after a warning about the data too (see `check`)"
     )
+    add_rig(parser)
+    add_topics(parser)
+
+
+class Reading:
+    """How a command reads data, by the options of `add_reading`: rig (None without --rig), topics, and the checks.
+
+    Raises RigError, and RequestError for an empty topic.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        from push_predictor.recordings.checks.data_checks import DataChecks
+
+        self.rig, self.topics = given_rig(options), topics_of(options)
+        self.checks = DataChecks(options.strict, warn)
+        self._options = options
+
+    def save_topics(self, paths: Sequence[Path]) -> None:
+        """Save the topics next to the recordings, if asked; see `save_topics_of`."""
+        save_topics_of(self._options, paths)
 
 
 def add_covariate(parser: argparse.ArgumentParser) -> None:

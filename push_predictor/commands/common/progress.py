@@ -1,25 +1,25 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Progress of long work on stderr: a bar with percent and time left in a terminal, lines otherwise.
+"""Progress of long work on stderr: elapsed time, percent, time left and stage; one line that changes in a terminal.
 
-The bar needs the package rich. Nothing is shown of work that takes less than two seconds.
+Nothing is shown of work that takes less than two seconds.
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from typing import Any
+from contextlib import contextmanager
 
 from push_predictor.watch import Watch
 
-PATIENCE = 2.0  # s before the first message, and between lines
-REDRAW = 0.2  # s between updates of the bar
+PATIENCE = 2.0  # s before the first message, and between messages
 FEWEST = 0.02  # fraction done from which the time left is estimated
+CLEAR = "\r\x1b[K"  # the line of a terminal
 
 
 @contextmanager
@@ -51,74 +51,27 @@ class Course:
         now = time.monotonic()
         self._reached = (stage, min(max(fraction, earlier), 1.0), now if fraction > earlier else at)
 
-    @property
-    def fraction(self) -> float | None:
-        """The fraction that is done; None if the work does not report it."""
-        return None if self._reached is None else self._reached[1]
-
     def text(self, now: float) -> str:
         """Elapsed time, and what is known of the rest: '12 s, 40 %, about 18 s left, dx'."""
         elapsed = now - self.begun
         if self._reached is None:
             return f"{elapsed:.0f} s"
         stage, fraction, at = self._reached
-        left = time_left(fraction, at - self.begun, elapsed)
-        remaining = [] if left is None else [f"about {left:.0f} s left"]
+        left = (at - self.begun) / fraction - elapsed if fraction >= FEWEST else 0.0  # if the rest goes as fast
+        remaining = [f"about {left:.0f} s left"] if left > 0.0 else []
         doing = stage.removeprefix(f"{self.task}: ")
         return ", ".join([f"{elapsed:.0f} s", f"{100.0 * fraction:.0f} %", *remaining, doing])
 
 
-def time_left(fraction: float, at: float, elapsed: float) -> float | None:
-    """Seconds left, if the rest goes as fast as the fraction that was done `at` seconds after the start.
-
-    None if too little is done, and if more time has passed than was estimated.
-    """
-    if fraction < FEWEST:
-        return None
-    left = at / fraction - elapsed
-    return left if left > 0.0 else None
-
-
 def _report(course: Course, done: threading.Event) -> None:
-    if done.wait(PATIENCE):
-        return
-    with ExitStack() as shown:
-        bar = _terminal_bar()
-        if bar is None:
-            _print_lines(course, done)
-            return
-        shown.enter_context(bar)
-        _draw(bar, course, done)
-
-
-def _print_lines(course: Course, done: threading.Event) -> None:
-    while True:
-        print(f"{course.task}: {course.text(time.monotonic())}", file=sys.stderr, flush=True)
-        if done.wait(PATIENCE):
-            return
-
-
-def _draw(bar: Any, course: Course, done: threading.Event) -> None:
-    row = bar.add_task(course.task, total=None, text="")
-    while True:
-        known = {} if course.fraction is None else {"total": 1.0, "completed": course.fraction}
-        bar.update(row, text=course.text(time.monotonic()), **known)
-        if done.wait(REDRAW):
-            return
-
-
-def _terminal_bar() -> Any:
-    """A bar of rich; None if stderr is no terminal or rich is not installed."""
-    if not sys.stderr.isatty():
-        return None
-    try:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-    except ImportError:
-        return None
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}", markup=False))
-    # stdout is for results: the bar must not redirect it.
-    return Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False)
+    terminal, shown = sys.stderr.isatty(), False
+    while not done.wait(PATIENCE):
+        line, shown = f"{course.task}: {course.text(time.monotonic())}", True
+        if terminal:
+            line = CLEAR + line[: shutil.get_terminal_size().columns - 1]
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
+    if terminal and shown:
+        print(CLEAR, end="", file=sys.stderr, flush=True)
 
 
 class JobProgress:
@@ -132,8 +85,7 @@ class JobProgress:
     def stage(self, number: int, of: int, title: str) -> None:
         """Start a stage."""
         self._stage, self._number, self._stages = f"{number}/{of} {title}", number, of
-        self._doing, self._done, self._count = "", 0, 0
-        self._notify()
+        self.begin("", 0)
 
     def begin(self, doing: str, count: int) -> None:
         """Start a batch of jobs."""

@@ -12,7 +12,7 @@ import numpy as np
 from push_predictor.recordings.checks.checked import CheckedData
 from push_predictor.recordings.checks.coverage import Coverage
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.outline.contact_fit import OFF, ContactFit
+from push_predictor.recordings.checks.motion import OFF, ContactFit
 
 ORDER = ("refused", "warning", "note")
 LABELS = {"refused": "refused", "warning": "check first", "note": "sound"}

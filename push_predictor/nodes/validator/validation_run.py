@@ -28,8 +28,8 @@ from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
 from push_predictor.online.sample_check import SampleCheck
 from push_predictor.online.stream_sync import StreamSync
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.checks.coverage import pushed_part
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.pushed_part import pushed_part
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream

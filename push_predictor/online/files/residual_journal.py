@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from push_predictor.recordings.atomic_append import append_lines
+from push_predictor.recordings.atomic import append_lines
 from push_predictor.recordings.table import COLUMNS, OUTPUTS
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array

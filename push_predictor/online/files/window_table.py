@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from push_predictor.online.files.residual_journal import JOURNAL, ResidualJournal
-from push_predictor.recordings.atomic_append import append_lines
+from push_predictor.recordings.atomic import append_lines
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import rig_path, write_table

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.recordings.windows.stamp_noise import stamp_noise
+from push_predictor.recordings.windows.regular_stamps import stamp_noise
 from push_predictor.types import IntArray
 
 SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another clock

@@ -12,7 +12,7 @@ from pathlib import Path
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.outline.contact_fit import ContactFit, contact_fit
+from push_predictor.recordings.checks.motion import ContactFit, contact_fit
 from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig

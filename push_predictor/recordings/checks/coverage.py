@@ -11,6 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
@@ -24,6 +25,7 @@ FEWEST_STEPS = 20  # from one window of a push to the next
 MOST_SIDES = 12  # an outline with more vertices is divided into quarters
 MIDDLE = (5.0, 95.0)  # percentiles
 NAMED = 4  # sides
+MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,19 @@ def coverage_findings(coverage: Coverage | None) -> list[Finding]:
         return [Finding("no_pushes", "warning", sentence, "Check topics, outline and clocks, and record pushes.")]
     found = [_pushes(coverage), _missing_sides(coverage), _speeds(coverage), _angles(coverage), _slides(coverage)]
     return [finding for finding in found if finding is not None]
+
+
+def pushed_part(table: PushTable, rig: Rig | None = None) -> list[Finding]:
+    """A warning that states what a table of windows leaves out of the domain; none if it covers enough.
+
+    The limits are those of the warnings of `push_predictor check`. Sides and sliding contacts need the rig.
+    """
+    coverage = coverage_of(table) if rig is None else coverage_of(table, rig.outline, rig.pusher_radius)
+    if coverage is None:
+        return []
+    lacking = [finding for finding in coverage_findings(coverage) if finding.severity == "warning"]
+    sentences = [_without_need(finding, coverage) for finding in lacking]
+    return [Finding("pushed_part", "warning", " ".join(sentences), MEANING)] if sentences else []
 
 
 def sides_of(outline: Outline, contact: Array) -> tuple[IntArray, int, str]:
@@ -182,3 +197,10 @@ def _slides(coverage: Coverage) -> Finding | None:
     sentence = f"The contact slides along the edge in {100.0 * share:.0f} % of the steps only."
     advice = "Record pushes at angles beyond 40 degrees, and longer ones: there the contact slides."
     return Finding("few_sliding", severity, sentence, advice, {"share": Value(share, "1")})
+
+
+def _without_need(finding: Finding, coverage: Coverage) -> str:
+    """The sentence of a finding, without what a learnt model needs."""
+    if finding.name != "few_pushes":
+        return finding.sentence
+    return f"The data contain {coverage.pushes} push{'' if coverage.pushes == 1 else 'es'} only."

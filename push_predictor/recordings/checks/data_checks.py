@@ -10,9 +10,8 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.checks.check import check_recording, check_table
-from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of
+from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of, pushed_part
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.pushed_part import pushed_part
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

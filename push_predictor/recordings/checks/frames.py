@@ -9,19 +9,17 @@ between tip and outline is named if the streams as recorded leave a large one.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.geometry.frames import to_body
+from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.motion import body_velocity, motion_of
-from push_predictor.recordings.checks.outline.causes import frames_apart
-from push_predictor.recordings.checks.outline.findings import FEWEST_PUSHES, fit_rig, outline_findings, unchecked
-from push_predictor.recordings.checks.outline.fit import OutlineFit
-from push_predictor.recordings.checks.outline.mirrors import MIRRORS, reflected
-from push_predictor.recordings.checks.outline.touches import Contacts
+from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
+from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.units import reach
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
@@ -31,31 +29,72 @@ LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is 
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
 AT_REST = 0.1  # share of the slider's motion; a slider moves only with the tip, or in a hand
-TIE = 1.3  # hypotheses with gaps up to this ratio fit equally well: the more usual one is named
 EXACT = 5e-5  # m; no further hypothesis is tried after one with a smaller gap, which is less than a tracker's noise
 FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wrong
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
-OUTLINE_MIRRORED = "outline_mirrored"
+RIGHT_HANDED = "Use right-handed frames, seen from above."
+IN_ORDER = "Give x before y, in right-handed frames seen from above."
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """What undoes the mistake: rows that multiply the slider's x and y, and the sign of its heading.
+
+    A constant turn of the heading is part of the fitted yaw.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    heading: float
+    mistake: str
+    advice: str
+
+
+def _sign(what: str) -> str:
+    return f"The sign of the slider's {what} is wrong."
+
+
+# The first of those that fit equally well is named.
+MIRRORS = {
+    "heading_clockwise": Mirror(
+        (1.0, 0.0), (0.0, 1.0), -1.0, _sign("heading"), "Negate the heading: counter-clockwise is positive."
+    ),
+    "frame_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), -1.0, _sign("y axis and heading"), RIGHT_HANDED),
+    "frame_mirrored_x": Mirror((-1.0, 0.0), (0.0, 1.0), -1.0, _sign("x axis and heading"), RIGHT_HANDED),
+    "axes_exchanged": Mirror(
+        (0.0, 1.0), (1.0, 0.0), -1.0, "The slider's x and y axes are exchanged, its heading too.", IN_ORDER
+    ),
+    "y_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), 1.0, _sign("y axis"), RIGHT_HANDED),
+    "x_mirrored": Mirror((-1.0, 0.0), (0.0, 1.0), 1.0, _sign("x axis"), RIGHT_HANDED),
+    "xy_exchanged": Mirror(
+        (0.0, 1.0), (1.0, 0.0), 1.0, "The slider's x and y positions are exchanged, its heading is not.", IN_ORDER
+    ),
+}
 
 
 def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
     """Findings about topics, frames, outline and clocks. Lengths in m, angles in rad, times in s."""
     if (contacts := contacts_of(recording, rig)) is None:
         return _without_contact(recording, rig)
-    fit, reach = fit_rig(contacts, rig), _reach(rig)
+    fit = fit_outline(contacts, rig)
     if rig.outline.rotational_symmetry == 0 and _leads(recording, rig) > AT_REST > 3.0 * _leads(
         swapped(recording), rig
     ):
         return [_swapped(fit.gap)]
-    recorded = _gap_as_recorded(contacts, rig)
-    if fit.pushes < FEWEST_PUSHES and recorded < WindowOptions().touch_gap_alone:
+    if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
-    if fit.gap < LARGE_GAP and not _is_implausible(fit, reach):
-        found = outline_findings(contacts, rig, fit)
-        return (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found) if found else []
-    explained = min(BETTER * fit.gap, FAR * reach)
+    if fit.gap >= LARGE_GAP or _is_implausible(fit, rig):
+        return _findings_of_large_gap(recording, rig, contacts, fit)
+    found = outline_findings(contacts, rig, fit)
+    return found and (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found)
+
+
+def _findings_of_large_gap(recording: Recording, rig: Rig, contacts: Contacts, fit: OutlineFit) -> list[Finding]:
+    """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
+    far = FAR * reach(rig)
+    explained = min(BETTER * fit.gap, far)
     if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
     mirrors = _mirror_gaps(contacts, rig)
@@ -64,24 +103,18 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
         return found
     if mirrors[best] < explained:
         return [_mirrored(best, fit.gap, mirrors[best])]
-    if fit.gap > FAR * reach or _is_implausible(fit, reach):
-        if frames_apart(contacts, rig, fit) is not None:
-            return outline_findings(contacts, rig, fit)
-        return [_another_body(recorded) if recorded > FAR * reach else _unexplained(recorded)]
+    another = fit.gap > far or _is_implausible(fit, rig)
+    if another and frames_apart(contacts, rig, fit) is None:
+        recorded = _gap_as_recorded(contacts, rig)
+        return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
-    explained_otherwise = {"frames_apart", "outline_shape"} & {finding.name for finding in found}
+    explained_otherwise = another or {"frames_apart", "outline_shape"} & {finding.name for finding in found}
     return found if explained_otherwise else [*found, _unexplained(fit.gap)]
 
 
 def swapped(recording: Recording) -> Recording:
     """The recording with slider and pusher exchanged."""
     return replace(recording, slider=recording.pusher, pusher=recording.slider)
-
-
-def mirrored(recording: Recording, y: float, heading: float) -> Recording:
-    """The recording with the slider's y and heading multiplied by the given signs."""
-    slider = recording.slider
-    return replace(recording, slider=replace(slider, y=y * slider.y, heading=heading * slider.heading))
 
 
 def contacts_of(recording: Recording, rig: Rig) -> Contacts | None:
@@ -101,22 +134,18 @@ def _gap(recording: Recording, rig: Rig) -> float:
 
 
 def _gap_of(contacts: Contacts, rig: Rig) -> float:
-    fit = fit_rig(contacts.at(np.unique(np.linspace(0, len(contacts.tips) - 1, FEW_SAMPLES).astype(np.int64))), rig)
-    return np.inf if _is_implausible(fit, _reach(rig)) else fit.gap
+    fit = fit_outline(contacts.drawn(FEW_SAMPLES), rig)
+    return np.inf if _is_implausible(fit, rig) else fit.gap
 
 
 def _mirror_gaps(contacts: Contacts, rig: Rig) -> dict[str, float]:
     """Gaps (m) by the name of the mirror, up to the first that explains the contacts exactly."""
     gaps = {}
     for name, mirror in MIRRORS.items():
-        gaps[name] = _gap_of(reflected(contacts, mirror), rig)
+        gaps[name] = _gap_of(_reflected(contacts, mirror), rig)
         if gaps[name] < EXACT:
             break
     return gaps
-
-
-def _reach(rig: Rig) -> float:
-    return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
 
 
 def _gap_as_recorded(contacts: Contacts, rig: Rig) -> float:
@@ -139,9 +168,17 @@ def tip_follows(recording: Recording, rig: Rig) -> bool:
     return _leads(recording, rig) > _leads(swapped(recording), rig)
 
 
-def _is_implausible(fit: OutlineFit, reach: float) -> bool:
+def _is_implausible(fit: OutlineFit, rig: Rig) -> bool:
     """Whether the correction is another slider rather than a mistake in this one's outline."""
-    return bool(np.hypot(fit.estimate[1], fit.estimate[2]) > reach or abs(fit.estimate[3]) > LARGEST_GROWTH)
+    return bool(np.hypot(*fit.estimate[[X, Y]]) > reach(rig) or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
+
+
+def _reflected(contacts: Contacts, mirror: Mirror) -> Contacts:
+    """The contacts with the slider's poses corrected; the same samples are in contact."""
+    world, velocities = to_world(contacts.tips, contacts.poses), rotate(contacts.velocities, contacts.poses[:, 2])
+    places = contacts.poses[:, :2] @ np.array([mirror.x, mirror.y]).T
+    poses = np.column_stack([places, mirror.heading * contacts.poses[:, 2]])
+    return replace(contacts, tips=to_body(world, poses), velocities=rotate(velocities, -poses[:, 2]), poses=poses)
 
 
 def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float) -> list[Finding]:
@@ -149,8 +186,8 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
     if has_mirror_symmetry(rig.outline) or len(np.unique(contacts.push)) < FEWEST_PUSHES:
         return []
     image = replace(rig, outline=mirror_image(rig.outline))
-    fit = fit_rig(contacts, image)
-    if fit.gap >= most or _is_implausible(fit, _reach(rig)):
+    fit = fit_outline(contacts, image)
+    if fit.gap >= most or _is_implausible(fit, rig):
         return []
     return [_outline_mirrored(gap, fit.gap), *outline_findings(contacts, image, fit)]
 
@@ -189,9 +226,8 @@ def _outline_mirrored(gap: float, after: float) -> Finding:
         f"{1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
     )
     advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
-    return Finding(
-        OUTLINE_MIRRORED, "warning", sentence, advice, {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    )
+    values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
+    return Finding("outline_mirrored", "warning", sentence, advice, values)
 
 
 def _unexplained(gap: float) -> Finding:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Motion of slider and tip on one time axis, and the samples in contact, found without the outline."""
+"""Motion of slider and tip on one time axis, the samples in contact, and how well these lie on the rig's outline."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.frames import rotate, to_body
+from push_predictor.recordings.checks.coverage import sides_of
+from push_predictor.recordings.dropouts import longest_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -19,6 +22,7 @@ SPAN = 0.05  # s before and after a sample that determine its speed
 MOVING = 0.003  # m/s: a faster slider moves, whatever the tracker's noise
 NOISE = 6.0  # standard deviations of the speed of a slider at rest: what is faster moves
 FEWEST = 5  # samples of each stream
+OFF = 0.001  # m from the outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,44 @@ class Motion:
     moving: BoolArray
     contact: BoolArray
     push: IntArray
+
+
+@dataclass(frozen=True)
+class ContactFit:
+    """The contacts of a recording against the outline of its rig, as given.
+
+    samples: in contact, judged by motion alone. inside, off: shares of them with the tip over OFF inside the outline,
+    or away from it. side: "side" or "quarter"; gaps: median gap (m, negative inside) on each, counter-clockwise from
+    the first vertex, None without a contact. contact_time, window_time: s in contact, and in windows; the latter None
+    where no windows were searched for.
+    """
+
+    samples: int
+    inside: float
+    off: float
+    side: str
+    gaps: tuple[float | None, ...]
+    contact_time: float
+    window_time: float | None
+
+    @property
+    def lost(self) -> float | None:
+        """Share of the time in contact that is in no window, None where no windows were searched for."""
+        if self.window_time is None:
+            return None
+        return max(0.0, 1.0 - self.window_time / self.contact_time)
+
+    def record(self) -> dict[str, object]:
+        """The entry in the JSON."""
+        return {
+            "samples": self.samples,
+            "inside_share": self.inside,
+            "off_share": self.off,
+            "gap_by_side": list(self.gaps),
+            "contact_time": self.contact_time,
+            "window_time": self.window_time,
+            "lost_share": self.lost,
+        }
 
 
 def motion_of(recording: Recording, rig: Rig) -> Motion | None:
@@ -74,6 +116,26 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
 def body_velocity(motion: Motion) -> Array:
     """Velocities (n, 2) of the tip, m/s, along the slider's axes."""
     return rotate(motion.tip_velocity, -motion.slider[:, 2])
+
+
+def contact_fit(recording: Recording, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
+    """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
+    motion = motion_of(recording, rig)
+    if motion is None or not motion.contact.any():
+        return None
+    touch = motion.contact
+    nearest = rig.outline.project(to_body(motion.tip, motion.slider)[touch])
+    gap, (index, count, side) = nearest.distance - rig.pusher_radius, sides_of(rig.outline, nearest.contact)
+    gaps = [float(np.median(gap[index == k])) if np.any(index == k) else None for k in range(count)]
+    return ContactFit(
+        samples=int(np.sum(touch)),
+        inside=float(np.mean(gap < -OFF)),
+        off=float(np.mean(gap > OFF)),
+        side=side,
+        gaps=tuple(gaps),
+        contact_time=_contact_time(motion),
+        window_time=None if table is None else float(np.sum(table.duration)),
+    )
 
 
 def _number(time: Array, contact: BoolArray) -> IntArray:
@@ -109,3 +171,11 @@ def _force(recording: Recording, origin: int, time: Array) -> Array:
     if wrench is None or len(wrench) < FEWEST:
         return np.full((len(time), 2), np.nan)
     return _at(time, _seconds(wrench.stamp, origin), np.column_stack([wrench.fx, wrench.fy]))
+
+
+def _contact_time(motion: Motion) -> float:
+    """Time (s) from samples in contact to the next ones, without dropouts."""
+    step = np.diff(motion.time)
+    period = float(np.median(step))
+    step = np.append(np.where(step > longest_interval(period), period, step), period)
+    return float(np.sum(step[motion.contact]))

@@ -92,14 +92,15 @@ def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding
 
 
 def _rig_length(rig: Rig) -> Finding | None:
-    reach = _reach(rig)
-    if max(reach, rig.pusher_radius) < LARGEST:
+    size = reach(rig)
+    if max(size, rig.pusher_radius) < LARGEST:
         return None
-    sentence = f"The rig's outline reaches {reach:.4g} m, the tip radius is {rig.pusher_radius:.4g} m: probably mm."
-    return Finding("units_rig", "refused", sentence, "Give the rig's lengths in metres.", {"reach": Value(reach, "m")})
+    sentence = f"The rig's outline reaches {size:.4g} m, the tip radius is {rig.pusher_radius:.4g} m: probably mm."
+    return Finding("units_rig", "refused", sentence, "Give the rig's lengths in metres.", {"reach": Value(size, "m")})
 
 
-def _reach(rig: Rig) -> float:
+def reach(rig: Rig) -> float:
+    """Distance (m) of the outline's farthest vertex from the origin."""
     return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
 
 
@@ -139,7 +140,7 @@ def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
     ]
     step = np.diff(pose, axis=0)
     turn, path = float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
-    if turn * _reach(rig) <= OUTRUN * max(path, TRAVEL):
+    if turn * reach(rig) <= OUTRUN * max(path, TRAVEL):
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
     return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})

@@ -3,7 +3,7 @@
 
 """Import other formats as recordings and push tables, with a report of every repair and assumption.
 
-Import `import_source`; each format has a module or folder.
+Import `import_source`; each format has a module.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.recordings.importers.mcube.pushes import import_mcube
-from push_predictor.recordings.importers.mit.pushes import import_mit
-from push_predictor.recordings.importers.mit.square_windows import import_mit_square
-from push_predictor.recordings.importers.mlab.push_logs import import_mlab
-from push_predictor.recordings.importers.report import ImportReport
+from push_predictor.recordings.importers.mcube import import_mcube
+from push_predictor.recordings.importers.mit import import_mit
+from push_predictor.recordings.importers.mit_square import import_mit_square
+from push_predictor.recordings.importers.mlab import import_mlab
 from push_predictor.recordings.importers.rosbag1 import import_rosbag1
-from push_predictor.recordings.importers.staging import Staging, staged
+from push_predictor.recordings.importers.staging import ImportReport, Staging, staged
 from push_predictor.recordings.rig import Rig
 from push_predictor.watch import Watch, no_watch
 

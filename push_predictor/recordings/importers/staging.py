@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write the results of an import together; after a failure none is left."""
+"""The report of an import, and its results: all are written together, after a failure none is left."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.bag.writer import check_replaceable, replace_folder
-from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
@@ -25,6 +25,51 @@ from push_predictor.recordings.write import write_recording
 from push_predictor.watch import Watch, no_watch, watched
 
 T = TypeVar("T")
+
+
+@dataclass
+class Notes:
+    """Sentences collected while files are read; each names the file, and the line or count."""
+
+    dropped: list[str] = field(default_factory=list)
+    repaired: list[str] = field(default_factory=list)
+    assumed: list[str] = field(default_factory=list)
+
+    def assume(self, sentence: str) -> None:
+        """Add an assumption once, even if several files share it."""
+        if sentence not in self.assumed:
+            self.assumed.append(sentence)
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The result of an import.
+
+    recordings: number of recordings written. pushes: number of pushes known from the format: the rows of a table, one
+    for a file with one push, none for a continuous bag, whose windows must be found first.
+    """
+
+    kind: str
+    written: tuple[Path, ...]
+    recordings: int
+    pushes: int
+    dropped: tuple[str, ...] = ()
+    repaired: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, object]:
+        """The report as JSON values."""
+        return {**asdict(self), "written": [str(path) for path in self.written]}
+
+    def __str__(self) -> str:
+        head = f"import {self.kind}: {self.recordings} recordings, {self.pushes} pushes"
+        parts = [("written", [str(path) for path in self.written])]
+        parts += [(name, list(getattr(self, name))) for name in ("dropped", "repaired", "assumed")]
+        return "\n".join([head, *(line for name, items in parts for line in _listed(name, items))])
+
+
+def _listed(name: str, items: list[str]) -> list[str]:
+    return [f"{name}:", *(f"  - {item}" for item in items)] if items else [f"{name}: nothing"]
 
 
 class Staging:
@@ -97,6 +142,23 @@ def _move(made: Path, target: Path) -> None:
         replace_folder(target, made)
     else:
         os.replace(made, target)
+
+
+def sources_in(sources: Sequence[Path], *patterns: str) -> list[Path]:
+    """The files that were given, and those in given folders (recursive) whose names match a pattern.
+
+    Raises ImportSourceError for what does not exist, and for a folder without such a file.
+    """
+    found = []
+    for source in sources:
+        wanted = f"a file or a folder that contains {' or '.join(patterns)}"
+        if not source.exists():
+            raise ImportSourceError(f"{source}: does not exist, give {wanted}")
+        inside = [path for pattern in patterns for path in source.rglob(pattern)] if source.is_dir() else [source]
+        if not inside:
+            raise ImportSourceError(f"{source}: contains no {' or '.join(patterns)}")
+        found += sorted(inside)
+    return found
 
 
 def safe_name(text: str) -> str:

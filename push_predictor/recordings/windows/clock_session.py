@@ -12,12 +12,14 @@ import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
-from push_predictor.recordings.windows.cut import Interval, SensorTracks, cut_window
-from push_predictor.recordings.windows.push_segmenter import PushSegmenter
+from push_predictor.recordings.windows.cut import cut_window
+from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.recordings.windows.stamp_order import ISOLATION
 from push_predictor.recordings.windows.track import Track
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 LONGEST_LAG = 30.0  # s; the other streams proceed without a stream that lags more
 HISTORY = 1.0  # s of samples kept before the last evaluated one
@@ -139,8 +141,7 @@ class ClockSession:
         push = self._segmenter.push
         if push is None or self._origin is None or self._first is None:
             return []
-        tracks = SensorTracks(self.tracks["slider"], self.tracks["pusher"], self._wrench())
-        window = cut_window(self._rig, tracks, Interval(start, end, self._origin), push, self._slid)
+        window = cut_window(self._rig, self.tracks, start, end, self._origin, push, self._slid)
         if not isinstance(window, PushWindow):
             self._counts[window] += 1
             return []
@@ -157,3 +158,24 @@ class ClockSession:
             needed = min(evaluated, (start - self._origin) * 1e-9)
         for track in self.tracks.values():
             track.forget_before(needed - HISTORY)
+
+
+def free_motion(rig: Rig, slider: PoseStream, pusher: PoseStream, stamp: IntArray) -> BoolArray:
+    """Whether the tip touches nothing at the slider samples before and after each stamp (n,) in ns.
+
+    By the rule of the window finder: the tip is lifted, or away from the outline. A stamp in a dropout of a pose, or
+    after the clock was set back, is not free.
+    """
+    session = ClockSession(rig, WindowOptions())
+    session.extend("pusher", pusher.stamp, np.column_stack([pusher.x, pusher.y, pusher.z]), final=True)
+    session.extend("slider", slider.stamp, np.column_stack([slider.x, slider.y, slider.z, slider.heading]), final=True)
+    track, tip = session.tracks["slider"], session.tracks["pusher"]
+    if not all(len(each) and each.period_known(final=True) for each in (track, tip)):
+        return np.zeros(len(stamp), dtype=np.bool_)
+    samples = list(contact_samples(rig, track, tip, None, 0, len(track)))
+    free = np.array([touches_nothing(sample, WindowOptions()) and not sample.in_break for sample in samples])
+    joined = ~np.array([sample.after_break for sample in samples])
+    after = np.searchsorted(track.stamp, stamp)
+    within = (after > 0) & (after < len(track)) & (np.maximum.accumulate(stamp) - stamp < ISOLATION)
+    after = np.clip(after, 1, len(track) - 1)
+    return np.asarray(within & free[after - 1] & free[after] & joined[after])

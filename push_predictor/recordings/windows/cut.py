@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,37 +22,6 @@ from push_predictor.types import Array
 ENTERED, ENTERED_SHARE = 0.0005, 0.5  # m, share of the tip's displacement: a tip this much deeper enters the outline
 OUTRAN, OUTRAN_SHARE = 0.002, 1.25  # m, share of the tip's displacement: a slider this much farther is not pushed
 FIT_SAMPLES = 4  # or this many samples, where those take longer
-
-
-@dataclass(frozen=True, eq=False)
-class PusherMotion:
-    """The pusher at a window's start: position (2,) m and velocity (2,) m/s."""
-
-    position: Array
-    velocity: Array
-
-
-@dataclass(frozen=True, eq=False)
-class SensorTracks:
-    """The tracks of the sensors; wrench is None without a force sensor."""
-
-    slider: Track
-    pusher: Track
-    wrench: Track | None
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A window's start and end, ns; origin: stamp (ns) from which the tracks count their time."""
-
-    start: int
-    end: int
-    origin: int
-
-    @property
-    def seconds(self) -> Array:
-        """Start and end (2,) in the time of the tracks, s."""
-        return np.array([(self.start - self.origin) * NANOSECOND, (self.end - self.origin) * NANOSECOND])
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,50 +57,53 @@ class _Command:
     speed: float
 
 
-def cut_window(rig: Rig, tracks: SensorTracks, interval: Interval, push: PushContext, slid: float) -> PushWindow | str:
-    """Cut a window, or return the fault (a key of stream_faults.FAULTS) for which it is rejected.
+def cut_window(
+    rig: Rig, tracks: Mapping[str, Track], start: int, end: int, origin: int, push: PushContext, slid: float
+) -> PushWindow | str:
+    """Cut a window from start to end (ns), or return the fault (a key of FAULTS) for which it is rejected.
 
-    slid: distance (m) that the slider has been pushed so far.
+    tracks: by sensor; that of the wrench may be empty. origin: stamp (ns) from which they count their time. slid:
+    distance (m) that the slider has been pushed so far.
     """
-    times = interval.seconds
-    poses = tracks.slider.at(times)[:, [0, 1, 3]]
+    times, pusher = np.array([start - origin, end - origin]) * NANOSECOND, tracks["pusher"]
+    poses = tracks["slider"].at(times)[:, [0, 1, 3]]
     pose, pose_after = poses
-    command = _command(rig, pusher_motion(tracks.pusher, float(times[0])), pose, push.last_edge)
+    command = _command(rig, *pusher_motion(pusher, float(times[0])), pose, push.last_edge)
     if not (abs(command.angle) < np.pi / 2.0 and command.speed > 0.0):
         return "not_a_push"
-    if fault := _motion_fault(rig, poses, tracks.pusher.at(times)[:, :2]):
+    if fault := _motion_fault(rig, poses, pusher.at(times)[:, :2]):
         return fault
     moved = rotate(pose_after[:2] - pose[:2], np.array(-command.heading))
     return PushWindow(
         push_id=push.push_id,
         index=push.window_index,
-        start=interval.start,
-        end=interval.end,
+        start=start,
+        end=end,
         velocity=command.speed,
         contact=command.contact,
         angle=command.angle,
-        duration=(interval.end - interval.start) * NANOSECOND,
+        duration=(end - start) * NANOSECOND,
         displacement=np.array([moved[0], moved[1], pose_after[2] - pose[2]]),
         slider_start=pose,
         slider_end=pose_after,
         push_heading=command.heading,
         covariates={
             "slid_distance": slid,
-            **_conditions(command, pose, interval.start, push),
-            **_forces(tracks.wrench, times, push.tare, command.normal),
+            **_conditions(command, pose, start, push),
+            **_forces(tracks["wrench"], times, push.tare, command.normal),
         },
     )
 
 
-def _command(rig: Rig, pusher: PusherMotion, pose: Array, last_edge: int | None) -> _Command:
-    """The command of a pusher at a slider with the given pose (3,)."""
-    touch = rig.outline.project(to_body(pusher.position, pose)[None])
+def _command(rig: Rig, position: Array, velocity: Array, pose: Array, last_edge: int | None) -> _Command:
+    """The command of a pusher at (2,) m with a velocity (2,) m/s, at a slider with the given pose (3,)."""
+    touch = rig.outline.project(to_body(position, pose)[None])
     edge, contact = contact_at(rig.outline, touch, last_edge)
     normal = rotate(rig.outline.inward_normal(np.array([contact]))[0], pose[2])
-    heading = float(np.arctan2(pusher.velocity[1], pusher.velocity[0]))
+    heading = float(np.arctan2(velocity[1], velocity[0]))
     angle = float(wrap_angle(np.array(heading - np.arctan2(normal[1], normal[0]))))
     gap = float(touch.distance[0] - rig.pusher_radius)
-    return _Command(edge, contact, gap, normal, heading, angle, float(np.hypot(*pusher.velocity)))
+    return _Command(edge, contact, gap, normal, heading, angle, float(np.hypot(*velocity)))
 
 
 def _motion_fault(rig: Rig, poses: Array, tips: Array) -> str:
@@ -157,14 +130,14 @@ def _conditions(command: _Command, pose: Array, start: int, push: PushContext) -
     }
 
 
-def pusher_motion(pusher: Track, begin: float) -> PusherMotion:
-    """Least-squares line through the pusher's first samples of a window that begins at `begin` (s)."""
+def pusher_motion(pusher: Track, begin: float) -> tuple[Array, Array]:
+    """Position (2,) m and velocity (2,) m/s at `begin` (s), by a least-squares line through the first samples."""
     first = int(np.searchsorted(pusher.time, begin))
     last = max(int(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right")), first + FIT_SAMPLES)
     time = pusher.time[first:last] - begin
     design = np.column_stack([np.ones_like(time), time])
     solution = np.linalg.lstsq(design, pusher.values[first:last, :2], rcond=None)[0]
-    return PusherMotion(solution[0], solution[1])
+    return solution[0], solution[1]
 
 
 def contact_at(outline: Outline, touch: Projection, last_edge: int | None) -> tuple[int, float]:
@@ -186,13 +159,11 @@ def _facing(outline: Outline, normal: Array, before: int, after: int) -> int:
     return (before, after)[int(np.argmin(outline.inward_normal(middles) @ normal))]
 
 
-def _forces(wrench: Track | None, times: Array, tare: Array | None, normal: Array) -> dict[str, float]:
+def _forces(wrench: Track, times: Array, tare: Array | None, normal: Array) -> dict[str, float]:
     """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left.
 
     tare: what the sensor reads without contact (2,); it is subtracted, and kept to judge the sensor's bias.
     """
-    if wrench is None:
-        return {}
     zero = {} if tare is None else {"free_force_x": float(tare[0]), "free_force_y": float(tare[1])}
     begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
     if begin >= end:

@@ -22,12 +22,11 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTracks
+from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
+from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray
 
 SENSORS = ("slider", "pusher", "wrench")
-STREAM_FAULTS = ("repeated", "late", "ahead", "not_finite", "jumps", "dropouts", "refused", "resets", "clock_set_back")
-WINDOW_FAULTS = ("not_a_push", "inside", "left_behind", "outran")
 
 
 def find_windows(recording: Recording, rig: Rig, options: WindowOptions | None = None) -> list[PushWindow]:
@@ -47,7 +46,7 @@ class WindowFinder:
         self._earlier_contact = (0, 0)  # of earlier sessions
         self._session = ClockSession(rig, self.options)
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
-        self._scalars = ScalarTracks()
+        self._scalars: dict[str, ScalarTrack] = {}  # by topic
         self._waiting: list[PushWindow] = []  # windows that wait for their scalars
         self._ready: list[PushWindow] = []
 
@@ -55,10 +54,8 @@ class WindowFinder:
     def counts(self) -> dict[str, int]:
         """Number of faults by kind so far."""
         found = self._counts + self._session.counts
-        found["refused"] += self._scalars.discarded
-        return {kind: found[kind] for kind in (*STREAM_FAULTS, *WINDOW_FAULTS)} | {
-            k: n for k, n in sorted(found.items()) if " " in k
-        }
+        found["refused"] += sum(track.discarded for track in self._scalars.values())
+        return {kind: found[kind] for kind in FAULTS} | {k: n for k, n in sorted(found.items()) if " " in k}
 
     @property
     def stamp_jitter(self) -> dict[str, float]:
@@ -99,7 +96,7 @@ class WindowFinder:
         An empty stream announces a topic. A window waits until every topic has passed its start, for at most
         LONGEST_GAP in the time of the other streams. A topic without a value by then gives the window no covariate.
         """
-        self._scalars.add(name, stream)
+        self._scalars.setdefault(name, ScalarTrack()).add(stream)
 
     def take_ready(self) -> list[PushWindow]:
         """The windows that have become complete since the last call."""
@@ -119,8 +116,8 @@ class WindowFinder:
         while self._postponed:
             self._add_postponed()
             self._end_session()
-        self._counts["refused"] += self._scalars.discarded
-        self._scalars = ScalarTracks()
+        self._counts["refused"] += sum(track.discarded for track in self._scalars.values())
+        self._scalars = {}
         return self._taken()
 
     # --- arriving samples ---------------------------------------------------------------------------------------
@@ -181,7 +178,8 @@ class WindowFinder:
         """Find windows as far as all streams are known."""
         self._waiting += self._session.find(final)
         needed = self._session.needed
-        self._scalars.forget_before(min(needed, self._waiting[0].start) if self._waiting else needed)
+        for track in self._scalars.values():
+            track.forget_before(min(needed, self._waiting[0].start) if self._waiting else needed)
 
     def _release(self, final: bool) -> None:
         """Complete the windows whose scalars are known, in order; with `final` all windows."""
@@ -192,10 +190,12 @@ class WindowFinder:
 
     def _waits(self, window: PushWindow) -> bool:
         late = self._session.newest - window.start > LONGEST_GAP
-        return not late and not self._scalars.known_at(window.start)
+        return not late and not all(track.known_at(window.start) for track in self._scalars.values())
 
     def _with_scalars(self, window: PushWindow) -> PushWindow:
-        return replace(window, covariates={**window.covariates, **self._scalars.covariates_at(window.start)})
+        values = {f"topic:{name}": track.at(window.start) for name, track in self._scalars.items()}
+        known = {name: value for name, value in values.items() if value is not None}
+        return replace(window, covariates={**window.covariates, **known})
 
     def _taken(self) -> list[PushWindow]:
         ready, self._ready = self._ready, []

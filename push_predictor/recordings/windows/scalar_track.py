@@ -59,33 +59,3 @@ class ScalarTrack:
         """Remove the samples before a time (ns), except the last of them."""
         keep = max(0, int(np.searchsorted(self._stamp, stamp, side="right")) - 1)
         self._stamp, self._value = self._stamp[keep:], self._value[keep:]
-
-
-class ScalarTracks:
-    """The tracks of all scalar topics, by topic name."""
-
-    def __init__(self) -> None:
-        self._tracks: dict[str, ScalarTrack] = {}
-
-    @property
-    def discarded(self) -> int:
-        """Number of discarded samples of all topics."""
-        return sum(track.discarded for track in self._tracks.values())
-
-    def add(self, name: str, stream: ScalarStream) -> None:
-        """Append samples of a topic; an empty stream announces the topic."""
-        self._tracks.setdefault(name, ScalarTrack()).add(stream)
-
-    def known_at(self, stamp: int) -> bool:
-        """Whether the values of all topics at a time (ns) are final."""
-        return all(track.known_at(stamp) for track in self._tracks.values())
-
-    def covariates_at(self, stamp: int) -> dict[str, float]:
-        """{topic:NAME: value} at a time (ns), for the topics that have samples."""
-        values = {f"topic:{name}": track.at(stamp) for name, track in self._tracks.items()}
-        return {name: value for name, value in values.items() if value is not None}
-
-    def forget_before(self, stamp: int) -> None:
-        """Remove the samples before a time (ns), except the last of each topic."""
-        for track in self._tracks.values():
-            track.forget_before(stamp)

@@ -10,11 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.recordings.importers.mit.listing import MitPush, straight_pushes
-from push_predictor.recordings.importers.mit.pushes import read_mit
-from push_predictor.recordings.importers.mit.source import MitPlace, paths_in, read_places
-from push_predictor.recordings.importers.mit.square_windows import read_mit_square, square_rig
-from push_predictor.recordings.importers.report import ImportReport, Notes
+from push_predictor.recordings.importers.mit import MitPlace, MitPush, paths_in, read_mit, read_places, straight_pushes
+from push_predictor.recordings.importers.mit_square import read_mit_square, square_rig
+from push_predictor.recordings.importers.staging import ImportReport, Notes
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.table import PushTable, concatenate

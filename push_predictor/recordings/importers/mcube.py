@@ -1,27 +1,29 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Import of the MCube lab's preliminary pushes, one recording for each run.
+"""Import of the MCube lab's preliminary pushes (August 2015), one recording for each run.
 
-The files are metal_K_{obj,ft,tcp}.txt with one number per line.
+The files are metal_K_{obj,ft,tcp}.txt with one number per line. obj: blocks of time (ns), x, y, z (m), qx, qy, qz in
+Vicon's world. ft: time, fx, fy (N) of the sensor. tcp: time, x, y (m) of the tip in the robot's base.
 
-obj: blocks of time (ns), x, y, z (m), qx, qy, qz in Vicon's world. ft: time, fx, fy (N) of the sensor.
-tcp: time, x, y (m) of the tip in the robot's base.
+The two metal blocks and their frames: values that the files lack were fitted to the contact. While the pusher touches a
+side, the distance of its centre from the block's centre line is half side + pusher radius. test_measured_importers
+repeats the fit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
+from push_predictor.geometry.shapes import square
 from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_repeats
-from push_predictor.recordings.importers.mcube.rig import CLOCK, FORCE, HEIGHT, TIP_LATE, Block, block_of
-from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import Staging, safe_name
+from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name, sources_in
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.types import Array
@@ -33,12 +35,28 @@ STOPS_EARLY = 1_000_000_000  # ns
 NEAR_HALF_TURN = 0.05  # |qw| below which the lost sign of qw may change
 IN_TOUCH = 0.002  # m
 TREND = 8  # samples that predict the next heading
+PUSHER_RADIUS = 0.004745  # m
+THICKNESS = 0.0132  # m; that of the MIT set's steel square, 0.837 kg on 0.09 m x 0.09 m
+TIP_LATE = 15_000_000  # ns; see CLOCK
+CLOCK = (
+    "clock: tip stamps are 15 ms late relative to the tracker's and were corrected. A delay test without repeated rows "
+    "gives 15.0 ms (rms 0.17 mm). With the repeated rows, which are 12 ms old, it gives 20 to 21 ms. Tracker and force "
+    "share a clock"
+)
+FORCE = (
+    "force: the sensor points down, so world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag. Axes "
+    "fitted to the contact normals of each block agree within 3 degrees. It is the force of the slider on the pusher, "
+    "tared by its mean before the tip first moves"
+)
+HEIGHT = "height: tip and slider are at 0 where the files contain no height of the tip"
 
 
 def import_mcube(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """One recording FOLDER_RUN for each run in folders (recursive) or named by its *_obj.txt."""
     notes = Notes()
-    for path in staging.in_turn(_runs(sources)):
+    for path in staging.in_turn(sources_in(sources, "*_obj.txt")):
+        if not path.name.endswith("_obj.txt"):
+            raise ImportSourceError(f"{path}: give a folder, or NAME_obj.txt next to NAME_ft.txt and NAME_tcp.txt")
         staging.recording(read_mcube(path, rig, notes), pushes=1)
     return staging.report("mcube", notes)
 
@@ -175,11 +193,68 @@ def _number(path: Path, line: int, word: str, kind: type[int] | type[float]) -> 
         raise ImportSourceError(f"{path}:{line}: {word[:40]!r}, expected {wanted}") from None
 
 
-def _runs(sources: Sequence[Path]) -> list[Path]:
-    found = []
-    for source in sources:
-        inside = sorted(source.rglob("*_obj.txt")) if source.is_dir() else [source]
-        if not inside or not inside[0].name.endswith("_obj.txt") or not inside[0].exists():
-            raise ImportSourceError(f"{source}: give a folder that contains NAME_obj.txt, NAME_ft.txt, NAME_tcp.txt")
-        found += inside
-    return found
+@dataclass(frozen=True)
+class Block:
+    """One of the blocks.
+
+    half_side m; density kg/m^3; base: Vicon's origin in the robot's base (x, y) m; centre: the block's centre in the
+    tracker's body frame (x, y) m; days: Unix seconds of the sessions.
+    """
+
+    name: str
+    half_side: float
+    density: float
+    base: tuple[float, float]
+    centre: tuple[float, float]
+    days: tuple[float, float]
+
+    @property
+    def rig(self) -> Rig:
+        """The square block; its mass follows from density, measured side and the assumed thickness."""
+        mass = self.density * 4.0 * self.half_side**2 * THICKNESS
+        return Rig(f"{self.name}_block", square(2.0 * self.half_side), PUSHER_RADIUS, "unknown", round(mass, 3))
+
+    @property
+    def assumed_rig(self) -> str:
+        """The assumptions about the block."""
+        rig = self.rig
+        return (
+            f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from the distance of tip and centre in "
+            f"contact. Mass {rig.object_mass} kg, not measured: from density {self.density:.0f} kg/m3 and thickness "
+            f"{THICKNESS * 1e3:.1f} mm, that of the MIT set's square; surface unknown"
+        )
+
+    @property
+    def assumed_frames(self) -> str:
+        """The assumptions about the frames."""
+        (bx, by), (cx, cy) = self.base, self.centre
+        source = (
+            "from the recorded transforms"
+            if self.base == RECORDED_BASE
+            else "fitted to the contacts; the recorded one is 10 mm off"
+        )
+        return (
+            f"{self.name}: the world frame is Vicon's. Its origin in the frame of the robot's base is "
+            f"({bx:.4f}, {by:.4f}) m ({source}). The block's centre in the tracked body is "
+            f"({1e3 * cx:.2f}, {1e3 * cy:.2f}) mm"
+        )
+
+
+RECORDED_BASE = (0.3958, 0.0019)  # from /tf of the bag
+STEEL = Block("steel", 0.0489, 7850.0, RECORDED_BASE, (0.0, 0.0), (1439424000.0, 1439596800.0))
+ALUMINIUM = Block("aluminium", 0.0496, 2700.0, (0.3906, -0.0064), (0.00085, 0.0016), (1438560000.0, 1438732800.0))
+FOLDERS = {"St": STEEL, "Al": ALUMINIUM}
+
+
+def block_of(path: Path, stamp: int) -> Block:
+    """The block of a file by its folder (St_..., Al_...), else by the day (ns). Raises ImportSourceError."""
+    for prefix, block in FOLDERS.items():
+        if path.resolve().parent.name.startswith(f"{prefix}_"):
+            return block
+    for block in FOLDERS.values():
+        if block.days[0] <= stamp / 1e9 < block.days[1]:
+            return block
+    raise ImportSourceError(
+        f"{path}: neither folder nor first stamp {stamp} ns identifies the block, name the folder St_... (steel) or "
+        "Al_... (aluminium)"
+    )

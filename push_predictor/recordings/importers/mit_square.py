@@ -8,9 +8,6 @@ The source has contact c on one side (0..1), dy positive to the right of the pus
 
 from __future__ import annotations
 
-import csv
-import gzip
-import io
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -18,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from push_predictor.errors import ImportSourceError
+from push_predictor.errors import ImportSourceError, TableError
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.recordings.importers.mit.pushes import MASSES, PUSHER_RADIUS
-from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import Staging, safe_name
+from push_predictor.geometry.shapes import MASSES, shape_outline
+from push_predictor.recordings.importers.mit import PUSHER_RADIUS
+from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import finite_column, read_cells
 from push_predictor.types import Array
 
 VELOCITY = 0.02  # m/s
@@ -62,8 +59,6 @@ def square_rig() -> Rig:
 def read_mit_square(source: Path, outline: Outline) -> PushTable:
     """The rows as a push table, with row_id as a covariate."""
     columns = _columns(source)
-    for name, column in columns.items():
-        _check_finite(column, name, source)
     c = columns["c"]
     if np.any(bad := (c < 0.0) | (c > 1.0)):
         row = int(np.argmax(bad))
@@ -91,50 +86,24 @@ def _columns(source: Path) -> dict[str, Array]:
 def _npz_columns(source: Path) -> dict[str, Array]:
     try:
         with np.load(source, allow_pickle=False) as arrays:
-            _require(COLUMNS, list(arrays), source)
+            if missing := [name for name in COLUMNS if name not in arrays]:
+                raise ImportSourceError(f"{source}: lacks {', '.join(missing)}; it contains {', '.join(arrays)[:200]}")
             columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in COLUMNS}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise ImportSourceError(f"{source}: the npz file cannot be read ({error})") from None
     for name, column in columns.items():
         if column.shape != columns["c"].shape or column.ndim != 1:
             raise ImportSourceError(f"{source}: {name} has shape {column.shape}, c has {columns['c'].shape}")
+        if np.any(bad := ~np.isfinite(column)):
+            row = int(np.argmax(bad))
+            raise ImportSourceError(f"{source}: {name}[{row}] is {float(column[row])!r}, give a finite number")
     return columns
 
 
 def _csv_columns(source: Path) -> dict[str, Array]:
-    names = [CSV_NAMES.get(name, name) for name in COLUMNS]
-    rows = csv.DictReader(io.StringIO(_text(source), newline=""))
-    _require(names, list(rows.fieldnames or ()), source)
-    values = [_numbers(row, names, f"{source}:{rows.line_num}") for row in rows]
-    return dict(zip(COLUMNS, np.array(values, dtype=np.float64).reshape(-1, len(names)).T, strict=True))
-
-
-def _text(source: Path) -> str:
+    names = {name: CSV_NAMES.get(name, name) for name in COLUMNS}
     try:
-        data = source.read_bytes()
-        return (gzip.decompress(data) if source.suffix == ".gz" else data).decode("utf-8")
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise ImportSourceError(f"{source}: cannot be read ({error})") from None
-
-
-def _numbers(row: dict[str, str], names: list[str], where: str) -> list[float]:
-    values = []
-    for name in names:
-        try:
-            values.append(float(row[name]))
-        except (TypeError, ValueError):
-            raise ImportSourceError(f"{where}: {name} is {row[name]!r}, give a number") from None
-    return values
-
-
-def _require(wanted: Sequence[str], found: Sequence[str], source: Path) -> None:
-    if missing := [name for name in wanted if name not in found]:
-        raise ImportSourceError(
-            f"{source}: lacks {', '.join(missing)}; it contains {', '.join(found)[:200] or 'nothing'}"
-        )
-
-
-def _check_finite(column: Array, name: str, source: Path) -> None:
-    if np.any(bad := ~np.isfinite(column)):
-        row = int(np.argmax(bad))
-        raise ImportSourceError(f"{source}: {name}[{row}] is {float(column[row])!r}, give a finite number")
+        cells, lines = read_cells(source, list(names.values()))
+        return {name: finite_column(source, column, cells[column], lines) for name, column in names.items()}
+    except TableError as error:
+        raise ImportSourceError(str(error)) from None

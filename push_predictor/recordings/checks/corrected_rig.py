@@ -14,8 +14,8 @@ from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import mirror_image, transformed, transformed_points
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.outline.causes import LARGEST_SIZE_CHANGE, LARGEST_TIP_CHANGE, LENGTH_ALLOWANCE
-from push_predictor.recordings.checks.outline.mirrors import MIRRORS
+from push_predictor.recordings.checks.frames import MIRRORS
+from push_predictor.recordings.checks.outline_findings import LARGEST_SIZE_CHANGE, LARGEST_TIP_CHANGE, LENGTH_ALLOWANCE
 from push_predictor.recordings.rig import Rig
 
 CORRECTED = ("outline_mirrored", "outline_turned", "outline_shifted", "outline_size", "tip_radius")
@@ -26,10 +26,13 @@ PREVENTS = (*MIRRORS, "outline_unchecked", "outline_misfit", "outline_shape")
 def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
     """The rig whose outline and tip radius are those that the findings of `check_recording` estimate.
 
-    Support points move with the outline. Other findings, such as mirrored frames and a clock lag, are faults of the
-    recording: they change nothing here. Without a finding, the rig is the same. Raises RigError for a size or a tip's
-    radius that no mistake of measurement explains.
+    Support points move with the outline. A clock lag and world frames apart are faults of the recording: they change
+    nothing here. Without a finding, the rig is the same. Raises RigError that names the findings with which nothing can
+    be corrected, or for a size or a tip's radius that no mistake of measurement explains.
     """
+    if prevents := [each for each in findings if each.severity == "refused" or each.name in PREVENTS]:
+        names, sentences = ", ".join(each.name for each in prevents), " ".join(each.sentence for each in prevents)
+        raise RigError(f"no rig can be estimated ({names}): {sentences}")
     found = {finding.name: finding.values for finding in findings if finding.name in CORRECTED}
     if not found:
         return rig
@@ -75,8 +78,3 @@ def _centring(outline: Outline, x: float, y: float) -> tuple[float, float]:
 def _mirrored(rig: Rig) -> Rig:
     points = None if rig.support_points is None else rig.support_points * [1.0, -1.0, 1.0]
     return replace(rig, outline=mirror_image(rig.outline), support_points=points)
-
-
-def prevents_correction(findings: Sequence[Finding]) -> list[str]:
-    """Names of findings with which no rig can be estimated: they must be corrected in the recording first."""
-    return [finding.name for finding in findings if finding.severity == "refused" or finding.name in PREVENTS]

@@ -1,42 +1,49 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Findings on the outline's pose, size and shape, on the tip's radius, the frames and the clocks, from the fits."""
+"""Findings on the outline's pose, size and shape, on the tip's radius, the frames and the clocks, from the fits.
+
+A corrected outline alone may explain the contacts, or a wrong tip, world frames apart, or other proportions. Each of
+these causes is a further parameter of the fit, named only where it explains clearly more, by a plausible amount.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.outline.causes import (
-    DOUBT,
-    LAG_ALLOWANCE,
-    LENGTH_ALLOWANCE,
-    Cause,
-    cause_of,
-    half_size,
-    is_resized,
-    is_shifted,
-    is_turned,
-)
-from push_predictor.recordings.checks.outline.fit import TIE, OutlineFit, fit_outline, fit_tip
-from push_predictor.recordings.checks.outline.touches import (
+from push_predictor.recordings.checks.outline_fit import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
     LAG,
     SIZE,
     STRETCH,
+    TIE,
     TIP,
     YAW,
     Contacts,
+    OutlineFit,
     X,
     Y,
+    fit_frames,
+    refit,
 )
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array
 
+Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "proportions"]
+DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
+LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
+SEPARATE = 0.0002  # m; sd of size and tip radius, fitted together, above which the contacts do not separate them
+FINE = 0.0001  # m; a spread of the pushes below it leaves nothing to explain
+LARGEST_TIP_CHANGE = 0.55  # relative; a diameter given as the radius is a change of 0.5
+LARGEST_SIZE_CHANGE = 0.1  # relative
+RIGHT_ANGLE = 1e-6  # cosine
 FEWEST_PUSHES = 8  # for five parameters: with fewer, the spread between pushes gives no standard deviation
 SHARE_OFF = 0.05  # of the pushes: if more lie off the corrected outline, its shape is wrong
 NOISY = 3.0 * 1.48  # three standard deviations of the pushes, in median absolute gaps
@@ -50,19 +57,17 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
         return [unchecked(fit.pushes)]
     cause = cause_of(contacts, rig, fit)
     found = [_frames_apart(cause.fit)] if cause.name == "frames_apart" else []
-    found += _pose_findings(cause.fit, rig)
+    if _is_turned(cause.fit):
+        found.append(_turned(value_of(cause.fit, YAW, "rad")))
+    if _is_shifted(cause.fit):
+        found.append(_shifted(cause.fit, rig))
     if cause.name == "proportions":
         found.append(_proportions(cause.fit, rig))
-    elif is_resized(cause.fit, rig):
+    elif _is_resized(cause.fit, rig):
         found.append(_size(contacts, rig, cause))
     if cause.name == "tip_radius":
         found.append(_tip(cause, rig))
     return [*found, *_clock_findings(cause.fit), *_shape_findings(cause.fit, rig)]
-
-
-def fit_rig(contacts: Contacts, rig: Rig) -> OutlineFit:
-    """The correction of the rig's outline that fits the contacts."""
-    return fit_outline(rig.outline, rig.pusher_radius, contacts)
 
 
 def value_of(fit: OutlineFit, parameter: int, unit: str, offset: float = 0.0) -> Value:
@@ -78,30 +83,23 @@ def unchecked(pushes: int) -> Finding:
     return Finding("outline_unchecked", "note", sentence, advice, {"pushes": Value(pushes, "1")})
 
 
-def _pose_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
-    found = [_turned(value_of(fit, YAW, "rad"))] if is_turned(fit) else []
-    if is_shifted(fit):
-        found.append(_shifted(value_of(fit, X, "m"), value_of(fit, Y, "m"), rig, one_side=fit.sd[SIZE] == 0.0))
-    return found
-
-
 def _turned(yaw: Value) -> Finding:
     degrees, sd = np.degrees(yaw.value), np.degrees(yaw.sd or 0.0)
     sentence = f"The slider is turned by {degrees:.1f} degrees (sd {sd:.1g}) against its outline."
-    advice = f"Turn the outline in the rig by {degrees:.1f} degrees: `check --rig-out` writes that rig."
+    advice = f"Turn the outline in the rig by {degrees:.1f} degrees: `rig --from` writes that rig."
     return Finding("outline_turned", "warning", sentence, advice, {"yaw": yaw})
 
 
-def _shifted(x: Value, y: Value, rig: Rig, one_side: bool) -> Finding:
-    given = 1e3 * rig.outline.centroid
+def _shifted(fit: OutlineFit, rig: Rig) -> Finding:
+    x, y, given = value_of(fit, X, "m"), value_of(fit, Y, "m"), 1e3 * rig.outline.centroid
     centre = np.round(given + 1e3 * np.array([x.value, y.value]), 1) + 0.0  # without a negative zero
     origin = f"({given[0]:.1f}, {given[1]:.1f}) mm" if np.any(np.abs(given) > 0.05) else "its origin"
     sentence = (
         f"The slider's centre is at ({centre[0]:.1f}, {centre[1]:.1f}) mm in the tracked frame "
         f"(sd {1e3 * (x.sd or 0.0):.1g}, {1e3 * (y.sd or 0.0):.1g}), not at {origin}."
     )
-    advice = "Move the tracked frame's origin there, or the outline in the rig (`check --rig-out` writes that rig)."
-    if one_side:
+    advice = "Move the tracked frame's origin there, or the outline in the rig (`rig --from` writes that rig)."
+    if fit.sd[SIZE] == 0.0:  # the contacts are on one side
         advice += " Or the size is wrong: push other sides too, to separate the two."
     return Finding("outline_shifted", "warning", sentence, advice, {"x": x, "y": y})
 
@@ -116,7 +114,7 @@ def _size(contacts: Contacts, rig: Rig, cause: Cause) -> Finding:
     advice = f"Multiply the outline by {scale.value:.3f}"
     values = {"scale": scale}
     if cause.name != "tip_radius":
-        tip = fit_tip(rig.outline, rig.pusher_radius, contacts, cause.fit)
+        tip = refit(cause.fit, contacts, rig, TIP, without=SIZE)
         if tip.cost <= TIE * cause.fit.cost:
             radius = value_of(tip, TIP, "m", rig.pusher_radius)
             values["radius_if_size_is_right"] = radius
@@ -205,10 +203,102 @@ def _frames_apart(fit: OutlineFit) -> Finding:
 
 
 def _clock_findings(fit: OutlineFit) -> list[Finding]:
-    lag, sd = float(fit.estimate[LAG]), float(fit.sd[LAG])
-    if abs(lag) <= DOUBT * sd + LAG_ALLOWANCE:
+    if not _exceeds(fit, LAG, LAG_ALLOWANCE):
         return []
+    lag, sd = float(fit.estimate[LAG]), float(fit.sd[LAG])
     side = "late" if lag > 0.0 else "early"
     sentence = f"The slider's stamps are {1e3 * abs(lag):.0f} ms {side} (sd {1e3 * sd:.2g} ms) against the pusher's."
     advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
     return [Finding("clocks_apart", "warning", sentence, advice, {"lag": Value(lag, "s", sd)})]
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """The cause that explains the contacts, and its fit; rival: a fit of other proportions that explains as much."""
+
+    name: Name
+    fit: OutlineFit
+    rival: OutlineFit | None = None
+
+
+def cause_of(contacts: Contacts, rig: Rig, fit: OutlineFit) -> Cause:
+    """The cause of the gaps between contacts and outline, from the fit of yaw, shift, size and clock lag alone."""
+    if fit.spread < FINE and not (_is_resized(fit, rig) or _is_turned(fit) or _is_shifted(fit)):
+        return Cause("outline", fit)
+    axes = None
+    if _has_two_sizes(rig) and fit.sd[SIZE] > 0.0:
+        axes = refit(fit, contacts, rig, STRETCH)
+    known: dict[Name, OutlineFit | None] = {
+        "tip_radius": _with_tip(contacts, rig, fit),
+        "frames_apart": frames_apart(contacts, rig, fit),
+        "proportions": axes if axes is not None and _has_other_proportions(axes, rig) else None,
+    }
+    tried = {name: each for name, each in known.items() if each is not None}
+    least = min([_penalised(fit), *map(_penalised, tried.values())])
+    name = next((name for name, each in tried.items() if _penalised(each) <= TIE * least), None)
+    if name is None or (name != "tip_radius" and _penalised(fit) <= TIE * _penalised(tried[name])):
+        return Cause("outline", fit)
+    rival = axes if name == "tip_radius" and axes is not None and axes.cost <= TIE * tried[name].cost else None
+    return Cause(name, tried[name], rival)
+
+
+def frames_apart(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
+    """The fit with the world frames of slider and pusher apart, None unless they are and it explains the contacts."""
+    apart = fit_frames(fit, contacts, rig)
+    turned = _exceeds(apart, FRAME_YAW, ANGLE_ALLOWANCE)
+    shifted = any(_exceeds(apart, each, LENGTH_ALLOWANCE) for each in (FRAME_X, FRAME_Y))
+    explained = apart.spread < LENGTH_ALLOWANCE and TIE * _penalised(apart) < _penalised(fit)
+    return apart if explained and (turned or shifted) else None
+
+
+def half_size(rig: Rig) -> float:
+    """Distance from the centre to a side, m, of a regular outline with this area and perimeter."""
+    return 2.0 * rig.outline.area / rig.outline.perimeter
+
+
+def _with_tip(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
+    """With the tip's radius too, if the size is wrong, and the contacts show both, by a plausible amount."""
+    if not _is_resized(fit, rig):
+        return None
+    both = refit(fit, contacts, rig, TIP)
+    separate = both.sd[SIZE] > 0.0 and max(float(both.sd[SIZE]) * half_size(rig), float(both.sd[TIP])) < SEPARATE
+    thicker, growth = abs(both.estimate[TIP]), abs(both.estimate[SIZE])
+    plausible = thicker <= LARGEST_TIP_CHANGE * rig.pusher_radius and growth <= LARGEST_SIZE_CHANGE
+    return both if separate and plausible and _exceeds(both, TIP, LENGTH_ALLOWANCE) else None
+
+
+def _has_two_sizes(rig: Rig) -> bool:
+    """Whether the outline is an ellipse or a rectangle: its sizes along two axes may be wrong by different amounts."""
+    outline = rig.outline
+    if outline.semi_axes is not None:
+        return outline.semi_axes[0] != outline.semi_axes[1]
+    sides = np.roll(outline.vertices, -1, axis=0) - outline.vertices
+    along = np.abs(sides / np.linalg.norm(sides, axis=1, keepdims=True)).max(axis=1)
+    return len(sides) == 4 and bool(np.all(along > 1.0 - RIGHT_ANGLE))
+
+
+def _has_other_proportions(axes: OutlineFit, rig: Rig) -> bool:
+    return axes.spread < LENGTH_ALLOWANCE and _exceeds(axes, STRETCH, LENGTH_ALLOWANCE / half_size(rig))
+
+
+def _is_resized(fit: OutlineFit, rig: Rig) -> bool:
+    return _exceeds(fit, SIZE, LENGTH_ALLOWANCE / half_size(rig))
+
+
+def _is_shifted(fit: OutlineFit) -> bool:
+    return _exceeds(fit, X, LENGTH_ALLOWANCE) or _exceeds(fit, Y, LENGTH_ALLOWANCE)
+
+
+def _is_turned(fit: OutlineFit) -> bool:
+    return _exceeds(fit, YAW, ANGLE_ALLOWANCE)
+
+
+def _penalised(fit: OutlineFit) -> float:
+    """The mean gap that other pushes would have, by generalised cross-validation with pushes as observations."""
+    spare = fit.pushes - np.count_nonzero(fit.sd)
+    return fit.cost * fit.pushes / spare if spare > 0 else np.inf
+
+
+def _exceeds(fit: OutlineFit, parameter: int, allowance: float) -> bool:
+    """Whether a parameter differs from 0 beyond doubt."""
+    return bool(abs(fit.estimate[parameter]) > DOUBT * fit.sd[parameter] + allowance)

@@ -1,4 +1,0 @@
-# Copyright 2026 The push_predictor authors
-# SPDX-License-Identifier: Apache-2.0
-
-"""What `doctor` checks of the installation, and its findings."""
