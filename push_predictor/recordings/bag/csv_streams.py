@@ -17,7 +17,7 @@ from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -67,10 +67,6 @@ class CsvStreams:
         """CDR messages in order of time, of all topics or of the given ones; those of a topic in its file's order."""
         wanted = [topic for topic in self._streams if topics is None or topic in topics]
         return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics."""
-        return gathered(self.messages(topics))
 
     def _of_topic(self, topic: str) -> Iterator[RawMessage]:
         kind, stamp, data = self._streams[topic]

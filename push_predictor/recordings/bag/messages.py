@@ -45,7 +45,8 @@ class Messages:
     def of(topic: str, kind: str, times: Sequence[int] | IntArray, data: Sequence[bytes]) -> Messages:
         """The same of single messages."""
         length = np.fromiter(map(len, data), np.int64, len(data))
-        logged = times if isinstance(times, np.ndarray) else np.array([_signed(time) for time in times], np.int64)
+        # Damaged files have times of more than 63 bits.
+        logged = times if isinstance(times, np.ndarray) else np.array(times, np.uint64).astype(np.int64)
         return Messages(topic, kind, logged, b"".join(data), np.cumsum(length) - length, length)
 
     def __len__(self) -> int:
@@ -63,15 +64,15 @@ class Messages:
             yield rows, data[self.start[rows][:, None] + np.arange(length)]
 
 
-def _signed(time: int) -> int:
-    """A time of 64 bits without a sign as one with it: damaged files have any."""
-    return time if time < 2**63 else time - 2**64
-
-
 def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:
     """Single messages as portions of each topic and type."""
     waiting = iter(messages)
     while portion := list(islice(waiting, PORTION)):
-        for topic, kind in dict.fromkeys((message.topic, message.type) for message in portion):
-            own = [message for message in portion if (message.topic, message.type) == (topic, kind)]
-            yield Messages.of(topic, kind, [message.log_time for message in own], [message.data for message in own])
+        topics, kinds, times, data = zip(*portion, strict=True)
+        sources = list(zip(topics, kinds, strict=True))
+        numbers = {source: number for number, source in enumerate(dict.fromkeys(sources))}
+        of = np.fromiter(map(numbers.__getitem__, sources), np.int64, len(portion))
+        whole = Messages.of("", "", times, data)
+        for (topic, kind), number in numbers.items():
+            rows = np.flatnonzero(of == number)
+            yield Messages(topic, kind, whole.times[rows], whole.buffer, whole.start[rows], whole.length[rows])
