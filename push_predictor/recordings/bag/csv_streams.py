@@ -15,8 +15,8 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
+from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.types import Array, IntArray
 
@@ -99,7 +99,7 @@ def _streams(file: Path) -> dict[str, tuple[str, IntArray, list[bytes]]]:
             raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
         stamp, values = _numbers(file, header, rows)
         columns = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
-        layout = SCALAR_LAYOUTS[SCALAR]
+        layout = STAMPED_SCALAR_LAYOUT
         return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in columns.items()}
     topic, accepted = STREAMS[file.stem]
     if header not in accepted:

@@ -34,7 +34,7 @@ from push_predictor.recordings.bag.mcap_records import (
     read_at,
     unpack_chunk,
 )
-from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.messages import Dated, Messages, RawMessage, gathered
 
 _Bytes: TypeAlias = bytes | bytearray
 _Wanted: TypeAlias = dict[int, tuple[str, str]]  # topic and type by channel
@@ -61,7 +61,7 @@ class McapFile:
     Raises RecordingError for a file that is empty or not MCAP.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[bytes | memoryview], bytes] = bytes, name: str = "") -> None:
+    def __init__(self, path: Path, *, unpack: Callable[[_Bytes], bytes] = bytes, name: str = "") -> None:
         self.path = path
         self.topics: dict[str, str] = {}
         self.schemas: dict[str, str] = {}
@@ -88,6 +88,13 @@ class McapFile:
 
         One chunk at a time is in memory.
         """
+        return (RawMessage(*of, time, data) for of, time, data in self._read(topics))
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The same of the given topics, those of a topic and type at once."""
+        return gathered(self._read(topics))
+
+    def _read(self, topics: Collection[str] | None) -> Iterator[Dated]:
         wanted = self._wanted(topics, self._channels.values())
         seen, chunks = 0, list[int]()
         with self.path.open("rb") as stream:
@@ -103,12 +110,12 @@ class McapFile:
 
     def _messages(
         self, content: _Bytes, offset: int, topics: Collection[str] | None, wanted: _Wanted
-    ) -> Generator[RawMessage, None, int]:
+    ) -> Generator[Dated, None, int]:
         """The wanted messages among consecutive records; returns the number of all messages.
 
         The channels, schemas and metadata among the records are stored.
         """
-        view, size, at = memoryview(content), len(content), 0
+        size, at = len(content), 0
         seen, undone, unwanted = 0, 0, set[int]()
         try:
             while at + HEAD.size <= size:
@@ -123,7 +130,7 @@ class McapFile:
                     number, _, time, _ = _MESSAGE.unpack_from(content, start)
                     if number in wanted:
                         try:
-                            yield RawMessage(*wanted[number], time, self._unpack(view[start + _MESSAGE.size : end]))
+                            yield wanted[number], time, self._unpack(content[start + _MESSAGE.size : end])
                         except UNREADABLE:
                             undone += 1
                     else:

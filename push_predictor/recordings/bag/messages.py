@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from push_predictor.types import IntArray
 
 PORTION = 20_000  # single messages that are gathered
+Dated: TypeAlias = tuple[tuple[str, str], int, bytes]  # topic and type, log time in ns, CDR
 
 
 class RawMessage(NamedTuple):
@@ -37,7 +38,7 @@ class Messages:
     topic: str
     type: str
     times: IntArray
-    buffer: bytes | bytearray | memoryview
+    buffer: bytes
     start: IntArray
     length: IntArray
 
@@ -45,16 +46,10 @@ class Messages:
     def of(topic: str, kind: str, times: Sequence[int] | IntArray, data: Sequence[bytes]) -> Messages:
         """The same of single messages."""
         length = np.fromiter(map(len, data), np.int64, len(data))
-        # Damaged files have times of more than 63 bits.
-        logged = times if isinstance(times, np.ndarray) else np.array(times, np.uint64).astype(np.int64)
-        return Messages(topic, kind, logged, b"".join(data), np.cumsum(length) - length, length)
+        return Messages(topic, kind, np.asarray(times, np.int64), b"".join(data), np.cumsum(length) - length, length)
 
     def __len__(self) -> int:
         return len(self.times)
-
-    def __getitem__(self, row: int) -> bytes:
-        begin = int(self.start[row])
-        return bytes(self.buffer[begin : begin + int(self.length[row])])
 
     def of_equal_length(self) -> Iterator[tuple[IntArray, NDArray[np.uint8]]]:
         """Rows (m,) of messages of the same length, and their bytes (m, length)."""
@@ -64,15 +59,17 @@ class Messages:
             yield rows, data[self.start[rows][:, None] + np.arange(length)]
 
 
-def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:
+def gathered(messages: Iterable[Dated]) -> Iterator[Messages]:
     """Single messages as portions of each topic and type."""
     waiting = iter(messages)
-    while portion := list(islice(waiting, PORTION)):
-        topics, kinds, times, data = zip(*portion, strict=True)
-        sources = list(zip(topics, kinds, strict=True))
-        numbers = {source: number for number, source in enumerate(dict.fromkeys(sources))}
-        of = np.fromiter(map(numbers.__getitem__, sources), np.int64, len(portion))
-        whole = Messages.of("", "", times, data)
-        for (topic, kind), number in numbers.items():
-            rows = np.flatnonzero(of == number)
-            yield Messages(topic, kind, whole.times[rows], whole.buffer, whole.start[rows], whole.length[rows])
+    while True:
+        parts: dict[tuple[str, str], tuple[list[int], list[bytes]]] = {}
+        for of, time, content in islice(waiting, PORTION):
+            times, contents = parts.get(of) or parts.setdefault(of, ([], []))
+            times.append(time)
+            contents.append(content)
+        if not parts:
+            return
+        for (topic, kind), (times, contents) in parts.items():
+            # Damaged files have times of more than 63 bits.
+            yield Messages.of(topic, kind, np.array(times, np.uint64).astype(np.int64), contents)

@@ -97,7 +97,11 @@ class Bag:
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """The messages of the given topics, those of a topic and type in file order; damage becomes a note."""
-        yield from gathered(self.messages(topics))
+        for file in self.files:
+            if isinstance(file, McapFile):
+                yield from file.portions(topics)
+            else:
+                yield from gathered((message[:2], *message[2:]) for message in file.messages(topics))
 
 
 def open_bag(path: Path) -> Bag:
@@ -143,7 +147,7 @@ def _open(file: Path, described: BagMetadata, scratch: Path | None) -> BagFile:
     return _file(file, unpack=unpack_message if described.compression == "message" else bytes)
 
 
-def _file(path: Path, *, unpack: Callable[[bytes | memoryview], bytes] = bytes, name: str = "") -> BagFile:
+def _file(path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> BagFile:
     """A file of the kind that its first bytes show."""
     try:
         with path.open("rb") as stream:

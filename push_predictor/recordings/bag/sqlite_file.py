@@ -27,7 +27,7 @@ class SqliteFile:
     Raises RecordingError for a file that is not a bag of rosbag2.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[bytes | memoryview], bytes] = bytes, name: str = "") -> None:
+    def __init__(self, path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> None:
         self.path, self._name, self._unpack = path, name or str(path), unpack
         self.notes: list[str] = []
         self._channels: dict[int, tuple[str, str]] = {}
