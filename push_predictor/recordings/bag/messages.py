@@ -32,31 +32,33 @@ class RawMessage(NamedTuple):
 class Messages:
     """n CDR messages of one topic and type, in their order.
 
-    times (n,): when they were logged or sent, ns. They lie in `buffer`, from byte start (n,) on, length (n,) bytes.
+    times (n,): when they were logged or sent, ns. They follow each other in `buffer`, with length (n,) bytes each.
     """
 
     topic: str
     type: str
     times: IntArray
     buffer: bytes
-    start: IntArray
     length: IntArray
 
     @staticmethod
     def of(topic: str, kind: str, times: Sequence[int] | IntArray, data: Sequence[bytes]) -> Messages:
         """The same of single messages."""
         length = np.fromiter(map(len, data), np.int64, len(data))
-        return Messages(topic, kind, np.asarray(times, np.int64), b"".join(data), np.cumsum(length) - length, length)
+        return Messages(topic, kind, np.asarray(times, np.int64), b"".join(data), length)
 
     def __len__(self) -> int:
         return len(self.times)
 
     def of_equal_length(self) -> Iterator[tuple[IntArray, NDArray[np.uint8]]]:
         """Rows (m,) of messages of the same length, and their bytes (m, length)."""
-        data = np.frombuffer(self.buffer, np.uint8)
+        data, start = np.frombuffer(self.buffer, np.uint8), np.cumsum(self.length) - self.length
         for length in np.unique(self.length).tolist():
             rows = np.flatnonzero(self.length == length)
-            yield rows, data[self.start[rows][:, None] + np.arange(length)]
+            if len(rows) == len(self) and length:
+                yield rows, data.reshape(-1, length)
+            else:
+                yield rows, data[start[rows][:, None] + np.arange(length)]
 
 
 def gathered(messages: Iterable[Dated]) -> Iterator[Messages]:
