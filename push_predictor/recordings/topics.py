@@ -71,8 +71,8 @@ class Topics:
 
 def topics_of(values: Mapping[str, Any]) -> Topics:
     """The topics that parameters, options or saved keys name, by KEYS; other names are ignored."""
-    given = {name: values[key] for key, name in _FIELDS.items() if values.get(key)}
-    return Topics(**{name: tuple(value) if name == "covariates" else value for name, value in given.items()})
+    given: dict[str, Any] = {name: values[key] for key, name in _FIELDS.items() if values.get(key)}
+    return Topics(**given | {"covariates": tuple(given.get("covariates", ()))})
 
 
 def values_of(topics: Topics) -> dict[str, str | list[str]]:

@@ -65,7 +65,7 @@ class ChunkHead(NamedTuple):
     seconds: float
 
 
-def parse(kind: _Readable[Record], content: bytes) -> Record:
+def parse(kind: _Readable[Record], content: bytes | bytearray) -> Record:
     """One record's content as the mcap package's class. Raises one of UNREADABLE."""
     return kind.read(ReadDataStream(_Content(content)))
 
@@ -110,17 +110,17 @@ def chunk_head(stream: BinaryIO, offset: int) -> ChunkHead:
 
 
 def next_chunk(stream: BinaryIO, offset: int) -> int | None:
-    """The first offset, from a given one on, at which the fields of a chunk agree, and which contains its end."""
+    """The first offset, from a given one on, at which the fields of a chunk agree; None without one."""
     size = stream.seek(0, 2)
     while offset < size:
         piece = read_at(stream, offset, _SEARCHED)
         for found in _BEGIN.finditer(piece):
             try:
-                if chunk_head(stream, offset + found.start()).end <= size:
-                    return offset + found.start()
+                chunk_head(stream, offset + found.start())
             except UNREADABLE:
-                pass
-        offset += max(len(piece) - _CHUNK_HEAD_SIZE, 1) if offset + len(piece) < size else len(piece)
+                continue
+            return offset + found.start()
+        offset += _SEARCHED - _CHUNK_HEAD_SIZE
     return None
 
 
@@ -130,10 +130,10 @@ def unpack_chunk(stream: BinaryIO, head: ChunkHead) -> bytes | bytearray:
     Memory is limited to the compressed bytes and the size that the head states. Raises one of UNREADABLE for a wrong
     size or a wrong checksum.
     """
-    data = read_at(stream, head.begin, head.packed)
-    cut = len(data) < head.packed
+    present = min(head.packed, stream.seek(0, 2) - head.begin)
+    data, cut = read_at(stream, head.begin, present), present < head.packed
     found = data if head.compression == b"" else _unpacked(head, data, cut)
-    if len(found) > head.size or not (cut or len(found) == head.size):
+    if len(found) != head.size and not cut:
         raise ValueError(f"a chunk does not contain the {head.size} bytes that it claims")
     if head.crc and not cut and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
