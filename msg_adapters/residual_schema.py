@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from push_predictor.recordings.bag.definitions import HEADER_DEFINITION
+from push_predictor.recordings.bag.message_types import HEADER_DEFINITION
 
 RESIDUAL_TYPE = "push_predictor_interfaces/msg/PushResidual"
 RESIDUAL_DEFINITION = f"""std_msgs/Header header

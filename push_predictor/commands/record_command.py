@@ -66,11 +66,11 @@ def _recorded(options: argparse.Namespace) -> Progress | None:
 
 def _parameters(options: argparse.Namespace) -> Iterator[str]:
     """The options as arguments of the node."""
-    topics = topics_of(options)
+    from push_predictor.recordings.topics import values_of
+
+    topics = values_of(topics_of(options))
     values: dict[str, object] = {"bag": str(options.out), "force": options.force, "duration": options.duration}
-    values |= {"slider_topic": topics.slider, "pusher_topic": topics.pusher, "wrench_topic": topics.wrench}
-    values |= {"wrench_frame": topics.wrench_frame, "wrench_bias": topics.wrench_bias, "world_frame": topics.world}
+    values |= {key: value or [""] if isinstance(value, list) else value for key, value in topics.items()}
     values |= {"rig": "" if options.rig is None else str(options.rig), "use_sim_time": options.use_sim_time}
-    values |= {"covariate_topics": list(topics.covariates) or [""]}
     for name, value in values.items():
         yield from ("-p", f"{name}:={json.dumps(value)}")

@@ -15,7 +15,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from push_predictor.errors import RequestError
-from push_predictor.recordings.topics import STREAMS, Topics
 
 Value: TypeAlias = "bool | int | float | str | list[str]"
 
@@ -58,13 +57,6 @@ class Param:
 
     def _within(self, value: Any) -> bool:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
-
-
-def topics_of(values: Mapping[str, Any]) -> Topics:
-    """The topics that the parameters of a node name."""
-    slider, pusher, wrench = (values[f"{name}_topic"] for name in STREAMS)
-    axes, bias = values["wrench_frame"], values["wrench_bias"]
-    return Topics(slider, pusher, wrench, tuple(values["covariate_topics"]), values["world_frame"], axes, bias)
 
 
 def declare(node: Node, params: Sequence[Param]) -> None:

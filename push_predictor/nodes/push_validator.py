@@ -21,7 +21,7 @@ from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
-from push_predictor.nodes.parameters import declare, topics_of, values_of
+from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
@@ -36,6 +36,7 @@ from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
+from push_predictor.recordings.topics import topics_of
 
 PERIOD = 0.02  # s between two looks at what has arrived
 

@@ -12,12 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
-from push_predictor.recordings.bag.definitions import POSE
+from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.bag.reader import Bag, open_bag
-from push_predictor.recordings.decoder.decoder import POSES, StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.decoder import StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
-from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, STREAMS, sources_of
+from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
 from push_predictor.recordings.fields.transforms import WORLD
@@ -120,8 +120,7 @@ def _scalar_source(topic: str) -> Source:
 def _kind(bag: Bag, name: str, source: Source, given: bool) -> str:
     """The type to read from a source's topic, '' without the topic."""
     kind, target = bag.topics.get(_named(bag, source.topic), ""), STREAMS[name]
-    if source.frame and kind not in TF_TYPES:
-        raise source.error(bag.path, f"{source.topic} is of type {kind!r}; only {TF_TYPES[0]} has frames")
+    source.check_type(kind, bag.path)
     return kind if given or kind in target.known or not kind else target.type
 
 

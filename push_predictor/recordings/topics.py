@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
@@ -18,13 +20,14 @@ WORLD_AXES, TIP_AXES = "world", "tip"
 FREE_MOTION, NO_BIAS = "free_motion", "none"
 NO_WRENCH = "none"  # in place of a topic: contact from geometry alone
 BIASES = (FREE_MOTION, NO_BIAS)
-KEYS = (
-    *(f"{name}_topic" for name in STREAMS),
-    "covariate_topics",
-    "wrench_frame",
-    "wrench_bias",
-    "world_frame",
-)
+_FIELDS = {  # of Topics, by their names in NAME.recording.yaml, as parameters and as options
+    **{f"{name}_topic": name for name in STREAMS},
+    "covariate_topics": "covariates",
+    "wrench_frame": "wrench_frame",
+    "wrench_bias": "wrench_bias",
+    "world_frame": "world",
+}
+KEYS = tuple(_FIELDS)
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,18 @@ class Topics:
         return replace(other, **{key: value for key, value in vars(self).items() if value})
 
 
+def topics_of(values: Mapping[str, Any]) -> Topics:
+    """The topics that parameters, options or saved keys name, by KEYS; other names are ignored."""
+    given: dict[str, Any] = {name: values[key] for key, name in _FIELDS.items() if values.get(key)}
+    return Topics(**given | {"covariates": tuple(given.get("covariates", ()))})
+
+
+def values_of(topics: Topics) -> dict[str, str | list[str]]:
+    """The inverse of topics_of; what is not given is empty."""
+    found = {key: getattr(topics, name) for key, name in _FIELDS.items()}
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in found.items()}
+
+
 DEFAULT_TOPICS = Topics("slider/pose", "pusher/pose", "pusher/wrench")
 
 
@@ -96,16 +111,10 @@ def save_topics(recording: Path, topics: Topics) -> Path:
     """Save topics next to a recording and return the file's path. Raises OSError that names the path."""
     import yaml
 
-    content: dict[str, object] = {_key(name): getattr(topics, name) for name in STREAMS}
-    content |= {"covariate_topics": list(topics.covariates), "wrench_frame": topics.wrench_frame}
-    content |= {"wrench_bias": topics.wrench_bias, "world_frame": topics.world}
+    content = {key: value for key, value in values_of(topics).items() if value}
     path = topics_path(recording)
-    write_whole(path, yaml.safe_dump({key: value for key, value in content.items() if value}, sort_keys=False).encode())
+    write_whole(path, yaml.safe_dump(content, sort_keys=False).encode())
     return path
-
-
-def _key(name: str) -> str:
-    return f"{name}_topic"
 
 
 def _parsed(saved: object, path: Path) -> Topics:
@@ -113,19 +122,17 @@ def _parsed(saved: object, path: Path) -> Topics:
         raise RecordingError(f"{path}: contains {saved!r}, give the keys {', '.join(KEYS)}")
     if unknown := [key for key in saved if key not in KEYS]:
         raise RecordingError(f"{path}: key {unknown[0]!r} is not accepted, give {', '.join(KEYS)}")
-    given = {name: _text(saved.get(_key(name)), path, _key(name)) for name in STREAMS}
-    covariates = _list(saved.get("covariate_topics"), path)
-    axes, bias = (_text(saved.get(key), path, key) for key in ("wrench_frame", "wrench_bias"))
-    if bias not in ("", *BIASES):
-        raise RecordingError(f"{path}: wrench_bias is {bias!r}, give {' or '.join(BIASES)}")
-    world = _text(saved.get("world_frame"), path, "world_frame")
-    return Topics(**given, covariates=covariates, world=world, wrench_frame=axes, wrench_bias=bias)
+    read = {key: _list if key == "covariate_topics" else _text for key in KEYS}
+    try:
+        return topics_of({key: read[key](value, path, key) for key, value in saved.items()})
+    except RequestError:
+        raise RecordingError(f"{path}: wrench_bias is {saved['wrench_bias']!r}, give {' or '.join(BIASES)}") from None
 
 
-def _list(value: object, path: Path) -> tuple[str, ...]:
+def _list(value: object, path: Path, key: str) -> tuple[str, ...]:
     if value is not None and not isinstance(value, list):
-        raise RecordingError(f"{path}: covariate_topics is {value!r}, give a list of topics")
-    return tuple(_text(item, path, "covariate_topics") for item in value or ())
+        raise RecordingError(f"{path}: {key} is {value!r}, give a list of topics")
+    return tuple(_text(item, path, key) for item in value or ())
 
 
 def _text(value: object, path: Path, key: str) -> str:

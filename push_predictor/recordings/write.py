@@ -13,8 +13,8 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, encode
-from push_predictor.recordings.bag.definitions import FLOAT64, POSE, SCALAR_LAYOUTS, WRENCH, MessageType
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, SCALAR_LAYOUT, WRENCH_STAMPED, encode
+from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.rig import RECORD_NAME
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
@@ -75,7 +75,7 @@ def _wrench(name: str, stream: WrenchStream) -> _Encoded:
 
 
 def _scalar(name: str, stream: ScalarStream) -> _Encoded:
-    messages = encode(stream.stamp, stream.value[:, None], SCALAR_LAYOUTS[FLOAT64.name])
+    messages = encode(stream.stamp, stream.value[:, None], SCALAR_LAYOUT)
     return _Encoded(name, FLOAT64, stream.stamp, messages)
 
 

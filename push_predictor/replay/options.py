@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RequestError
-from push_predictor.recordings.topics import STREAMS, Topics
+from push_predictor.recordings.topics import Topics, topics_of
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 
@@ -87,7 +87,7 @@ def replay_options(values: Mapping[str, Any]) -> ReplayOptions:
         window=values["play.read_ahead_queue_size"],
         acked_timeout=_ns(values["play.wait_acked_timeout"]),
         strict=values["strict"],
-        topics=_topics(values),
+        topics=topics_of(values),
     )
 
 
@@ -95,11 +95,6 @@ def _recording(values: Mapping[str, Any]) -> Path:
     if not values["recording"]:
         raise RequestError("recording", "", "the path of a recording (docs/reference/recordings.md)")
     return Path(values["recording"]).expanduser()
-
-
-def _topics(values: Mapping[str, Any]) -> Topics:
-    named = {stream: values[f"{stream}_topic"] for stream in STREAMS}
-    return Topics(**named, world=values["world_frame"], wrench_frame=values["wrench_frame"])
 
 
 def _filter(values: Mapping[str, Any]) -> TopicFilter:

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from push_predictor.recordings.fields.sources import Source
-from push_predictor.recordings.topics import DEFAULT_TOPICS, STREAMS, Topics
-
-STATIC = "_static"  # /tf_static belongs to /tf
+from push_predictor.recordings.decoder.sources import POSES, STATIC, STREAMS, sources_of
+from push_predictor.recordings.topics import Topics
 
 
 def push_topics(present: Collection[str], topics: Topics) -> frozenset[str]:
@@ -20,15 +18,12 @@ def push_topics(present: Collection[str], topics: Topics) -> frozenset[str]:
 
 def missing_poses(present: Collection[str], topics: Topics) -> list[str]:
     """The topics of slider and pusher, as named, that a bag does not contain."""
-    return [_named(stream, topics) for stream in ("slider", "pusher") if not _of_stream(stream, present, topics)]
-
-
-def _named(stream: str, topics: Topics) -> str:
-    return str(getattr(topics.over(DEFAULT_TOPICS), stream))
+    named = dict(sources_of(topics))
+    return [named[stream].text for stream in POSES if not _of_stream(stream, present, topics)]
 
 
 def _of_stream(stream: str, present: Collection[str], topics: Topics) -> list[str]:
-    source = Source("", "", _named(stream, topics))
+    source = dict(sources_of(topics))[stream]
     name = source.topic.strip("/")
     names = {name, name + STATIC} if source.frame else {name}
     return [topic for topic in present if topic.strip("/") in names]

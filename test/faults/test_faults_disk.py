@@ -39,7 +39,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online import trace_process
 from push_predictor.recordings import atomic
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.bag.definitions import FLOAT64
+from push_predictor.recordings.bag.message_types import FLOAT64
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from push_predictor.errors import RecordingError, RequestError
+from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.decoder.sources import RecordedTopic, resolved, topics_to_record
-from push_predictor.recordings.fields.installed_definitions import definition_text
 from push_predictor.recordings.topics import Topics
 
 

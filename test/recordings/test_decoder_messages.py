@@ -18,8 +18,8 @@ from planar_messages import pose_message, wrench_message
 from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
-from push_predictor.recordings.bag.definitions import POSE as POSE_TYPE
-from push_predictor.recordings.bag.definitions import WRENCH as WRENCH_TYPE
+from push_predictor.recordings.bag.message_types import POSE as POSE_TYPE
+from push_predictor.recordings.bag.message_types import WRENCH as WRENCH_TYPE
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder import topic_input
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from push_predictor.recordings.decoder.posed_wrench import PosedWrench
-from push_predictor.recordings.fields.wrench_axes import at_tip, in_sensor_axes
+from push_predictor.recordings.decoder.wrench import PosedWrench
+from push_predictor.recordings.fields.pose_rows import at_tip, in_sensor_axes
 from push_predictor.types import Array, IntArray
 
 MS = 10**6

@@ -27,8 +27,7 @@ from turning_sensor import MOUNT, add_wrench, measured_at, wrench_rows
 
 from push_predictor.recordings.decoder import transform_buffer
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
-from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
-from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
+from push_predictor.recordings.fields.pose_rows import composed, in_sensor_axes, inverted, normalised
 from push_predictor.recordings.fields.wrench_bias import estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream

@@ -178,6 +178,15 @@ def test_samples_of_a_frame_without_connection_are_limited(monkeypatch: pytest.M
     assert (buffer.dropped, len(buffer._histories["tip"].edge.stamp)) == (150, 100)
 
 
+def test_of_a_silent_frame_only_recent_samples_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transform_buffer, "SILENT", 200 * MILLISECOND)
+    monkeypatch.setattr(transform_buffer, "KEPT", 100 * MILLISECOND)
+    buffer, stamps, lab = TransformBuffer(["tip"], "world"), every(4, 0, 1001), Lab()
+    lab.transform("/tf", "world", "cart", stamps, line(stamps))
+    taken(buffer, lab.in_order(), "tip")
+    assert buffer._histories["cart"].edge.stamp.tolist() == stamps[-76:].tolist()
+
+
 def test_the_last_static_transform_counts() -> None:
     buffer, stamps, lab = TransformBuffer(["tip"], "world"), every(4, 0, 100), Lab()
     lab.transform("/tf", "cart", "tip", stamps, line(stamps, 0.0))

@@ -21,12 +21,12 @@ from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder import bias_so_far
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
-from push_predictor.recordings.fields.pose_rows import normalised
+from push_predictor.recordings.fields.pose_rows import in_sensor_axes, normalised
 from push_predictor.recordings.fields.sources import TF_TYPES
-from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
-from push_predictor.recordings.fields.wrench_bias import gravity_direction
+from push_predictor.recordings.fields.wrench_bias import BiasError, gravity_direction
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
+from push_predictor.recordings.streams import taken as rows_of
 from push_predictor.recordings.topics import Topics
 from push_predictor.types import Array
 
@@ -226,3 +226,22 @@ def test_few_samples_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
         for portion in in_portions(still().in_order(), 40):
             taken(decoder, still(), portion)
             assert decoder.wrench.bias is not None and decoder.wrench.bias._count <= 240
+
+
+def test_a_bias_that_stays_unknown_is_not_sought_with_every_portion(monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts: list[int] = []
+
+    def unknown(stamp: Array, *_: object) -> None:
+        attempts.append(len(stamp))
+        raise BiasError("no free motion")
+
+    monkeypatch.setattr(bias_so_far, "MOST", 200)
+    monkeypatch.setattr(bias_so_far, "estimate_bias", unknown)
+    bias, rig, still_tip = bias_so_far.BiasSoFar(), original().rig, original().pusher
+    assert rig is not None
+    bias.begin(rig)
+    for portion in range(200):
+        stamp = SECOND + 1_000_000 * np.arange(5 * portion, 5 * portion + 5)
+        pose = rows_of(original().slider, slice(0, 5)), rows_of(still_tip, slice(0, 5))
+        bias.put(bias_so_far.Wrenches(stamp, np.zeros((5, 6))), *pose)
+    assert bias.problem == "no free motion" and 40 <= len(attempts) <= 60

@@ -29,7 +29,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
-from push_predictor.recordings.bag.definitions import POSE, WRENCH
+from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream

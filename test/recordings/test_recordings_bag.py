@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.definitions import FLOAT64, POSE, WRENCH, MessageType
+from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import Topics, read_recording, require_rig
 from push_predictor.recordings.streams import Recording

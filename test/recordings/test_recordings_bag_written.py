@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.definitions import FLOAT64, POSE, WRENCH
+from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.read import read_recording

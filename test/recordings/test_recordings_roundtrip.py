@@ -14,7 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from push_predictor.recordings.bag.cdr import Layout, decode, encode
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, encode
+from push_predictor.recordings.bag.message_types import POSE
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.fields.sources import POSE_TARGET, Columns, FieldReader, definitions_of
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.write import write_recording
@@ -119,45 +122,45 @@ def test_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Pat
     assert [p.name for p in first] == (["metadata.yaml", "push_0.mcap"] if name == "push" else ["push.mcap"])
 
 
-LAYOUTS = st.builds(Layout, st.booleans(), st.integers(1, 7), st.just(8)) | st.just(Layout(False, 1, 4))
+def decoded(messages: list[bytes]) -> Columns:
+    """Poses as the reader of fields decodes them."""
+    reader = FieldReader(POSE_TARGET, POSE.name, "pose", definitions_of(POSE.name, {}))
+    return reader.read(Messages.of("/slider/pose", POSE.name, np.zeros(len(messages), np.int64), messages))
 
 
-@given(stamps(0), LAYOUTS, st.text(max_size=20), st.data())
-def test_columns_read_back_from_cdr_with_any_frame_id(
-    stamp: np.ndarray, layout: Layout, frame: str, data: st.DataObject
-) -> None:
+@given(stamps(0), st.text(max_size=20), st.data())
+def test_columns_read_back_from_cdr_with_any_frame_id(stamp: np.ndarray, frame: str, data: st.DataObject) -> None:
     frame = frame.replace("\0", "")
-    values = data.draw(columns(len(stamp), layout.count, st.floats(width=8 * layout.size)))
-    decoded = decode(encode(stamp, values, layout, frame), layout)
-    np.testing.assert_array_equal(decoded.values, values)
-    np.testing.assert_array_equal(decoded.stamp, stamp if layout.header else np.zeros_like(stamp))
-    assert decoded.valid.all()
-    assert decoded.frames == (frozenset({frame}) if layout.header and len(stamp) else frozenset())
+    values = data.draw(columns(len(stamp), 7, st.floats()))
+    found = decoded(encode(stamp, values, POSE_STAMPED, frame))
+    np.testing.assert_array_equal(found.values, values)
+    np.testing.assert_array_equal(found.stamp, stamp)
+    assert found.valid.all()
+    assert found.named == (frozenset({frame}) if len(stamp) else frozenset())
 
 
-@given(st.lists(st.binary(max_size=100), max_size=10), LAYOUTS)
-def test_decoder_accepts_any_bytes(messages: list[bytes], layout: Layout) -> None:
-    decoded = decode(messages, layout)
-    assert decoded.values.shape == (len(messages), layout.count)
-    assert not decoded.valid[[len(m) < 4 + layout.count * layout.size for m in messages]].any()
+@given(st.lists(st.binary(max_size=150), max_size=10))
+def test_decoder_accepts_any_bytes(messages: list[bytes]) -> None:
+    found = decoded(messages)
+    assert found.values.shape == (len(messages), 7)
+    assert not found.valid[[len(message) < 4 + 12 + 56 for message in messages]].any()
 
 
 def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_order() -> None:
-    layout = Layout(header=True, count=2)
-    stamp, values = np.arange(6, dtype=np.int64) * 10**9 + 5, np.arange(12.0).reshape(6, 2)
+    stamp, values = np.arange(6, dtype=np.int64) * 10**9 + 5, np.arange(42.0).reshape(6, 7)
     frames = ["", "w", "world", "a_long_frame_name", "world", "w"]
-    messages = [encode(stamp[i : i + 1], values[i : i + 1], layout, frames[i])[0] for i in range(6)]
+    messages = [encode(stamp[i : i + 1], values[i : i + 1], POSE_STAMPED, frames[i])[0] for i in range(6)]
     messages[2] = big_endian(messages[2], len("world") + 1)
     messages[4] = messages[4][:-9]
-    decoded = decode(messages, layout)
-    assert decoded.valid.tolist() == [True, True, True, True, False, True]
-    np.testing.assert_array_equal(decoded.values[decoded.valid], values[decoded.valid])
-    np.testing.assert_array_equal(decoded.stamp[decoded.valid], stamp[decoded.valid])
+    found = decoded(messages)
+    assert found.valid.tolist() == [True, True, True, True, False, True]
+    np.testing.assert_array_equal(found.values[found.valid], values[found.valid])
+    np.testing.assert_array_equal(found.stamp[found.valid], stamp[found.valid])
 
 
 def big_endian(message: bytes, frame_length: int) -> bytes:
     """The same message in the other byte order."""
-    start = Layout(header=True, count=2).start(frame_length)
+    start = POSE_STAMPED.start(frame_length)
     words = np.frombuffer(message[4:16], "<u4").astype(">u4").tobytes()
     numbers = np.frombuffer(message[start:], "<f8").astype(">f8").tobytes()
     return b"\0\0\0\0" + words + message[16:start] + numbers

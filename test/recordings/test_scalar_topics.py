@@ -17,7 +17,7 @@ from synthetic import START, Push, rows, square_rig, stamps, translating_push, w
 from push_predictor.online import stream_sync
 from push_predictor.online.clock_history import DELAY, STALE, ClockHistory
 from push_predictor.online.stream_sync import StreamSync
-from push_predictor.recordings.bag.definitions import POSE
+from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.streams import Recording, ScalarStream

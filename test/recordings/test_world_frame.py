@@ -20,8 +20,7 @@ from turning_sensor import add_tip, add_wrench, wrench_rows
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM
-from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
-from push_predictor.recordings.fields.wrench_axes import in_sensor_axes
+from push_predictor.recordings.fields.pose_rows import composed, in_sensor_axes, inverted, normalised
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.topics import Topics, load_topics

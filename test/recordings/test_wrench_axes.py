@@ -20,8 +20,7 @@ from turning_sensor import add_tip, add_wrench, measured_at_mount, measured_at_t
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.fields.pose_rows import normalised, poses_at
-from push_predictor.recordings.fields.wrench_axes import about_points, in_sensor_axes, in_world_axes
+from push_predictor.recordings.fields.pose_rows import about_points, in_sensor_axes, in_world_axes, normalised, poses_at
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import Topics, load_topics, save_topics

@@ -21,7 +21,7 @@ from turning_sensor import add_tip, add_wrench, tip_rows
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.geometry.frames import to_body
-from push_predictor.recordings.fields.wrench_axes import in_sensor_axes, in_world_axes
+from push_predictor.recordings.fields.pose_rows import in_sensor_axes, in_world_axes
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, gravity_direction
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from lab_bags import Lab, pose_values
 
-from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
-from push_predictor.recordings.fields.wrench_axes import about_points, in_sensor_axes
+from push_predictor.recordings.fields.pose_rows import about_points, composed, in_sensor_axes, inverted, normalised
 from push_predictor.recordings.streams import PoseStream, WrenchStream
 from push_predictor.types import Array, IntArray
 

@@ -103,6 +103,7 @@ def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
         group.add_argument(f"--{name}-topic", default="", metavar="TOPIC", help=f"default: {default}")
     group.add_argument(
         "--covariate-topic",
+        dest="covariate_topics",
         action="append",
         default=[],
         metavar="TOPIC",
@@ -133,22 +134,15 @@ def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
 
 def topics_of(options: argparse.Namespace) -> Topics:
     """The topics given on the command line. Raises RequestError for an empty name."""
-    from push_predictor.recordings.topics import Topics
+    from push_predictor.recordings import topics
 
-    for option in ("slider_topic", "pusher_topic", "wrench_topic", "covariate_topic"):
-        given = getattr(options, option)
-        for text in [given] if isinstance(given, str) else given:
+    values = vars(options)
+    for key in ("slider_topic", "pusher_topic", "wrench_topic", "covariate_topics"):
+        for text in [values[key]] if isinstance(values[key], str) else values[key]:
             if text and not text.partition(":")[0].partition(".")[0].strip("/ "):
-                raise RequestError(f"--{option.replace('_', '-')}", text, "TOPIC, TOPIC.FIELD or /tf:FRAME")
-    return Topics(
-        options.slider_topic,
-        options.pusher_topic,
-        options.wrench_topic,
-        tuple(options.covariate_topic),
-        world=options.world_frame,
-        wrench_frame=options.wrench_frame,
-        wrench_bias=options.wrench_bias,
-    )
+                option = f"--{key.removesuffix('s').replace('_', '-')}"
+                raise RequestError(option, text, "TOPIC, TOPIC.FIELD or /tf:FRAME")
+    return topics.topics_of(values)
 
 
 def save_topics_of(options: argparse.Namespace, paths: Sequence[Path]) -> None:

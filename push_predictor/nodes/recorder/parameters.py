@@ -15,9 +15,9 @@ from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.parameters import Param, declare, topics_of, values_of
+from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.recordings.decoder.sources import resolved
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics, load_topics, topics_of
 
 PARAMETERS = (
     Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required."),

@@ -17,8 +17,8 @@ from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
 from msg_adapters.residuals import ValidatedWindow, residual_to_message
 from push_predictor.online.files.residual_journal import JOURNAL
 from push_predictor.online.live_validation import LiveValidation
-from push_predictor.recordings.bag.cdr import encode
-from push_predictor.recordings.bag.definitions import FLOAT64, SCALAR_LAYOUTS
+from push_predictor.recordings.bag.cdr import SCALAR_LAYOUT, encode
+from push_predictor.recordings.bag.message_types import FLOAT64
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
@@ -81,7 +81,7 @@ def _scalars(validation: LiveValidation) -> Iterator[tuple[int, str, bytes]]:
         for name, value in window.covariates.items():
             if name.startswith(SCALAR):
                 row = np.array([[value]])
-                (data,) = encode(np.array([window.start]), row, SCALAR_LAYOUTS[FLOAT64.name])
+                (data,) = encode(np.array([window.start]), row, SCALAR_LAYOUT)
                 yield window.start, _topic(name), data
 
 

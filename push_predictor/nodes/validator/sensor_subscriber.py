@@ -24,7 +24,6 @@ from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
-from push_predictor.recordings.fields.sources import Source
 from push_predictor.recordings.fields.transforms import WORLD
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
@@ -228,12 +227,8 @@ def check_sources(topics: Topics) -> None:
             validate_topic_name(source.topic)
         except InvalidTopicNameException as error:
             raise RequestError(source.key, source.text, f"{accepted} ({' '.join(str(error).split())})") from None
-        if source.topic.startswith("~") or source.text.endswith(".") or _has_wrong_frame(source, bool(frame)):
+        if source.topic.startswith("~") or source.text.endswith(".") or not source.frame_fits(bool(frame)):
             raise RequestError(source.key, source.text, accepted)
         if name == COVARIATE and name_of(source) in scalars:
             raise RequestError(source.key, source.text, "each topic or field once")
         scalars |= {name_of(source)} if name == COVARIATE else set()
-
-
-def _has_wrong_frame(source: Source, may_have: bool) -> bool:
-    return ":" in source.text and not (may_have and source.frame)

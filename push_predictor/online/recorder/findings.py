@@ -9,14 +9,13 @@ from collections import deque
 
 import numpy as np
 
-from push_predictor.errors import RecordingError
 from push_predictor.online.recorder.pace import Pace
 from push_predictor.online.recorder.progress import StreamFigures
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
 from push_predictor.recordings.decoder.poses import PoseFrame
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STREAMS, sources_of
-from push_predictor.recordings.fields.sources import TF_TYPES, Source
+from push_predictor.recordings.fields.sources import Source
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -46,15 +45,11 @@ class Findings:
         """State the type of a topic; schema: its definition, '' if unknown. One that does not fit becomes a problem."""
         self._types[topic] = type_name
         for name, pose in self._decoder.poses.items():
-            if isinstance(pose, PoseFrame) and key_of(pose.source.topic) == key_of(topic) and type_name not in TF_TYPES:
-                refusal = pose.source.error("", f"{topic} is of type {type_name!r}; only {TF_TYPES[0]} has frames")
-                self._refused[name] = str(refusal)
+            if isinstance(pose, PoseFrame) and key_of(pose.source.topic) == key_of(topic):
+                self._try(name, lambda pose=pose: pose.source.check_type(type_name, ""))
         for name, each in self._decoder.inputs().items():
             if name in STREAMS and key_of(each.source.topic) == key_of(topic):
-                try:
-                    each.declare(type_name, {type_name: schema})
-                except RecordingError as error:
-                    self._refused[name] = str(error)
+                self._try(name, lambda each=each: each.declare(type_name, {type_name: schema}))
 
     def set_rig(self, rig: Rig) -> None:
         """Find windows of this rig from now on, and in the last EARLY portions."""

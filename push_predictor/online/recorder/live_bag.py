@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.decoder.sources import POSES, sources_of
-from push_predictor.recordings.fields.installed_definitions import definition_text
 from push_predictor.recordings.rig import RECORD_NAME, Rig
 from push_predictor.recordings.topics import Topics, save_topics
 

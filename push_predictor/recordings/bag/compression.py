@@ -36,7 +36,7 @@ def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
     return target
 
 
-def unpack_message(data: bytes) -> bytes:
+def unpack_message(data: bytes | bytearray) -> bytes:
     """The message in a zstd frame.
 
     Raises zstandard.ZstdError for another frame or a message that is too large.

@@ -15,9 +15,9 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
+from push_predictor.recordings.bag.message_types import POSE, WRENCH
+from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -68,10 +68,6 @@ class CsvStreams:
         wanted = [topic for topic in self._streams if topics is None or topic in topics]
         return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
 
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics."""
-        return gathered(self.messages(topics))
-
     def _of_topic(self, topic: str) -> Iterator[RawMessage]:
         kind, stamp, data = self._streams[topic]
         return (RawMessage(topic, kind, time, message) for time, message in zip(stamp.tolist(), data, strict=True))
@@ -103,7 +99,7 @@ def _streams(file: Path) -> dict[str, tuple[str, IntArray, list[bytes]]]:
             raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
         stamp, values = _numbers(file, header, rows)
         columns = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
-        layout = SCALAR_LAYOUTS[SCALAR]
+        layout = STAMPED_SCALAR_LAYOUT
         return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in columns.items()}
     topic, accepted = STREAMS[file.stem]
     if header not in accepted:

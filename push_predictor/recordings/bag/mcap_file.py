@@ -1,46 +1,52 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One MCAP file as raw messages in file order; damage becomes notes."""
+"""One MCAP file as raw messages in file order; damage becomes notes.
+
+The mcap package parses the summary and the descriptions. The records of the data are located here, since its readers
+end at the first damage: after it, reading continues at the next chunk.
+"""
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Callable, Collection, Iterator
+import struct
+import zlib
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
+from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
-import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import MetadataIndex
+from mcap.records import Channel, ChunkIndex, McapRecord, Metadata, MetadataIndex, Schema, Statistics
+from mcap.stream_reader import StreamReader
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.mcap_descriptions import Descriptions, Wanted
-from push_predictor.recordings.bag.mcap_places import Place, data_checksum_is_wrong, places
 from push_predictor.recordings.bag.mcap_records import (
-    CHUNK_HEAD_SIZE,
     HEAD,
+    LARGEST_CHUNK,
     MAGIC,
-    MESSAGE,
     UNREADABLE,
-    Bytes,
     chunk_head,
-    split,
+    is_head,
+    next_chunk,
+    parse,
+    read_at,
     unpack_chunk,
 )
-from push_predictor.recordings.bag.mcap_summary import (
-    DATA_END_SIZE,
-    Footer,
-    Summary,
-    read_footer,
-    read_metadata,
-    read_summary,
-)
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import Dated, Messages, RawMessage, gathered
 
-_Found: TypeAlias = "array[int]"  # of each message: channel, log time, first byte, byte after the last
-_NUMBERS = 4
+_Bytes: TypeAlias = bytes | bytearray
+_Wanted: TypeAlias = dict[int, tuple[str, str]]  # topic and type by channel
+_MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE_INDEX = struct.Struct("<HI")
+_DATA_END = struct.Struct("<BQI")
+_FOOTER = struct.Struct("<BQQQI8s")
+_ENDS = {(Opcode.DATA_END, 4), (Opcode.FOOTER, 20)}
+_DESCRIPTIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata}
+_READ = frozenset({*_DESCRIPTIONS, Opcode.MESSAGE})
+_WITH_LENGTHS = (Opcode.CHUNK, Opcode.MESSAGE_INDEX)  # state their length twice, which is compared
+_LARGE = 1 << 16  # bytes; a longer record with a doubtful length is not read
 MOST_NOTES = 50  # a file can have a million damaged records
 
 
@@ -49,26 +55,31 @@ class McapFile:
 
     topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if
     unknown}; metadata: {record name: {key: value}}; notes: damage found so far, with file and byte offset
-    (opening reads the summary, messages() the rest). unpack decompresses a single message to CDR and raises one of
+    (opening reads the summary, messages() the rest). unpack turns a recorded message into CDR and raises one of
     UNREADABLE if it cannot; name: of the file in notes, by default its path.
 
     Raises RecordingError for a file that is empty or not MCAP.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> None:
+    def __init__(self, path: Path, *, unpack: Callable[[_Bytes], bytes] = bytes, name: str = "") -> None:
         self.path = path
-        self._descriptions = descriptions = Descriptions(self._note)
-        self.topics, self.schemas = descriptions.topics, descriptions.schemas
-        self.qos, self.metadata = descriptions.qos, descriptions.metadata
+        self.topics: dict[str, str] = {}
+        self.schemas: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
         self.notes: list[str] = []
         self._name = name or str(path)
         self._unpack = unpack
+        self._channels: dict[int, Channel] = {}  # of two different descriptions the first
+        self._types: dict[int, str] = {}
         self._listed: int | None = None  # number of messages in the summary
-        self._chunks: list[int] = []  # their offsets, if verified by a checksum
-        self._end_checked = False
+        self._summary_start = 0  # as the file's end states it, 0 without one
+        self._closed = self._end_checked = False
+        self._cut = 0  # offset of a chunk that the end of the file cuts off
         self._size = _checked_size(path, self._name)
-        self._footer: Footer | None = None
-        if not self._read_end():
+        with path.open("rb") as stream:
+            complete = self._read_end(stream)
+        if not complete:
             for _ in self.messages(topics=()):
                 pass
 
@@ -77,172 +88,231 @@ class McapFile:
 
         One chunk at a time is in memory.
         """
-        for content, found, wanted, _ in self._contents(topics):
-            view = memoryview(content)
-            for k in range(0, len(found), _NUMBERS):
-                channel, time, start, end = found[k : k + _NUMBERS]
-                yield RawMessage(*wanted[channel], time, view[start:end].tobytes())
-            del view, content, found  # before the next chunk is read
+        return (RawMessage(*of, time, data) for of, time, data in self._read(topics))
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The same of the given topics, a portion for each topic of a chunk."""
-        single: list[RawMessage] = []
-        for content, found, wanted, is_chunk in self._contents(topics):
-            rows = np.array(found).astype(np.int64).reshape(-1, _NUMBERS)
-            if not is_chunk:  # a portion of one message would be slow
-                single += [RawMessage(*wanted[c], time, bytes(content[a:b])) for c, time, a, b in rows.tolist()]
-                continue
-            yield from gathered(single)
-            single = []
-            for of in dict.fromkeys(wanted[channel] for channel in np.unique(rows[:, 0]).tolist()):
-                own = [channel for channel, other in wanted.items() if other == of]
-                _, time, start, end = rows[np.isin(rows[:, 0], own)].T
-                # Copied: a chunk may be mostly of other topics, such as a camera's.
-                parts = [bytes(content[a:b]) for a, b in zip(start.tolist(), end.tolist(), strict=True)]
-                yield Messages.of(*of, time, parts)
-        yield from gathered(single)
+        """The same of the given topics, those of a topic and type at once."""
+        return gathered(self._read(topics))
 
-    def _contents(self, topics: Collection[str] | None) -> Iterator[tuple[Bytes, _Found, Wanted, bool]]:
-        """Consecutive records, the wanted messages among them, of which channels, and whether they are a chunk."""
-        wanted = self._descriptions.wanted(topics, self._descriptions.channels.values())
-        seen = 0
-        chunks: list[int] = []
+    def _read(self, topics: Collection[str] | None) -> Iterator[Dated]:
+        wanted = self._wanted(topics, self._channels.values())
+        seen, chunks = 0, list[int]()
         with self.path.open("rb") as stream:
-            for place in places(stream, self._size, self._chunks, self._footer is not None, self._note):
-                if place.opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                    self._check_end(stream, place, chunks)
-                    break
-                if place.opcode == Opcode.CHUNK:
-                    chunks.append(place.offset)
-                content = self._content(stream, place)
-                found, count = self._found(content, place, topics, wanted)
-                seen += count
-                if self._unpack is not None:
-                    content, found = self._unpacked(content, found, place)
-                yield content, found, wanted, place.opcode == Opcode.CHUNK
-                del content, found
+            for opcode, offset, content in self._records(stream):
+                if opcode == Opcode.DATA_END:
+                    self._check_end(stream, offset, chunks)
+                elif opcode == Opcode.CHUNK:
+                    chunks.append(offset)
+                seen += yield from self._messages(content, offset, topics, wanted)
+                del content  # before the next chunk is read
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
-    def _content(self, stream: BinaryIO, place: Place) -> Bytes:
-        """The records at a place."""
-        stream.seek(place.offset)
-        if place.opcode != Opcode.CHUNK:
-            return stream.read(HEAD.size + place.length)
-        try:
-            stream.seek(HEAD.size, 1)
-            head = chunk_head(stream.read(min(CHUNK_HEAD_SIZE, place.length)), place.length)
-            stream.seek(place.offset + HEAD.size + head.begin)
-            return unpack_chunk(head, stream)
-        except UNREADABLE as error:
-            self._note(place.offset, f"a chunk was skipped: {error or type(error).__name__}")
-            return b""
-
-    def _found(
-        self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
-    ) -> tuple[_Found, int]:
-        """The wanted messages among consecutive records, and the number of all messages.
+    def _messages(
+        self, content: _Bytes, offset: int, topics: Collection[str] | None, wanted: _Wanted
+    ) -> Generator[Dated, None, int]:
+        """The wanted messages among consecutive records; returns the number of all messages.
 
         The channels, schemas and metadata among the records are stored.
         """
-        seen, found, unwanted = 0, array("Q"), set[int]()
+        size, at = len(content), 0
+        seen, undone, unwanted = 0, 0, set[int]()
         try:
-            for opcode, start, end in split(content, place.whole):
+            while at + HEAD.size <= size:
+                opcode, length = HEAD.unpack_from(content, at)
+                start, end = at + HEAD.size, at + HEAD.size + length
+                if end > size:
+                    break
                 if opcode == Opcode.MESSAGE:
-                    if start + MESSAGE.size > end:
-                        raise ValueError(f"a message has {end - start} bytes, its header alone needs {MESSAGE.size}")
+                    if length < _MESSAGE.size:
+                        raise ValueError(f"a message has {length} bytes, its header alone needs {_MESSAGE.size}")
                     seen += 1
-                    number, _, log_time, _ = MESSAGE.unpack_from(content, start)
+                    number, _, time, _ = _MESSAGE.unpack_from(content, start)
                     if number in wanted:
-                        found.extend((number, log_time, start + MESSAGE.size, end))
+                        try:
+                            yield wanted[number], time, self._unpack(content[start + _MESSAGE.size : end])
+                        except UNREADABLE:
+                            undone += 1
                     else:
                         unwanted.add(number)
-                elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
-                    wanted.update(self._descriptions.wanted(topics, [channel]))
+                elif opcode in _DESCRIPTIONS:
+                    channel = self._add(parse(_DESCRIPTIONS[opcode], content[start:end]), offset)
+                    wanted.update(self._wanted(topics, [channel] if channel else []))
+                at = end
+            if at != size and offset != self._cut:
+                raise ValueError(f"the last whole record of a chunk ends at byte {at} of {size}")
         except UNREADABLE as error:
-            self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
-        for number in sorted(unwanted):
-            self._check_unwanted(number, topics, place.offset)
-        return found, seen
-
-    def _unpacked(self, content: Bytes, found: _Found, place: Place) -> tuple[Bytes, _Found]:
-        """The same with the messages decompressed."""
-        assert self._unpack is not None
-        unpacked, where, undone = bytearray(), array("Q"), 0
-        for k in range(0, len(found), _NUMBERS):
-            channel, time, start, end = found[k : k + _NUMBERS]
-            try:
-                data = self._unpack(bytes(content[start:end]))
-            except UNREADABLE:
-                undone += 1
-            else:
-                where.extend((channel, time, len(unpacked), len(unpacked) + len(data)))
-                unpacked += data
+            self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
         if undone:
-            self._note(place.offset, f"{undone} messages cannot be decompressed and were skipped")
-        return unpacked, where
+            self._note(offset, f"{undone} messages cannot be decompressed and were skipped")
+        for number in sorted(unwanted):
+            self._check_unwanted(number, topics, offset)
+        return seen
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a message that is wanted but cannot be decoded; others are ignored."""
-        if (known := self._descriptions.channels.get(channel)) is None:
+        if (known := self._channels.get(channel)) is None:
             self._note(offset, f"channel {channel} has no description; its messages were skipped")
         elif topics and known.topic in topics:
             self._note(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
 
-    def _read_end(self) -> bool:
-        """Read topics and metadata from the summary. False if it is absent, damaged or incomplete."""
-        with self.path.open("rb") as stream:
-            self._footer = footer = read_footer(stream, self._size)
-            if footer is None:
-                self._note(self._size, "the end of the file is missing or damaged")
-                return False
-            try:
-                if not footer.start:
-                    footer.check(b"")
-                    return False
-                return self._use(stream, read_summary(stream, footer, footer.start))
-            except UNREADABLE as error:
-                self._note(footer.start or footer.offset, f"{error or type(error).__name__}; the whole file is read")
-                return False
+    # --- the records of the data ---
 
-    def _use(self, stream: BinaryIO, summary: Summary) -> bool:
-        """Store a summary's descriptions; returns whether they are complete."""
-        if (statistics := summary.statistics) is not None:
-            self._listed = statistics.message_count
-        if statistics is None or not summary.verified:  # the descriptions before the data are at least as good
+    def _records(self, stream: BinaryIO) -> Iterator[tuple[int, int, _Bytes]]:
+        """(opcode, offset, content with its head) of each record up to the end of the data; of a chunk its records.
+
+        Damage is noted at its offset, the content is empty then. Reading continues at the next record, or at the next
+        chunk if no record begins after the damage.
+        """
+        offset: int | None = len(MAGIC)
+        while offset is not None and offset < self._size:
+            opcode, length = HEAD.unpack(read_at(stream, offset, HEAD.size).ljust(HEAD.size, b"\0"))
+            if (opcode, length) in _ENDS:
+                yield opcode, offset, b""
+                return
+            end = offset + HEAD.size + length
+            follows = end <= self._size and is_head(read_at(stream, end, HEAD.size))
+            try:
+                content = self._content(stream, opcode, offset, length, follows)
+                known = follows or opcode in _WITH_LENGTHS
+            except UNREADABLE as error:
+                self._note(offset, str(error) or type(error).__name__)
+                content, known = b"", follows
+            yield opcode, offset, content
+            del content
+            offset = end if known else next_chunk(stream, offset + 1)
+        if offset is not None:
+            self._note(self._size, "the file was not closed; its contents are used")
+
+    def _content(self, stream: BinaryIO, opcode: int, offset: int, length: int, follows: bool) -> _Bytes:
+        """See _records; empty for a record that is not read. follows: whether a record begins after it.
+
+        Raises one of UNREADABLE for damage.
+        """
+        end = offset + HEAD.size + length
+        if opcode == Opcode.CHUNK:
+            return self._chunk(stream, offset)
+        if end > self._size:
+            raise ValueError(self._lost_from(offset))
+        if opcode == Opcode.MESSAGE_INDEX:  # a chunk with a damaged opcode must not be taken for one
+            start = read_at(stream, offset + HEAD.size, min(_MESSAGE_INDEX.size, length))
+            if len(start) < _MESSAGE_INDEX.size or _MESSAGE_INDEX.unpack(start)[1] + len(start) != length:
+                raise ValueError("a message index contradicts its own length, the record was skipped")
+            return b""
+        if opcode not in _READ and opcode != Opcode.ATTACHMENT and (opcode, offset) != (Opcode.HEADER, len(MAGIC)):
+            raise ValueError(f"a record of kind {opcode:#04x} is not allowed there and was skipped")
+        if not follows:
+            doubt = f"the record there or the one after it, at byte {end}, is damaged"
+            if length > _LARGE:
+                raise ValueError(doubt)
+            self._note(offset, doubt)
+        return read_at(stream, offset, HEAD.size + length) if opcode in _READ else b""
+
+    def _chunk(self, stream: BinaryIO, offset: int) -> _Bytes:
+        """The records of a chunk, of one that is cut off those before the cut. Raises ValueError for a damaged one."""
+        lost = ""
+        try:
+            head = chunk_head(stream, offset)
+            lost = f" ({head.seconds:.3g} s of messages)"
+            if head.end > self._size:
+                # In a file with an end, or with chunks after this one, bytes are missing within it.
+                if self._closed or next_chunk(stream, offset + 1) is not None:
+                    raise ValueError(self._lost_from(offset))
+                self._note(offset, self._lost_from(offset))
+                self._cut = offset
+            return unpack_chunk(stream, head)
+        except UNREADABLE as error:
+            raise ValueError(f"a chunk was skipped: {error or type(error).__name__}{lost}") from None
+
+    def _lost_from(self, offset: int) -> str:
+        return f"damaged or cut off; some of the {self._size - offset} bytes from there on are lost"
+
+    # --- descriptions ---
+
+    def _wanted(self, topics: Collection[str] | None, channels: Iterable[Channel]) -> _Wanted:
+        """The CDR channels among those given, of all topics or of the given ones."""
+        return {
+            channel.id: (channel.topic, self._types.get(channel.schema_id, ""))
+            for channel in channels
+            if channel.message_encoding == "cdr" and (topics is None or channel.topic in topics)
+        }
+
+    def _add(self, record: McapRecord, offset: int) -> Channel | None:
+        """Store a description; returns the first description of a channel."""
+        if isinstance(record, Schema):
+            self._types.setdefault(record.id, record.name)
+            self.schemas.setdefault(record.name, record.data.decode(errors="replace"))
+        elif isinstance(record, Metadata):
+            self.metadata[record.name] = record.metadata
+        elif isinstance(record, Channel):
+            known: Channel = self._channels.setdefault(record.id, record)
+            if known != record:
+                self._note(offset, f"channel {record.id} has a second, different description; the first one is used")
+            self.topics.setdefault(known.topic, self._types.get(known.schema_id, ""))
+            self.qos.setdefault(known.topic, known.metadata.get("offered_qos_profiles", ""))
+            return known
+        return None
+
+    # --- the end of the file ---
+
+    def _read_end(self, stream: BinaryIO) -> bool:
+        """Read topics and metadata from the summary. False if it is absent, damaged or incomplete."""
+        end = max(self._size - _FOOTER.size, 0)
+        opcode, length, start, _, crc, magic = _FOOTER.unpack(read_at(stream, end, _FOOTER.size).ljust(_FOOTER.size))
+        if (opcode, length, magic) != (Opcode.FOOTER, 20, MAGIC):
+            self._note(self._size, "the end of the file is missing or damaged")
             return False
-        self._chunks = summary.chunks
-        for schema in summary.schemas:
-            self._descriptions.add_schema(schema)
-        for channel in summary.channels:
-            self._descriptions.add_channel(channel, self._size)
-        read = sum(self._use_metadata(stream, place) for place in summary.metadata)
-        complete = statistics.channel_count == len(self._descriptions.channels)
-        return bool(complete and statistics.metadata_count == read)
+        self._closed, self._summary_start = True, start
+        try:
+            summary = _read_summary(stream, start or end, end)
+            return self._use(stream, summary, verified=crc != 0) if start else False
+        except UNREADABLE as error:
+            self._note(start or end, f"{error or type(error).__name__}; the whole file is read")
+            return False
+
+    def _use(self, stream: BinaryIO, summary: list[McapRecord], verified: bool) -> bool:
+        """Store a summary's descriptions; returns whether they are complete."""
+        statistics = next((record for record in summary if isinstance(record, Statistics)), None)
+        if statistics is not None:
+            self._listed = statistics.message_count
+        if statistics is None or not verified:  # the descriptions before the data are at least as good
+            return False
+        for record in summary:
+            self._add(record, self._size)
+        read = sum(self._use_metadata(stream, record) for record in summary if isinstance(record, MetadataIndex))
+        return bool((statistics.channel_count, statistics.metadata_count) == (len(self._channels), read))
 
     def _use_metadata(self, stream: BinaryIO, place: MetadataIndex) -> bool:
+        """Store the record that an index points to; returns whether it is there."""
         try:
-            record = read_metadata(stream, place, self._size)
+            offset = min(place.offset, self._size)
+            opcode, length = HEAD.unpack(read_at(stream, offset, HEAD.size))
+            if opcode != Opcode.METADATA or HEAD.size + length != place.length or offset + place.length > self._size:
+                raise ValueError("the metadata index points to a place without a metadata record")
+            record = parse(Metadata, stream.read(length))
+            if record.name != place.name:
+                raise ValueError(f"a metadata record is named {record.name!r}, but {place.name!r} in the index")
         except UNREADABLE as error:
             self._note(place.offset, f"{error or type(error).__name__}; a metadata record is expected there")
             return False
-        self.metadata[record.name] = record.metadata
+        self._add(record, offset)
         return True
 
-    def _check_end(self, stream: BinaryIO, place: Place, chunks: list[int]) -> None:
-        """At the end of the data, compare them with their checksum and with the summary."""
-        if self._end_checked or place.opcode != Opcode.DATA_END:
+    def _check_end(self, stream: BinaryIO, end: int, chunks: list[int]) -> None:
+        """At the end of the data, compare them with their checksum, and the chunks found with the summary."""
+        if self._end_checked:
             return
-        end = place.offset
         self._end_checked = True
-        if data_checksum_is_wrong(stream, end):
+        _, _, stated = _DATA_END.unpack(read_at(stream, end, _DATA_END.size).ljust(_DATA_END.size, b"\0"))
+        if stated and _checksum(stream, end) != stated:  # 0: none was computed
             self._note(end, "the checksum of the data is wrong; they are damaged somewhere before it")
-        if self._footer is None or self._footer.start in (0, end + DATA_END_SIZE):
+        if self._summary_start in (0, end + _DATA_END.size):
             return
         try:  # bytes were lost or inserted; the summary still lists the offsets of the chunks
-            listed = read_summary(stream, self._footer, end + DATA_END_SIZE).chunks
+            summary = _read_summary(stream, end + _DATA_END.size, self._size - _FOOTER.size)
         except UNREADABLE:
             return
+        listed = [record.chunk_start_offset for record in summary if isinstance(record, ChunkIndex)]
         if moved := [place for place, found in zip_longest(listed, chunks) if place != found]:
             there = f"{len(chunks)} chunks were found, the summary lists {len(listed)}"
             self._note(moved[0] or self._size, f"a chunk is missing or has moved; {there}")
@@ -267,3 +337,25 @@ def _checked_size(path: Path, name: str) -> int:
         accepted = "MCAP, sqlite3 and ROS 1 recordings are accepted"
         raise RecordingError(f"{name}: not an MCAP file (starts with {start[:8]!r}), {accepted}")
     return path.stat().st_size
+
+
+def _read_summary(stream: BinaryIO, start: int, end: int) -> list[McapRecord]:
+    """The records of the summary from byte start to the footer at byte end.
+
+    Raises one of UNREADABLE if they are missing or damaged.
+    """
+    if not 0 <= end - start <= LARGEST_CHUNK:
+        raise ValueError("the footer places the summary outside the file")
+    content = read_at(stream, start, end - start + _FOOTER.size)
+    crc = _FOOTER.unpack_from(content, end - start)[4]
+    if crc and zlib.crc32(content[: -len(MAGIC) - 4]) != crc:
+        raise ValueError("the summary's checksum is wrong")
+    return list(StreamReader(BytesIO(content), skip_magic=True).records)
+
+
+def _checksum(stream: BinaryIO, end: int) -> int:
+    """The checksum of the bytes before an offset."""
+    found = 0
+    for begin in range(0, end, _LARGE):
+        found = zlib.crc32(read_at(stream, begin, min(_LARGE, end - begin)), found)
+    return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from push_predictor.types import IntArray
 
 PORTION = 20_000  # single messages that are gathered
+Dated: TypeAlias = tuple[tuple[str, str], int, bytes]  # topic and type, log time in ns, CDR
 
 
 class RawMessage(NamedTuple):
@@ -31,47 +32,46 @@ class RawMessage(NamedTuple):
 class Messages:
     """n CDR messages of one topic and type, in their order.
 
-    times (n,): when they were logged or sent, ns. They lie in `buffer`, from byte start (n,) on, length (n,) bytes.
+    times (n,): when they were logged or sent, ns. They follow each other in `buffer`, with length (n,) bytes each.
     """
 
     topic: str
     type: str
     times: IntArray
-    buffer: bytes | bytearray | memoryview
-    start: IntArray
+    buffer: bytes
     length: IntArray
 
     @staticmethod
     def of(topic: str, kind: str, times: Sequence[int] | IntArray, data: Sequence[bytes]) -> Messages:
         """The same of single messages."""
         length = np.fromiter(map(len, data), np.int64, len(data))
-        logged = times if isinstance(times, np.ndarray) else np.array([_signed(time) for time in times], np.int64)
-        return Messages(topic, kind, logged, b"".join(data), np.cumsum(length) - length, length)
+        return Messages(topic, kind, np.asarray(times, np.int64), b"".join(data), length)
 
     def __len__(self) -> int:
         return len(self.times)
 
-    def __getitem__(self, row: int) -> bytes:
-        begin = int(self.start[row])
-        return bytes(self.buffer[begin : begin + int(self.length[row])])
-
     def of_equal_length(self) -> Iterator[tuple[IntArray, NDArray[np.uint8]]]:
         """Rows (m,) of messages of the same length, and their bytes (m, length)."""
-        data = np.frombuffer(self.buffer, np.uint8)
+        data, start = np.frombuffer(self.buffer, np.uint8), np.cumsum(self.length) - self.length
         for length in np.unique(self.length).tolist():
             rows = np.flatnonzero(self.length == length)
-            yield rows, data[self.start[rows][:, None] + np.arange(length)]
+            if len(rows) == len(self) and length:
+                yield rows, data.reshape(-1, length)
+            else:
+                yield rows, data[start[rows][:, None] + np.arange(length)]
 
 
-def _signed(time: int) -> int:
-    """A time of 64 bits without a sign as one with it: damaged files have any."""
-    return time if time < 2**63 else time - 2**64
-
-
-def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:
+def gathered(messages: Iterable[Dated]) -> Iterator[Messages]:
     """Single messages as portions of each topic and type."""
     waiting = iter(messages)
-    while portion := list(islice(waiting, PORTION)):
-        for topic, kind in dict.fromkeys((message.topic, message.type) for message in portion):
-            own = [message for message in portion if (message.topic, message.type) == (topic, kind)]
-            yield Messages.of(topic, kind, [message.log_time for message in own], [message.data for message in own])
+    while True:
+        parts: dict[tuple[str, str], tuple[list[int], list[bytes]]] = {}
+        for of, time, content in islice(waiting, PORTION):
+            times, contents = parts.get(of) or parts.setdefault(of, ([], []))
+            times.append(time)
+            contents.append(content)
+        if not parts:
+            return
+        for (topic, kind), (times, contents) in parts.items():
+            # Damaged files have times of more than 63 bits.
+            yield Messages.of(topic, kind, np.array(times, np.uint64).astype(np.int64), contents)

@@ -14,7 +14,7 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import unpack_file, unpack_message
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
 from push_predictor.recordings.bag.mcap_file import McapFile
-from push_predictor.recordings.bag.messages import Messages, RawMessage
+from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
     BagMetadata,
@@ -98,7 +98,10 @@ class Bag:
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """The messages of the given topics, those of a topic and type in file order; damage becomes a note."""
         for file in self.files:
-            yield from file.portions(topics)
+            if isinstance(file, McapFile):
+                yield from file.portions(topics)
+            else:
+                yield from gathered((message[:2], *message[2:]) for message in file.messages(topics))
 
 
 def open_bag(path: Path) -> Bag:
@@ -141,10 +144,10 @@ def _open(file: Path, described: BagMetadata, scratch: Path | None) -> BagFile:
     if scratch is not None:
         unpacked = unpack_file(file, scratch, described.notes)
         return _file(unpacked, name=str(file) if unpacked == file else f"{file}, decompressed,")
-    return _file(file, unpack=unpack_message if described.compression == "message" else None)
+    return _file(file, unpack=unpack_message if described.compression == "message" else bytes)
 
 
-def _file(path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> BagFile:
+def _file(path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> BagFile:
     """A file of the kind that its first bytes show."""
     try:
         with path.open("rb") as stream:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import RawMessage
 
 MAGIC = b"#ROSBAG"
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
@@ -64,10 +64,6 @@ class Ros1File:
                     undone += 1
         if undone:
             self._note(f"{undone} messages do not fit the definition of their type and were skipped")
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics."""
-        return gathered(self.messages(topics))
 
     def _registered(self, connection: Any) -> str:
         """The type of a connection, known to the store from now on."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.mcap_records import UNREADABLE
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import RawMessage
 
 MAGIC = b"SQLite format 3\0"
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
@@ -27,7 +27,7 @@ class SqliteFile:
     Raises RecordingError for a file that is not a bag of rosbag2.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> None:
+    def __init__(self, path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> None:
         self.path, self._name, self._unpack = path, name or str(path), unpack
         self.notes: list[str] = []
         self._channels: dict[int, tuple[str, str]] = {}
@@ -59,7 +59,7 @@ class SqliteFile:
                         undone += 1  # in a damaged file a cell may have any type
                         continue
                     try:
-                        message = self._unpack(data) if self._unpack else data
+                        message = self._unpack(data)
                     except UNREADABLE:
                         undone += 1
                     else:
@@ -68,10 +68,6 @@ class SqliteFile:
             self._note(f"damaged after {read} messages ({error}); the rest is not read")
         if undone:
             self._note(f"{undone} messages cannot be read or decompressed and were skipped")
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics."""
-        return gathered(self.messages(topics))
 
     def _opened(self) -> sqlite3.Connection:
         # A recorder that was killed leaves a write-ahead log; without one nothing is written next to the bag.

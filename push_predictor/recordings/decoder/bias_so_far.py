@@ -9,17 +9,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.recordings.decoder.posed_wrench import Wrenches
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, joined
 from push_predictor.recordings.windows.clock_session import free_motion
 from push_predictor.recordings.windows.clock_set import set_back
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 FIRST = 50  # wrenches before the first attempt
 LATER, REFINED = 1.1, 2.0  # factors in their number to the next attempt: without an estimate, with one
 MOST = 50_000  # wrenches that are kept; an estimate from as many is final
+
+
+class Wrenches(NamedTuple):
+    """Stamps (n,) ns and wrenches (n, 6) along the axes of a sensor, with its poses and the tip's (n, 7) in the world.
+
+    sensor and tip are None where the axes are the world's.
+    """
+
+    stamp: IntArray
+    values: Array
+    sensor: Array | None = None
+    tip: Array | None = None
 
 
 class _Portion(NamedTuple):
@@ -46,7 +57,8 @@ class BiasSoFar:
 
     def _forget(self) -> None:
         self._portions: list[_Portion] = []
-        self._count, self._next = 0, FIRST  # wrenches in the portions; from how many on to make an estimate
+        self._count = self._seen = 0  # wrenches in the portions, and with those that are no longer kept
+        self._next = FIRST  # how many have been seen at the next attempt
 
     def begin(self, rig: Rig) -> None:
         """Begin anew with a rig, by whose outline free motion is found."""
@@ -68,7 +80,7 @@ class BiasSoFar:
         if (
             self._rig is not None
             and not self._final
-            and (self._next <= self._count or (last and self._count > 0 and not known_before))
+            and (self._next <= self._seen or (last and self._count > 0 and not known_before))
         ):
             self._attempt(self._rig)
         if self.estimate is None:
@@ -86,10 +98,10 @@ class BiasSoFar:
             self._final = self.estimate is not None
         self._portions.append(portion)
         self._count += len(portion.wrench.stamp)
+        self._seen += len(portion.wrench.stamp)
         self._final = self._final or (self.estimate is not None and self._count > MOST)
         while self._count > MOST and len(self._portions) > 1:
             self._count -= len(self._portions.pop(0).wrench.stamp)
-            self._next = min(self._next, MOST)
 
     def _attempt(self, rig: Rig) -> None:
         wrench = _joined([portion.wrench for portion in self._portions])
@@ -101,7 +113,8 @@ class BiasSoFar:
             self.estimate, self.problem = estimate_bias(wrench.stamp, values, free, wrench.sensor), ""
         except BiasError as error:
             self.problem = str(error)
-        self._next = round(self._count * (LATER if self.estimate is None else REFINED)) + 1
+        later = min(round(self._seen * LATER), self._seen + MOST // 10)
+        self._next = (later if self.estimate is None else round(self._seen * REFINED)) + 1
 
 
 def _joined(parts: Sequence[Wrenches], count: int | None = None) -> Wrenches:

@@ -26,7 +26,7 @@ from push_predictor.recordings.decoder.rules import (
     slider_stream,
     usable,
 )
-from push_predictor.recordings.decoder.sources import COVARIATE, STATIC, TF, sources_of
+from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, TF, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.decoder.wrench import WrenchInput
@@ -36,7 +36,7 @@ from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchSt
 from push_predictor.recordings.topics import Topics
 from push_predictor.types import IntArray
 
-POSES = {"slider": SLIDER, "pusher": PUSHER}
+_RULES = {"slider": SLIDER, "pusher": PUSHER}
 FAR = 3_600_000_000_000  # ns from the poses' stamps, at which the stamp of a scalar is of another clock
 
 
@@ -71,7 +71,7 @@ class StreamDecoder:
             name: PoseFrame(source, rules, self.tf[key_of(source.topic)])
             if (source := sources[name]).frame
             else PoseTopic(name, source, rules, first, topics.world, expected)
-            for name, rules in POSES.items()
+            for name, rules in _RULES.items()
         }
         self.wrench = WrenchInput(sources["wrench"], topics, first, "" if topics.world else expected)
         self.scalars = {

@@ -65,9 +65,9 @@ def resolved(given: Topics, resolve: Callable[[str], str]) -> Topics:
     """
     names: dict[str, list[str]] = {}
     for name, source in sources_of(given):
-        text, frame_fits = source.text, name in POSES
-        if not source.topic.strip("/ ") or (":" in text and not (source.frame and frame_fits)):
-            raise RequestError(source.key, text, "TOPIC, TOPIC.FIELD" + (" or /tf:FRAME" if frame_fits else ""))
+        text, has_frames = source.text, name in POSES
+        if not source.topic.strip("/ ") or not source.frame_fits(has_frames):
+            raise RequestError(source.key, text, "TOPIC, TOPIC.FIELD" + (" or /tf:FRAME" if has_frames else ""))
         names.setdefault(name, []).append(resolve(source.topic) + text[len(source.topic) :])
     streams = {name: names[name][0] for name in STREAMS}
     return replace(given, **streams, covariates=tuple(names.get(COVARIATE, ())))

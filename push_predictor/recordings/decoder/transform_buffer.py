@@ -21,6 +21,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 SET_BACK = "clock set back"
 KEPT = 5_000_000_000  # ns of samples that are kept after their pose was returned
+SILENT = 60_000_000_000  # ns of samples that are kept for a frame without a pose so far
 SETTLING = 1_000_000_000  # ns of all transforms of a frame that decide which of them gives the stamps
 
 
@@ -223,12 +224,14 @@ class TransformBuffer:
     def forget(self) -> None:
         """Drop samples that nobody needs any more; call it when all have taken, for who has not is not known yet."""
         known = [*(progress.newest for progress in self._progress.values()), *self._wanted.values()]
-        newest = [stamp for stamp in known if stamp is not None]
-        if not newest or len(newest) < len(known):
+        if not known:
             return
         for child, history in self._histories.items():
+            # Of a frame without a pose so far, nobody knows which samples it will need.
+            silent = int(history.edge.stamp.max()) - SILENT
+            newest = min(silent if stamp is None else stamp for stamp in known)
             needed = [p.done - history.first for p in self._progress.values() if p.leader == child]
-            old = np.flatnonzero(history.edge.stamp >= min(newest) - KEPT)
+            old = np.flatnonzero(history.edge.stamp >= newest - KEPT)
             count = min([int(old[0]) if len(old) else len(history.edge.stamp) - 1, *needed])
             if not history.edge.static and count > 0:
                 history.drop(count)

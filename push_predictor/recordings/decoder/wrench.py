@@ -5,32 +5,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
-from push_predictor.recordings.decoder.bias_so_far import BiasSoFar
-from push_predictor.recordings.decoder.posed_wrench import PosedWrench, Wrenches
+from push_predictor.recordings.decoder.bias_so_far import BiasSoFar, Wrenches
 from push_predictor.recordings.decoder.rules import (
     SPATIAL_WRENCH,
     WRENCH,
+    has_orientation,
     pusher_stream,
     slider_stream,
+    upright,
     wrench_stream,
 )
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
+from push_predictor.recordings.fields.pose_rows import at_tip, normalised, poses_at
 from push_predictor.recordings.fields.sources import WRENCH_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
-from push_predictor.recordings.fields.wrench_axes import at_tip
 from push_predictor.recordings.fields.wrench_bias import LEAST_FREE, WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import WrenchStream
 from push_predictor.recordings.topics import FREE_MOTION, WORLD_AXES, Topics
+from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, BoolArray, IntArray
 
 UNKNOWN_BIAS = (
     f"The bias of the wrench is not known yet, so contact is found from geometry alone. Lift the tip, or move it away "
     f"from the slider, for {LEAST_FREE:g} s."
 )
+
+
+KEPT = 2_000_000_000  # ns of the tip's poses that are kept before the first wrench that waits: streams lag by less
+MOST_WAITING = 20_000  # wrenches that wait, and poses of the tip for them
+# Of stamps (n,) ns, which are decided and the poses (k, 7) of the axes at these; the second: no more will come.
+AxesAt: TypeAlias = Callable[[IntArray, bool], tuple[BoolArray, Array]]
 
 
 class WrenchInput:
@@ -102,3 +113,66 @@ class WrenchInput:
     def estimate(self) -> WrenchBias | None:
         """What is subtracted."""
         return None if self.bias is None else self.bias.estimate
+
+
+class PosedWrench:
+    """Wrenches wait until poses of the tip and of the sensor at or after their stamp are known.
+
+    axes: the sensor's poses; None for a sensor with the axes of the tip. without_pose: how many wrenches got no pose;
+    oriented: whether a pose of the tip had an orientation.
+    """
+
+    def __init__(self, axes: AxesAt | None = None) -> None:
+        self.without_pose, self.oriented = 0, False
+        self._axes = axes
+        self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 6))
+        self._tip_stamp, self._tip = np.empty(0, np.int64), np.empty((0, 7))
+
+    def put(self, stamp: IntArray, values: Array, tip_stamp: IntArray, tip: Array, last: bool = False) -> Wrenches:
+        """The wrenches whose poses are known with these portions; last: no more will come.
+
+        stamp (w,), values (w, 6): new wrenches along the sensor's axes. tip_stamp (t,), tip (t, 7): new poses of the
+        tip.
+        """
+        self._note_tip(tip_stamp, tip)
+        self._stamp, self._values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
+        newest = self._tip_stamp.max() if len(self._tip_stamp) else np.iinfo(np.int64).min
+        due, sensor = self._sensor((self._stamp <= newest) | last, last)
+        ready, wrenches = self._stamp[due], self._values[due]
+        self._stamp, self._values = self._stamp[~due][-MOST_WAITING:], self._values[~due][-MOST_WAITING:]
+        poses = poses_at(ready, self._tip_stamp, self._tip)
+        sensor = poses if sensor is None else sensor
+        known = ~np.isnan(poses).any(axis=1) & ~np.isnan(sensor).any(axis=1)
+        self.without_pose += int(np.sum(~known))
+        self._forget()
+        return Wrenches(ready[known], wrenches[known], sensor[known], poses[known])
+
+    def _sensor(self, due: BoolArray, last: bool) -> tuple[BoolArray, Array | None]:
+        """Which of the waiting wrenches are due by tf as well, and the sensor's poses at these; None for the tip's."""
+        if self._axes is None:
+            return due, None
+        decided, rows = self._axes(self._stamp, last)
+        return due & decided, rows[due[decided]]
+
+    def _note_tip(self, stamp: IntArray, poses: Array) -> None:
+        if self._axes is None:
+            oriented = has_orientation(poses)
+            self.oriented = self.oriented or bool(oriented.any())
+            stamp, poses = stamp[oriented], normalised(poses[oriented])
+        else:
+            poses = upright(poses)  # tf has the orientation
+        if not len(stamp):
+            return
+        if len(self._tip_stamp) and self._tip_stamp[-1] - stamp[-1] > CLOCK_SET:  # all that waits is old
+            self.without_pose += len(self._stamp)
+            self._stamp, self._values = self._stamp[:0], self._values[:0]
+            self._tip_stamp, self._tip = self._tip_stamp[:0], self._tip[:0]
+        self._tip_stamp = np.concatenate([self._tip_stamp, stamp])
+        self._tip = np.concatenate([self._tip, poses])
+
+    def _forget(self) -> None:
+        """Drop the tip's poses that no wrench needs, after those that came were used: the first portion may be long."""
+        if len(self._tip_stamp):
+            needed = min(int(self._tip_stamp[-1]), int(self._stamp.min(initial=np.iinfo(np.int64).max)))
+            kept = np.flatnonzero(self._tip_stamp >= needed - KEPT)[-MOST_WAITING:]
+            self._tip_stamp, self._tip = self._tip_stamp[kept], self._tip[kept]

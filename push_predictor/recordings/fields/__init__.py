@@ -3,6 +3,6 @@
 
 """Fields of messages of any type: poses, wrenches and scalars, as messages of the types that a recording has.
 
-Import `sources`, `transforms`, `wrench_axes` and `wrench_bias`; `message_text` parses definitions and `columns` reads
-fields from CDR.
+`columns` reads fields from CDR, `sources` the numbers that a stream needs; `transforms` composes frames, `pose_rows`
+turns poses and wrenches, `wrench_bias` estimates the zero of a force sensor.
 """

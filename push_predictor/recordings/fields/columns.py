@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from push_predictor.recordings.bag.message_types import Field, short_name
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.fields.message_text import Field, short_name
 from push_predictor.types import Array, IntArray
 
 _PREFIX = 4  # bytes of encapsulation, from which numbers are aligned
@@ -143,6 +143,11 @@ class _Walk:
         count = each.array or self._length()
         if count > len(self.message):
             raise ValueError(f"{path} has {count} elements")
+        if count and (code := _NUMBERS.get(each.type)):
+            size = int(code[1:])
+            at = self._take(size, size * count)
+            self.layout.numbers |= {f"{path}[{k}]": (at + size * k, code) for k in range(count)}
+            return
         for number in range(count):
             self._value(each.type, f"{path}[{number}]")
 

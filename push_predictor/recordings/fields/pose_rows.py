@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Poses in space as rows of numbers: composed, inverted and interpolated many at a time.
+"""Poses in space as rows of numbers: composed, inverted and interpolated many at a time, and wrenches turned by them.
 
 A row is x, y, z (m) and a unit quaternion x, y, z, w.
 """
@@ -75,3 +75,31 @@ def poses_at(stamp: IntArray, known: IntArray, rows: Array) -> Array:
     dropout = span * NANOSECOND > longest_interval(period * NANOSECOND)
     outside = (stamp < known[0]) | (stamp > known[-1]) | (dropout & (stamp != known[after]))
     return np.asarray(np.where(outside[:, None], np.nan, found))
+
+
+def in_world_axes(wrenches: Array, poses: Array) -> Array:
+    """Wrenches (n, 6: force N, torque N m) along a sensor's axes, along the world's; the torque keeps its point.
+
+    poses (n, 7): of the sensor in the world, x, y, z (m) and a unit quaternion x, y, z, w.
+    """
+    quaternion = poses[:, 3:]
+    return np.hstack([turned(quaternion, wrenches[:, :3]), turned(quaternion, wrenches[:, 3:])])
+
+
+def in_sensor_axes(wrenches: Array, poses: Array) -> Array:
+    """Wrenches (n, 6) along the world's axes, along those of sensors at poses (n, 7): the inverse of in_world_axes."""
+    return in_world_axes(wrenches, inverted(poses))
+
+
+def at_tip(wrenches: Array, sensor: Array, tip: Array) -> Array:
+    """Wrenches (n, 6) along a sensor's axes, along the world's and about the tip; sensor, tip: their poses (n, 7)."""
+    return about_points(in_world_axes(wrenches, sensor), sensor[:, :3], tip[:, :3])
+
+
+def about_points(wrenches: Array, origins: Array, points: Array) -> Array:
+    """Wrenches (n, 6) whose torque is about origins (n, 3) m, with their torque about points (n, 3) m.
+
+    All are along the same axes.
+    """
+    force = wrenches[:, :3]
+    return np.hstack([force, wrenches[:, 3:] + np.cross(origins - points, force)])

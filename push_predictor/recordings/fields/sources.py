@@ -12,17 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.definitions import POSE, WRENCH
-from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
-from push_predictor.recordings.fields.message_text import (
+from push_predictor.recordings.bag.message_types import (
+    POSE,
     STANDARD,
+    WRENCH,
     Definitions,
     fields_of_types,
     parse_definitions,
     short_name,
     type_at,
 )
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
 from push_predictor.types import Array, BoolArray, IntArray
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -92,6 +93,15 @@ class Source:
     def frame(self) -> str:
         """The name of a frame, '' if none was named."""
         return self.text.partition(":")[2].strip("/")
+
+    def frame_fits(self, may_have: bool) -> bool:
+        """Whether there is no colon, or a frame after it where the stream may have one."""
+        return ":" not in self.text or (may_have and bool(self.frame))
+
+    def check_type(self, kind: str, path: object) -> None:
+        """Raise RecordingError for a frame in a topic of a type without frames."""
+        if self.frame and kind not in TF_TYPES:
+            raise self.error(path, f"{self.topic} is of type {kind!r}; only {TF_TYPES[0]} has frames")
 
     def error(self, path: object, problem: str) -> RecordingError:
         """An error that names the bag ('' for live topics), the key, the option and the value."""

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from push_predictor.recordings.bag.message_types import STANDARD
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.columns import Block, BlockReader
-from push_predictor.recordings.fields.message_text import STANDARD
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, poses_at
 from push_predictor.recordings.fields.sources import TF_TYPES, header_stamps
 from push_predictor.types import Array, IntArray

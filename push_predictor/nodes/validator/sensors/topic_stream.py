@@ -17,9 +17,9 @@ from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.following import FollowingSubscription
 from push_predictor.nodes.polling import Taken
 from push_predictor.online.sensors.topic_report import TopicReport, stamp_figures
+from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.topic_input import TopicInput
-from push_predictor.recordings.fields.installed_definitions import definition_text
 from push_predictor.types import IntArray
 
 DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones; memory grows as the queue fills

@@ -1,14 +1,20 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Definitions of message types, parsed from `ros2msg` text."""
+"""Message types and their definitions: `ros2msg` text of standard and installed types, and the fields in such text."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from push_predictor.errors import RecordingError
+
+_RULE = "=" * 80
 _LINE = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+(\w+)\s*(.*)$")
 _DEEPEST = 8  # levels of nested types that are searched
 
@@ -82,33 +88,91 @@ def _fields(text: str, package: str) -> Iterator[Field]:
         yield Field(kind, found[3], array)
 
 
-_POSE = "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"
+def definition_text(type_name: str, shares: Sequence[Path] | None = None) -> str:
+    """The `ros2msg` text of a type such as std_msgs/msg/Header, followed by those of all types in it.
+
+    shares: folders with PACKAGE/msg/NAME.msg; those of the ROS installation by default. Raises RecordingError that
+    names the missing file and where it was looked for.
+    """
+    places = _installed() if shares is None else shares
+    return _with_types(short_name(type_name), lambda name: _installed_text(name, places))
+
+
+def _with_types(type_name: str, text_of: Callable[[str], str]) -> str:
+    """The definition of a type (package/Name), and after it each type in it once."""
+    texts: dict[str, str] = {}
+    waiting = [type_name]
+    while waiting:
+        name = waiting.pop(0)
+        if name not in texts:
+            texts[name] = text_of(name)
+            package = name.partition("/")[0]
+            waiting += [field.type for field in _fields(texts[name], package) if "/" in field.type]
+    return f"{_RULE}\n".join(text if name == type_name else f"MSG: {name}\n{text}" for name, text in texts.items())
+
+
+def _installed() -> list[Path]:
+    prefixes = filter(None, [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix])
+    return [Path(prefix) / "share" for prefix in dict.fromkeys(prefixes)]
+
+
+def _installed_text(type_name: str, shares: Sequence[Path]) -> str:
+    package, _, name = type_name.partition("/")
+    for share in shares:
+        file = share / package / "msg" / f"{name}.msg"
+        if file.is_file():
+            return file.read_text(encoding="utf-8").rstrip("\n") + "\n"
+    raise RecordingError(f"{package}/msg/{name}.msg: not found in {', '.join(map(str, shares))}")
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """name: package/msg/Name; definition: ros2msg text with all referenced types; type_hash: REP 2016."""
+
+    name: str
+    definition: str
+    type_hash: str
+
+
+_HEADER = "std_msgs/Header header\n"
 _XYZ = "float64 x\nfloat64 y\nfloat64 z\n"
 _STANDARD = {
     "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
     "geometry_msgs/Point": _XYZ,
     "geometry_msgs/Vector3": _XYZ,
-    "geometry_msgs/Quaternion": f"{_XYZ}float64 w\n",
-    "geometry_msgs/Pose": _POSE,
-    "geometry_msgs/PoseStamped": "Header header\nPose pose\n",
+    "geometry_msgs/Quaternion": "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+    "geometry_msgs/PoseStamped": f"{_HEADER}geometry_msgs/Pose pose\n",
     "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance\n",
-    "geometry_msgs/PoseWithCovarianceStamped": "Header header\nPoseWithCovariance pose\n",
+    "geometry_msgs/PoseWithCovarianceStamped": f"{_HEADER}PoseWithCovariance pose\n",
     "geometry_msgs/Transform": "Vector3 translation\nQuaternion rotation\n",
-    "geometry_msgs/TransformStamped": "Header header\nstring child_frame_id\nTransform transform\n",
+    "geometry_msgs/TransformStamped": f"{_HEADER}string child_frame_id\nTransform transform\n",
     "geometry_msgs/Twist": "Vector3 linear\nVector3 angular\n",
     "geometry_msgs/TwistWithCovariance": "Twist twist\nfloat64[36] covariance\n",
-    "geometry_msgs/Wrench": "Vector3 force\nVector3 torque\n",
-    "geometry_msgs/WrenchStamped": "Header header\nWrench wrench\n",
-    "nav_msgs/Odometry": "Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
+    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
+    "geometry_msgs/WrenchStamped": f"{_HEADER}geometry_msgs/Wrench wrench\n",
+    "nav_msgs/Odometry": f"{_HEADER}string child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
     "geometry_msgs/TwistWithCovariance twist\n",
     "std_msgs/Float64": "float64 data\n",
     "std_msgs/Float32": "float32 data\n",
-    "sensor_msgs/Temperature": "Header header\nfloat64 temperature\nfloat64 variance\n",
-    "sensor_msgs/RelativeHumidity": "Header header\nfloat64 relative_humidity\nfloat64 variance\n",
-    "sensor_msgs/FluidPressure": "Header header\nfloat64 fluid_pressure\nfloat64 variance\n",
+    "sensor_msgs/Temperature": f"{_HEADER}float64 temperature\nfloat64 variance\n",
+    "sensor_msgs/RelativeHumidity": f"{_HEADER}float64 relative_humidity\nfloat64 variance\n",
+    "sensor_msgs/FluidPressure": f"{_HEADER}float64 fluid_pressure\nfloat64 variance\n",
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
 }
 # Bags of older rosbag2 have no definitions; those of these types never change.
 STANDARD: Definitions = {name: tuple(_fields(text, name.partition("/")[0])) for name, text in _STANDARD.items()}
+
+
+def _standard(name: str, type_hash: str) -> MessageType:
+    return MessageType(name, _with_types(short_name(name), _STANDARD.__getitem__), f"RIHS01_{type_hash}")
+
+
+POSE = _standard("geometry_msgs/msg/PoseStamped", "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8")
+WRENCH = _standard(
+    "geometry_msgs/msg/WrenchStamped", "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"
+)
+FLOAT64 = _standard("std_msgs/msg/Float64", "705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a")
+HEADER_DEFINITION = f"{_RULE}\nMSG: std_msgs/Header\n{_with_types('std_msgs/Header', _STANDARD.__getitem__)}"
