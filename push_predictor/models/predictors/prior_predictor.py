@@ -86,4 +86,4 @@ class PriorPredictor(BasePredictor):
 
     def _displacements(self, values: Array, push: Push) -> Array:
         """Displacements (n, k, 3) of n pushes under k rows (k, 28) of parameters."""
-        return self._mechanics.drawn(values, push.inputs, push.duration, push.covariates, self._shape)
+        return self._mechanics.displaced(values[None], push, self._shape)
