@@ -24,7 +24,7 @@ class Slider:
     """A slider as the kernel takes it: boundary, limit surfaces, pusher and accuracy."""
 
     common: Common
-    _given: tuple
+    _given: object
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Slider:
             tables.known += 1
             exponent += QUANTITIES
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> object:
         """Of another process: built again from the same arrays."""
         return Slider, self._given
 
