@@ -8,8 +8,7 @@ from __future__ import annotations
 from math import inf
 from pathlib import Path
 
-from push_predictor.models.effects.covariate_range import CovariateRange
-from push_predictor.models.effects.covariates import UNITS
+from push_predictor.models.effects.covariates import UNITS, CovariateRange
 from push_predictor.models.push_model import PushModel
 from push_predictor_interfaces.msg import ModelInfo
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from threadpoolctl import ThreadpoolController
+    from threadpoolctl import LibController
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -37,15 +37,21 @@ def one_blas_thread() -> Iterator[None]:
     if _process["limited"]:
         yield
         return
-    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
-
-    with _controller().limit(limits=1, user_api="blas"):
+    libraries = _libraries()
+    before = [library.get_num_threads() for library in libraries]
+    try:
+        for library in libraries:
+            library.set_num_threads(1)
         yield
+    finally:
+        for library, threads in zip(libraries, before, strict=True):
+            library.set_num_threads(threads)
 
 
 @lru_cache(maxsize=1)
-def _controller() -> ThreadpoolController:
-    """The BLAS libraries of numpy and scipy. To find them takes twenty times as long as to limit them."""
+def _libraries() -> list[LibController]:
+    """The BLAS libraries of numpy and scipy. To find them takes a thousand times as long as to limit them."""
+    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
     from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()
+    return [library for library in ThreadpoolController().lib_controllers if library.user_api == "blas"]

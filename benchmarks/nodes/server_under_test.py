@@ -28,7 +28,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.tabulated.table_accuracy import outside_pushes
+from push_predictor.models.tabulated.tabulated_model import outside_pushes
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

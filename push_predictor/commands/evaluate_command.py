@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.metrics_text import metrics_lines
     from push_predictor.evaluation.offline import rig_difference, training_overlap
     from push_predictor.evaluation.validation import compare, metrics_json
-    from push_predictor.models.request import check_table
+    from push_predictor.models.request import check_pushes
     from push_predictor.models.store.model_file import load_model
     from push_predictor.models.train_mechanics import on_supports
     from push_predictor.recordings.load import different_supports, known_rig, load_data
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> None:
         checks.judged_by(options.data, table, known)
         model = on_supports(model, known, supports)
         table = model.continued(table)
-        check_table(model, table)
+        check_pushes(model, table)
         metrics = metrics_json(compare(model, table))
     for path in options.data:
         rig = given or known_rig(path)

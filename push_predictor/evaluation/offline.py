@@ -15,7 +15,7 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.evaluation.alarm.scores import recording_alarm
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import check_table
+from push_predictor.models.request import check_pushes
 from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.train_mechanics import on_supports
 from push_predictor.recordings.bag.reader import open_bag
@@ -110,7 +110,7 @@ def validate_recording(
     windows, table = recorded_windows(model, path, rig, report, topics, checks)
     model = on_supports(model, rig or recording_rig(path), {})
     table = model.continued(table)
-    check_table(model, table)
+    check_pushes(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
@@ -134,7 +134,7 @@ def report_recording(
     models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
     tables = [model.continued(table) for model in models]
     for model, own in zip(models, tables, strict=True):
-        check_table(model, own)
+        check_pushes(model, own)
     each = watched(list(zip(models, tables, strict=True)), part_of(watch, 0.1, 0.5), "model")
     comparisons = [compare(model, own) for model, own in each]
     alarm = recording_alarm(models[0], table, comparisons[0])

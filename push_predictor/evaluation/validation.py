@@ -68,7 +68,7 @@ class Comparison:
 
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
-    """Predict every row of a table; the caller has checked it with `check_table`."""
+    """Predict every row of a table; the caller has checked it with `check_pushes`."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return comparison_of(model, table, prediction.mean, prediction.covariance)
 

@@ -20,13 +20,15 @@ by exp(-x). For faster ones it stays in proportion, which is on the safe side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from push_predictor.geometry.boundary import place_features
 from push_predictor.geometry.outline import Outline
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
+_TINY = float(np.finfo(np.float64).tiny)
 EDGE_SPACING = 3.0  # distance, in edge lengths, between edges that no symmetry maps onto each other
 
 
@@ -65,7 +67,11 @@ class Scaling:
     def features(self, outline: Outline, inputs: Array) -> Array:
         """Standardised features (n, D) of inputs (n, 3)."""
         features = push_features(outline, within(self.speeds, inputs))
-        return np.asarray((features[:, self.columns] - self.feature_mean) / self.feature_sd)
+        return np.asarray((features.T[self._used].T - self.feature_mean) / self.feature_sd)
+
+    @cached_property
+    def _used(self) -> IntArray:
+        return np.array(self.columns, dtype=np.intp)
 
     def outcomes(self, outcomes: Array) -> Array:
         """Standardised outcomes (n, 3) of outcomes (n, 3) in SI units, at a path of `travel`."""
@@ -81,8 +87,8 @@ class Scaling:
         """Logarithms (n,) of the speeds' ratios to the nearest training speed; zero for what is not per path length."""
         if self.travel is None or self.speeds is None:
             return np.zeros(len(inputs))
-        speed = np.maximum(inputs[:, 0], np.finfo(np.float64).tiny)
-        return np.asarray(np.log(speed / np.clip(speed, *self.speeds)))
+        speed = np.maximum(inputs[:, 0], _TINY)
+        return np.asarray(np.log(speed / _between(self.speeds, speed)))
 
     def noise_growth(self, inputs: Array) -> Array:
         """Logarithms (n,) of the factor on the noise variance per path length; zero but for slow pushes."""
@@ -93,4 +99,11 @@ def within(speeds: tuple[float, float] | None, inputs: Array) -> Array:
     """The pushes (n, 3) with speeds beyond these moved to the nearest one; the same for None."""
     if speeds is None:
         return inputs
-    return np.column_stack([np.clip(inputs[:, 0], *speeds), inputs[:, 1:]])
+    moved = np.array(inputs, dtype=np.float64)
+    moved[:, 0] = _between(speeds, moved[:, 0])
+    return moved
+
+
+def _between(ends: tuple[float, float], values: Array) -> Array:
+    """Like np.clip, in a third of the time of one value."""
+    return np.asarray(np.minimum(np.maximum(values, ends[0]), ends[1]))

@@ -17,7 +17,7 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import RequestError
 from push_predictor.geometry.boundary import within_box
-from push_predictor.models.effects.covariate_range import CovariateRange, range_of
+from push_predictor.models.effects.covariates import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.predictors import (
@@ -38,9 +38,7 @@ LEARNT = ("vhgp", "gp")
 KINDS = (*LEARNT, "analytical", "prior")
 USUAL_SPEED, USUAL_DURATION = 0.02, 0.2  # m/s, s: of the pushes of an untrained model
 DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
-SMALLEST_LARGE = 100  # rows of a matrix on which a BLAS may use several threads
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
-_ANY_THREADS = nullcontext()
 
 
 @dataclass(frozen=True)
@@ -113,8 +111,8 @@ class PushModel:
         covariates that the model needs is missing; others are ignored.
         """
         push = Push(inputs, duration, covariates or {})
-        inside = self.in_domain(inputs) & self.covariates_seen(push)
-        with one_blas_thread() if self._has_large_matrices else _ANY_THREADS:
+        inside = self.supported(push)
+        with one_blas_thread() if self.predictor.learnt else nullcontext():
             return Prediction(*self.predictor.moments(push), inside, self.predictor.tails)
 
     @property
@@ -127,7 +125,7 @@ class PushModel:
         """The values of covariates that a push may omit, by name: those at the end of the trace."""
         return self.predictor.defaults
 
-    @property
+    @cached_property
     def accepted(self) -> tuple[str, ...]:
         """Names of the covariates that a push may bring."""
         return (*self.needs, *self.defaults)
@@ -138,11 +136,6 @@ class PushModel:
         Those of an extended model go on from its trace, see TracedSession.
         """
         return self.predictor.session.continued(table)
-
-    @cached_property
-    def _has_large_matrices(self) -> bool:
-        """Whether more threads would work on a prediction, for little; to forbid it takes some microseconds."""
-        return self.predictor.learnt and len(self.training) >= SMALLEST_LARGE
 
     @cached_property
     def base(self) -> PushModel:
@@ -172,24 +165,24 @@ class PushModel:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
 
         The domain of a prior model are all pushes for which its priors are meant. For covariates see
-        `covariates_seen`.
+        `supported`.
         """
         points = inputs if self.predictor.own_limits else push_features(self.rig.outline, inputs)
         found = np.empty(len(inputs), dtype=np.uint8)
         within_box(points, *self._domain, found)
         return found.view(np.bool_)
 
-    def covariates_seen(self, push: Push) -> BoolArray:
-        """Whether the covariates of each of n pushes lie in the range on which the effects were fitted, (n,).
+    def supported(self, push: Push) -> BoolArray:
+        """Whether each of n pushes lies in the domain, with covariates in the range on which the effects were fitted.
 
-        Raises KeyError where one is missing.
+        Raises KeyError where a covariate is missing.
         """
-        seen = np.ones(len(push.inputs), dtype=np.bool_)
+        inside = self.in_domain(push.inputs)
         if self.covariate_ranges:
             covariates = self.predictor.completed(push).covariates
             for name, known in self.covariate_ranges.items():
-                seen &= known.contains(covariates[name])
-        return seen
+                inside &= known.contains(covariates[name])
+        return inside
 
     @cached_property
     def input_limits(self) -> InputLimits:

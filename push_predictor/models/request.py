@@ -71,24 +71,15 @@ def check_requests(model: PushModel, inputs: Array, duration: float | Array, cov
     _check(model, velocity, contact, angle, duration, covariates)
 
 
-def check_pushes(model: PushModel, pushes: Pushes) -> None:
+def check_pushes(model: PushModel, pushes: Pushes | PushTable) -> None:
     """Raise RequestError unless the model predicts these pushes; covariates that it does not use are ignored."""
     needed = {name: column for name, column in pushes.covariates.items() if name in model.accepted}
-    if len(pushes) > 1:
+    if len(pushes) != 1:
         check_requests(model, pushes.inputs, pushes.duration, needed)
     else:
         velocity, contact, angle = pushes.inputs[0].tolist()
         covariates = {name: float(column[0]) for name, column in needed.items()}
         _check(model, velocity, contact, angle, float(pushes.duration[0]), covariates)
-
-
-def check_table(model: PushModel, table: PushTable) -> None:
-    """Raise RequestError unless the model predicts every row of a table; covariates that it does not use are ignored.
-
-    The index in the error is that of the row.
-    """
-    needed = {name: column for name, column in table.covariates.items() if name in model.accepted}
-    check_requests(model, table.inputs, table.duration, needed)
 
 
 def _check(
@@ -113,10 +104,8 @@ def _check(
     low, high = model.duration_range
     near = "{:.3g} to {:.3g} s, close to the training durations of {}"
     _require("duration", duration, (duration >= low) & (duration <= high), near, low, high, model.name)
-    if model.predictor.integrates:
-        most = "at most {:.3g} m/s for {:g} s: a path of {:g} m"
-        within = velocity * duration <= FARTHEST
-        _require("velocity", velocity, within, most, FARTHEST / duration, duration, FARTHEST)
+    most = "at most {:.3g} m/s for {:g} s: a path of {:g} m"
+    _require("velocity", velocity, velocity * duration <= FARTHEST, most, FARTHEST / duration, duration, FARTHEST)
 
 
 def _require(

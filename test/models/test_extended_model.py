@@ -23,7 +23,7 @@ from msg_adapters.predictions import PushQuery, prediction_from_response, query_
 from push_predictor.cli import main
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.validation import compare, metrics_json
-from push_predictor.models.effects.covariate_range import range_of
+from push_predictor.models.effects.covariates import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import joint, joint_shift
@@ -31,12 +31,11 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.request import PushRequest, check_request, check_table
+from push_predictor.models.request import PushRequest, check_pushes, check_request
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
-from push_predictor.models.tabulated.table_accuracy import MEAN_TOLERANCE
-from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.tabulated.tabulated_model import MEAN_TOLERANCE, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
@@ -300,12 +299,12 @@ def test_unneeded_covariates_are_ignored(bases: dict[str, PushModel]) -> None:
     check_request(extended(bases["gp"], slippery(0.1)), push)
     table = pushes(5, 1)
     table.covariates["topic:/warmth"][:] = np.nan
-    check_table(extended(bases["gp"], slippery(0.1)), table)
+    check_pushes(extended(bases["gp"], slippery(0.1)), table)
 
 
 def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushModel]) -> None:
     with pytest.raises(RequestError, match="covariate elapsed_time: 'missing'"):
-        check_table(extended(bases["gp"], slippery(0.1)), replace(pushes(5, 1), covariates={}))
+        check_pushes(extended(bases["gp"], slippery(0.1)), replace(pushes(5, 1), covariates={}))
 
 
 # --- files ---------------------------------------------------------------------------------------------------

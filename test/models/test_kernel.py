@@ -21,6 +21,7 @@ from push_predictor.models.mechanics.kernel import push as compiled
 from push_predictor.models.mechanics.parameters import PARAMETERS, MechanicsParameter
 from push_predictor.models.mechanics.pressure import PressureDistribution
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
 RADIUS, LEVER = 0.00475, 0.03  # m; a turn counts as the path of a point at the lever
@@ -63,7 +64,7 @@ def kept(name: str) -> dict[str, Array]:
 
 
 def displaced(model: PushMechanics, values: Array, pushes: Array) -> Array:
-    return model.displaced(values, pushes[:, :3], pushes[:, 3], {"push_heading": pushes[:, 4]})
+    return model.displaced(values[:, None], Push(pushes[:, :3], pushes[:, 3], {"push_heading": pushes[:, 4]}))[:, 0]
 
 
 def apart(found: Array, expected: Array, pushes: Array) -> Array:
@@ -134,7 +135,7 @@ def test_each_recording_has_the_bits_of_its_own_support() -> None:
     pushes, values = kept("rect1, patch")["pushes"][:30], TEXTBOOK[None]
     model = PushMechanics(shape_outline("rect1"), RADIUS, None, {1: THREE_POINTS, 2: FOUR_POINTS})
     recording = np.arange(30) % 3
-    together = model.displaced(values, pushes[:, :3], pushes[:, 3], {"recording": recording})
+    together = model.displaced(values[:, None], Push(pushes[:, :3], pushes[:, 3], {"recording": recording}))[:, 0]
     for number, kind in enumerate(("patch", "three", "four")):
         rows = recording == number
         assert np.array_equal(together[rows], displaced(mechanics("rect1", kind), values, pushes[rows]))

@@ -17,8 +17,16 @@ from push_predictor.errors import RigError
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square, transformed
-from push_predictor.models.mechanics.load_map import AZIMUTHS, DIRECTIONS, ELEVATIONS, LoadMap, load_map, reach
-from push_predictor.models.mechanics.point_friction import power_of_twist, twist_of_load
+from push_predictor.models.mechanics.load_map import (
+    AZIMUTHS,
+    DIRECTIONS,
+    ELEVATIONS,
+    LoadMap,
+    load_map,
+    power_of_twist,
+    reach,
+    twist_of_load,
+)
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch, supported_at
 from push_predictor.models.mechanics.surface import uniform_ellipsoid
 from push_predictor.types import Array

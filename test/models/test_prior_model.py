@@ -23,11 +23,11 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, displacements, prior_spreads
+from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, prior_spreads, table_of
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
@@ -91,6 +91,12 @@ def after_ten() -> PushModel:
     return trained(pushed(20, 3))
 
 
+def displacements(
+    mechanics: PushMechanics, names: tuple[str, ...], draws: Array, inputs: Array, duration: Array
+) -> Array:
+    return mechanics.displaced(table_of(names, draws)[None], Push(inputs, duration, {}))
+
+
 # --- width -------------------------------------------------------------------------------------------------
 
 
@@ -101,7 +107,7 @@ def test_intervals_cover_outcomes_of_sliders_drawn_from_the_priors(untrained: Pu
     sliders = rng.normal([p.textbook for p in table], prior_spreads(names), (400, len(names)))
     sliders = sliders[np.all((sliders > [p.low for p in table]) & (sliders < [p.high for p in table]), axis=1)]
     inputs, duration = some_inputs(15, 0), np.full(15, 0.2)
-    found = displacements(predictor.fitted.mechanics, names, sliders, inputs, duration, {})
+    found = displacements(predictor.fitted.mechanics, names, sliders, inputs, duration)
     prediction = untrained.predict_rows(inputs, duration)
     roots = np.linalg.cholesky(prediction.process_covariance)
     outcomes = found + np.einsum("nab,nkb->nka", roots, rng.standard_normal(found.shape))
@@ -133,7 +139,7 @@ def test_estimates_are_the_most_probable_given_priors_and_pushes(untrained: Push
     found = np.array([predictor.fitted.values[name] for name in names])
     steps = 0.4 * np.concatenate([np.zeros((1, len(names))), np.eye(len(names)), -np.eye(len(names))])
     tried = found + steps * spread
-    moved = displacements(predictor.fitted.mechanics, names, tried, rows.inputs, rows.duration, {})
+    moved = displacements(predictor.fitted.mechanics, names, tried, rows.inputs, rows.duration)
     away = rows.outcomes[:, None] - moved
     prior = np.sum(((tried - list(means.values())) / spread) ** 2, axis=1)
     misfit = np.einsum("nsk,nkl,nsl->s", away, precision, away) + prior
@@ -234,9 +240,7 @@ def test_draws_have_the_covariance_of_the_priors_along_all_that_pushes_show(untr
     names, values = tuple(fitted.values), np.array(list(fitted.values.values()))
     spread, inputs, duration = prior_spreads(names), some_inputs(30, 2), np.full(30, 0.2)
     steps = np.diag(0.1 * spread)
-    found = displacements(
-        fitted.mechanics, names, np.concatenate([values + steps, values - steps]), inputs, duration, {}
-    )
+    found = displacements(fitted.mechanics, names, np.concatenate([values + steps, values - steps]), inputs, duration)
     slopes = (found[:, : len(names)] - found[:, len(names) :]) / 0.2
     deviates = (prior_draws(fitted, 3) - values) / spread
     drawn = np.einsum("npk,pq,nqk->nk", slopes, deviates.T @ deviates / DRAWS, slopes)

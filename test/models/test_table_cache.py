@@ -31,8 +31,7 @@ from push_predictor.models.store.table_cache import (
     table_folder,
     tables_of,
 )
-from push_predictor.models.tabulated.table_accuracy import Probes
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.tabulated.tabulated_model import Probes, TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 
 

@@ -28,15 +28,18 @@ from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import table_nodes
 from push_predictor.models.tabulated.grid_posterior import on_grid
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
-from push_predictor.models.tabulated.table_accuracy import (
+from push_predictor.models.tabulated.tabulated_model import (
+    COMPUTED,
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
+    REFINEMENTS,
     TableAccuracy,
+    TabulatedModel,
     outside_pushes,
     probed,
     relative_error,
+    tabulate,
 )
-from push_predictor.models.tabulated.tabulated_model import COMPUTED, REFINEMENTS, TabulatedModel, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

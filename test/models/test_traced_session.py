@@ -24,7 +24,7 @@ from push_predictor.models.effects.traced_session import Mark, TracedSession
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
-from push_predictor.models.request import check_table
+from push_predictor.models.request import check_pushes
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
@@ -148,7 +148,7 @@ def test_request_without_the_count_is_predicted_as_after_the_trace(base: PushMod
     assert np.array_equal(found.mean, after.mean) and not np.allclose(found.mean, before.mean, atol=1e-5)
     assert found.in_domain.all() and after.in_domain.all()
     with pytest.raises(RequestError, match="covariate push_index"):
-        check_table(model, replace(base.training, covariates={"push_index": np.full(len(base.training), np.nan)}))
+        check_pushes(model, replace(base.training, covariates={"push_index": np.full(len(base.training), np.nan)}))
 
 
 def pushed_at(**covariates: float) -> Pushes:

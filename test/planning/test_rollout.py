@@ -357,7 +357,7 @@ def test_accepts_a_singular_start_covariance() -> None:
 class Attentive:
     """A predictor that needs covariates, and remembers what it was given."""
 
-    learnt, integrates, effects, covariates, tails, own_limits = False, True, (), (), None, None
+    learnt, effects, covariates, tails, own_limits = False, (), (), None, None
     needs: tuple[str, ...]
     seen: list[Push] = field(default_factory=list)
 

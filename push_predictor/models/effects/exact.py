@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,6 +51,11 @@ class JointEffects:
         """The changes (n, q), at most the largest that a rig can have."""
         return np.minimum(np.maximum(columns @ self._weights, -self._largest), self._largest)
 
+    def shifted(self, mechanics: FittedMechanics, push: Push) -> tuple[Array, Array, Array]:
+        """Shift (n, 3) of the mean, its derivatives (n, q, 3) by the parameters, and the columns (n, b)."""
+        columns = self.columns(push)
+        return *mechanics.shifted(self.names, self.changes(columns), push), columns
+
     def design(self, columns: Array, slopes: Array) -> Array:
         """Derivatives (n, m, 3) by the coefficients, from those (n, q, 3) by the parameters."""
         parameter, column = self._acting
@@ -86,20 +92,11 @@ class JointEffects:
         return np.array([LARGEST[name] for name in self.names])
 
 
-@dataclass(frozen=True, eq=False)
-class JointShift:
-    """Shift (n, 3) of the mean; per effect, its derivatives (n, 3, p * m) by the coefficients.
-
-    of_parameter: those (n, 3) by each parameter of the mechanics that effects change.
-    """
+class JointShift(NamedTuple):
+    """Shift (n, 3) of the mean; per effect, its derivatives (n, 3, p * m) by the coefficients."""
 
     shift: Array
     designs: list[Array]
-    of_parameter: dict[str, Array]
-
-    def responses(self, effect: Effect) -> Array:
-        """Derivatives (n, 3, p) by the parameters that an effect changes."""
-        return np.stack([self.of_parameter[name] for name in effect.quantities], axis=2)
 
 
 def joint_shift(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push) -> Array:
@@ -109,26 +106,22 @@ def joint_shift(mechanics: FittedMechanics, effects: Sequence[Effect], push: Pus
 
 def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
     """The shift by all effects together, and its derivatives by their coefficients."""
-    acting, n = JointEffects.of(effects), len(push.inputs)
-    if not acting.effects:
-        found = JointShift(np.zeros((n, 3)), [], {})
-    elif derivatives:
-        columns = acting.columns(push)
-        shift, slopes = mechanics.shifted(acting.names, acting.changes(columns), push)
-        found = JointShift(shift, [], {name: slopes[:, k] for k, name in enumerate(acting.names)})
+    acting, shift, designs = JointEffects.of(effects), np.zeros((len(push.inputs), 3)), []
+    exact: Iterator[Array] = iter(())
+    if acting.effects and derivatives:
+        shift, slopes, columns = acting.shifted(mechanics, push)
         exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
-    else:
+    elif acting.effects:
         changes = acting.changes(acting.columns(push)).T
         still, moved = mechanics.displacements([{}, dict(zip(acting.names, changes, strict=True))], push)
-        found = JointShift(moved - still, [], {})
-    shift = found.shift
+        shift = moved - still
     for effect in effects:
         if not effect.exact:
-            found.designs.append(effect.design(mechanics, push))
-            shift = shift + found.designs[-1] @ effect.coefficients
+            designs.append(effect.design(mechanics, push))
+            shift = shift + designs[-1] @ effect.coefficients
         elif derivatives:
-            found.designs.append(next(exact))
-    return replace(found, shift=shift)
+            designs.append(next(exact))
+    return JointShift(shift, designs)
 
 
 def _ends(effects: Sequence[Effect]) -> IntArray:

@@ -19,7 +19,8 @@ import scipy
 
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, displacements
+from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, table_of
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array, IntArray
 
 HALF = 8  # directions of either half of a design
@@ -82,7 +83,8 @@ def _sensitivity(fitted: FittedMechanics, root: Array) -> Array:
     steps = _DIFFERENCE * root.T
     tried = np.clip(np.concatenate([values + steps, values - steps]), *_ranges(fitted))
     varied = ProcessNoise.changed(names, values)
-    found = displacements(fitted.mechanics, names, np.concatenate([varied, tried]), inputs, duration, {})
+    draws = table_of(names, np.concatenate([varied, tried]))
+    found = fitted.mechanics.displaced(draws[None], Push(inputs, duration, {}))
     noise = ProcessNoise().covariance(found[:, : len(varied)], _SPEED * duration, fitted.ellipsoid.length)
     above, below = np.split(found[:, len(varied) :], 2, axis=1)
     slopes = (above - below) / (2.0 * _DIFFERENCE)  # (n, p, 3)

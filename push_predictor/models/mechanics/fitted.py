@@ -55,25 +55,22 @@ class FittedMechanics:
 
     def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
-        return self.mechanics.displaced(self._row, inputs, duration, covariates, self._shape)
+        push = Push(inputs, duration, covariates or {})
+        return self.mechanics.displaced(self._row[None, None], push, self._shape)[:, 0]
 
     def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
-        """Displacements (k, n, 3) with each of k sets of changes of parameters, computed as one set of pushes.
+        """Displacements (k, n, 3) with each of k sets of changes of parameters, computed in one call.
 
         The heading of a push follows from that of the slider where it is given.
         """
-        k, n = len(tried), len(push.inputs)
-        values = np.empty((k, n, len(TEXTBOOK)))
+        values = np.empty((len(push.inputs), len(tried), len(TEXTBOOK)))
         values[:] = self._row
-        for own, changes in zip(values, tried, strict=True):
+        for k, changes in enumerate(tried):
             for name, change in changes.items():
-                own[:, COLUMN[name]] += change
+                values[:, k, COLUMN[name]] += change
         given = self._covariates(push, {name for changes in tried for name in changes})
-        if k > 1:
-            given = {name: np.tile(column, k) for name, column in given.items()}
-        inputs = np.broadcast_to(push.inputs, (k, n, 3)).reshape(-1, 3)
-        duration = np.broadcast_to(push.duration, (k, n)).reshape(-1)
-        return self.mechanics.displaced(values.reshape(k * n, -1), inputs, duration, given).reshape(k, n, 3)
+        found = self.mechanics.displaced(values, Push(push.inputs, push.duration, given))
+        return np.ascontiguousarray(found.transpose(1, 0, 2))
 
     def shifted(
         self, names: tuple[str, ...], changes: Array, push: Push, difference: float = DIFFERENCE
@@ -92,7 +89,7 @@ class FittedMechanics:
         """Where no rim changes it is the same for all changes of these parameters."""
         rim = "rim_exponent" in names
         if rim or names not in self._shapes:
-            ends = np.repeat(self._row, 2, axis=0)
+            ends = np.tile(self._row, (2, 1))
             for k, name in enumerate(names):
                 step = difference * BY_NAME[name].spread
                 ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
@@ -136,7 +133,7 @@ class FittedMechanics:
         row = TEXTBOOK.copy()
         for name, value in self.values.items():
             row[COLUMN[name]] = value
-        return row[None]
+        return row
 
     def _covariates(self, push: Push, names: Iterable[str]) -> dict[str, Array]:
         """What the mechanics with changes of these parameters need of the covariates of pushes."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.mechanics.kernel.push import displacements, drawn, shifts
+from push_predictor.models.mechanics.kernel.push import Slider, displacements, shifts
 from push_predictor.models.mechanics.parameters import PARAMETERS, ParameterValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.mechanics.surface import (
@@ -45,7 +45,7 @@ class Shape(NamedTuple):
     """What the kernel needs in addition to pushes and values. in_world: whether the heading of a push matters."""
 
     in_world: bool
-    given: tuple[Array, Array, Array, Array, float, float, float]
+    slider: Slider
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,61 +77,38 @@ class PushMechanics:
         if unknown := set(values) - set(COLUMN):
             raise KeyError(f"{sorted(unknown)[0]!r} is no parameter of the mechanics: {', '.join(COLUMN)}")
         alike = all(np.ndim(value) == 0 for value in values.values())
-        table = np.tile(TEXTBOOK, (1 if alike else len(inputs), 1))
+        table = np.tile(TEXTBOOK, (1 if alike else len(inputs), 1, 1))
         for name, value in values.items():
-            table[:, COLUMN[name]] = value
-        return self.displaced(table, inputs, duration, covariates)
+            table[:, 0, COLUMN[name]] = value
+        return self.displaced(table, Push(inputs, duration, covariates or {}))[:, 0]
 
-    def displaced(
-        self,
-        values: Array,
-        inputs: Array,
-        duration: Array,
-        covariates: Mapping[str, Array] | None = None,
-        shape: Shape | None = None,
-    ) -> Array:
-        """The same with values as rows (n, 28) in the order of parameters.PARAMETERS, or (1, 28) for all pushes.
+    def displaced(self, values: Array, push: Push, shape: Shape | None = None) -> Array:
+        """The same (n, k, 3) with k rows of values in the order of parameters.PARAMETERS for each of n pushes.
 
-        shape: `shape_of` the values, where it is known.
+        values (n, k, 28), or (1, k, 28) for all pushes. shape: `shape_of` the values, where it is known.
         """
-        found = np.empty((len(inputs), 3))
-        if len(inputs):
-            shape = shape or self.shape_of(values)
-            displacements(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
-        return found
-
-    def drawn(
-        self,
-        values: Array,
-        inputs: Array,
-        duration: Array,
-        covariates: Mapping[str, Array] | None = None,
-        shape: Shape | None = None,
-    ) -> Array:
-        """Displacements (n, k, 3) of each push with each of k rows of values (k, 28); shape as in `displaced`."""
-        found = np.empty((len(inputs), len(values), 3))
+        found = np.empty((len(push.inputs), values.shape[1], 3))
         if found.size:
             shape = shape or self.shape_of(values)
-            drawn(_writeable(values), self._pushes(shape, inputs, duration, covariates), *shape.given, found)
+            displacements(_writeable(values), self._pushes(shape, push), shape.slider, found)
         return found
 
     def shifted(self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push) -> Array:
         """What changes (n, q) of q parameters shift, and its derivatives by each of them, (n, 1 + q, 3).
 
-        values (1, 28); shape: theirs with the changes, see shape_of. moved (3, q): index of the parameter, step of its
+        values (28,); shape: theirs with the changes, see shape_of. moved (3, q): index of the parameter, step of its
         central difference, least change of it.
         """
         found = np.empty((len(changes), 1 + changes.shape[1], 3))
         if len(changes):
-            pushes = self._pushes(shape, push.inputs, push.duration, push.covariates)
-            shifts(values, _writeable(changes), moved, pushes, *shape.given, found)
+            shifts(values, _writeable(changes), moved, self._pushes(shape, push), shape.slider, found)
         return found
 
     def shape_of(self, values: Array) -> Shape:
-        """What the kernel needs for pushes with values (k, 28), tabulated if it is not yet."""
-        in_world = bool(values[:, _IN_WORLD].any())
-        stretched = bool(values[:, _STRETCHING].any() or (in_world and values[:, _GRAIN].any()))
-        exponents = values[:, _RIM]
+        """What the kernel needs for pushes with values (..., 28), tabulated if it is not yet."""
+        in_world = bool(values[..., _IN_WORLD].any())
+        stretched = bool(values[..., _STRETCHING].any() or (in_world and values[..., _GRAIN].any()))
+        exponents = values[..., _RIM]
         knots = knots_about(float(exponents.min()), float(exponents.max())) if self.support is None else ()
         if knots not in self._tables:
             if isinstance(self.support, PowerSurface):
@@ -141,13 +118,12 @@ class PushMechanics:
         tables = self._tables[knots]
         slopes = tables.slopes if stretched else NO_SLOPES
         surfaces = tables.cells, slopes, tables.quantities, tables.power
-        return Shape(in_world, (self.outline.boundary, *surfaces, self.pusher_radius, self.accuracy))
+        return Shape(in_world, Slider(self.outline.boundary, *surfaces, self.pusher_radius, self.accuracy))
 
-    def _pushes(self, shape: Shape, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Array:
+    def _pushes(self, shape: Shape, push: Push) -> Array:
         """Pushes (n, 6) as the kernel takes them."""
-        pushes = np.empty((len(inputs), 6))
-        pushes[:, :3], pushes[:, 3] = inputs, duration
-        given = covariates or {}
+        pushes, given = np.empty((len(push.inputs), 6)), push.covariates
+        pushes[:, :3], pushes[:, 3] = push.inputs, push.duration
         pushes[:, 4] = given["push_heading"] if shape.in_world else 0.0
         pushes[:, 5] = -1.0 if self.support is None else 0.0
         if self.supports and RECORDING in given:

@@ -15,7 +15,7 @@ covariance, and the size of the noise. The windows of a push share their deviati
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
 from push_predictor.models.mechanics.kernel.push import drawn_moments
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.models.pushes import Push
 from push_predictor.types import Array, IntArray
 
 CORRELATION = 0.5  # of the windows of a push; planning/persistence.py finds 0.45 and more
@@ -106,8 +107,8 @@ class _Update:
         return _Local(self.rows.outcomes - found[:, 0], jacobian, noise)
 
     def _displacements(self, draws: Array) -> Array:
-        rows = self.rows
-        return displacements(self.mechanics, self.names, draws, rows.inputs, rows.duration, rows.covariates)
+        push = Push(self.rows.inputs, self.rows.duration, self.rows.covariates)
+        return self.mechanics.displaced(table_of(self.names, draws)[None], push)
 
     def _precision(self, noise: Array, factor: Array) -> Array:
         root = np.sqrt(factor)
@@ -175,21 +176,6 @@ def drawn_parameters(known_support: bool) -> tuple[str, ...]:
 def prior_spreads(names: Sequence[str]) -> Array:
     """Standard deviations (p,) from rig to rig of the parameters before the first push."""
     return np.array([PRIOR_SHARE * BY_NAME[name].spread for name in names])
-
-
-def displacements(
-    mechanics: PushMechanics,
-    names: Sequence[str],
-    draws: Array,
-    inputs: Array,
-    duration: Array,
-    covariates: Mapping[str, Array],
-) -> Array:
-    """Displacements (n, k, 3: m, m, rad) of n pushes under k draws (k, p) of the parameters.
-
-    inputs (n, 3), duration (n,) s, covariates as in PushMechanics.displacement.
-    """
-    return mechanics.drawn(table_of(names, draws), inputs, duration, covariates)
 
 
 def table_of(names: Sequence[str], draws: Array) -> Array:

@@ -60,11 +60,6 @@ class ExtendedPredictor:
         """See BasePredictor."""
         return self.base.absorbs
 
-    @property
-    def integrates(self) -> bool:
-        """See BasePredictor: responses of effects are derivatives of integrated mechanics."""
-        return True
-
     @cached_property
     def covariates(self) -> tuple[str, ...]:
         """See BasePredictor."""
@@ -135,8 +130,7 @@ class ExtendedPredictor:
             together = joint(self.mechanics, self.effects, push)
             design = np.concatenate(together.designs, axis=2).transpose(0, 2, 1)
             return Shift(together.shift, design.transpose(0, 2, 1) @ self._covariance @ design)
-        columns = self._acting.columns(push)
-        shift, slopes = self.mechanics.shifted(self._acting.names, self._acting.changes(columns), push)
+        shift, slopes, columns = self._acting.shifted(self.mechanics, push)
         return Shift(shift, self._acting.uncertainty(columns, slopes, self._covariance))
 
     @cached_property

@@ -41,10 +41,7 @@ class GaussianProcessPredictor(BasePredictor):
     mean: FittedMechanics | None = None
     tails: Tails | None = None
 
-    @property
-    def learnt(self) -> bool:
-        """See BasePredictor."""
-        return True
+    learnt = True
 
     @property
     def gaussian(self) -> bool:
@@ -55,11 +52,6 @@ class GaussianProcessPredictor(BasePredictor):
     def absorbs(self) -> bool:
         """See BasePredictor: without a mean."""
         return self.mean is None
-
-    @property
-    def integrates(self) -> bool:
-        """See BasePredictor."""
-        return self.mean is not None
 
     @cached_property
     def mechanics(self) -> FittedMechanics:
@@ -170,10 +162,14 @@ class GaussianProcessPredictor(BasePredictor):
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""
-        mean = np.column_stack([p.mean for p in latent]) * self.scaling.outcome_sd + self.scaling.outcome_mean
-        of_function = np.column_stack([p.variance for p in latent]) * self.reported_sd**2
-        of_process = np.column_stack([p.process_variance for p in latent]) * self.reported_sd**2
-        return Moments(mean, *covariances(of_function, of_process, correlation))
+        found = np.empty((4, len(latent[0].mean), len(latent)))
+        for k, p in enumerate(latent):
+            found[:, :, k] = p.mean, p.variance, p.log_noise_mean, p.log_noise_variance
+        mean, variance, log_noise, uncertainty = found
+        of_process = np.exp(log_noise + 0.5 * uncertainty)
+        factor = self.reported_sd**2
+        mean = mean * self.scaling.outcome_sd + self.scaling.outcome_mean
+        return Moments(mean, *covariances(variance * factor, of_process * factor, correlation))
 
     def _log_density(self, latent: Sequence[LatentPrediction], push: Push, outcomes: Array) -> Array:
         """Log density (n, 3) of outcomes (n, 3) under latent predictions in standardised units, one per output."""

@@ -57,6 +57,10 @@ class BasePredictor(ABC):
     session: ClassVar[TracedSession] = TracedSession()
     defaults: ClassVar[Mapping[str, float]] = MappingProxyType({})
     past: ClassVar[tuple[str, ...]] = ()
+    # Whether it was fitted as a function of its inputs, so that its training data bound its domain; limits of the
+    # pushes for which it is meant, None if its training pushes bound its domain.
+    learnt: ClassVar[bool] = False
+    own_limits: ClassVar[InputLimits | None] = None
 
     @property
     def base(self: Self) -> Self:
@@ -69,19 +73,9 @@ class BasePredictor(ABC):
         """Mechanics whose parameters effects change: its own, or the textbook's if it has none."""
 
     @property
-    def learnt(self) -> bool:
-        """Whether it was fitted as a function of its inputs, so that its training data bound its domain."""
-        return False
-
-    @property
     def absorbs(self) -> bool:
         """Whether a refit learns a constant change of the mechanics, because it keeps no parameters of theirs."""
         return False
-
-    @property
-    def integrates(self) -> bool:
-        """Whether predicting integrates mechanics, which takes longer the further the push."""
-        return True
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -96,11 +90,6 @@ class BasePredictor(ABC):
     @property
     def tails(self) -> Tails | None:
         """Distribution of the outcomes in units of the standard deviations; None for a Gaussian or a VHGP's own."""
-        return None
-
-    @property
-    def own_limits(self) -> InputLimits | None:
-        """Limits of the pushes for which it is meant; None if its training pushes bound its domain."""
         return None
 
     def completed(self, push: Push) -> Push:

@@ -34,20 +34,13 @@ class PriorPredictor(BasePredictor):
     draws: Array
     noise: ProcessNoise
 
+    own_limits = InputLimits((0.0, FASTEST), (-STEEPEST, STEEPEST))  # all around, where the priors are meant
+    absorbs = True  # a refit updates the priors of its parameters
+
     @property
     def mechanics(self) -> FittedMechanics:
         """See Predictor."""
         return self.fitted
-
-    @property
-    def own_limits(self) -> InputLimits:
-        """See Predictor: pushes all around the slider, at the speeds and angles for which the priors are meant."""
-        return InputLimits((0.0, FASTEST), (-STEEPEST, STEEPEST))
-
-    @property
-    def absorbs(self) -> bool:
-        """See Predictor: a refit updates the priors of its parameters."""
-        return True
 
     def moments(self, push: Push) -> Moments:
         """See Predictor. The covariance is that of the draws plus the process noise."""
@@ -86,4 +79,4 @@ class PriorPredictor(BasePredictor):
 
     def _displacements(self, values: Array, push: Push) -> Array:
         """Displacements (n, k, 3) of n pushes under k rows (k, 28) of parameters."""
-        return self._mechanics.drawn(values, push.inputs, push.duration, push.covariates, self._shape)
+        return self._mechanics.displaced(values[None], push, self._shape)

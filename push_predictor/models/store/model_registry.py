@@ -22,7 +22,7 @@ class ModelRegistry:
     """Loaded models in the order of loading.
 
     A model is registered only after its file has been read completely and it has predicted. `complete` adds what makes
-    its predictions fast; they change by no more than the tolerances of tabulated.table_accuracy.
+    its predictions fast; they change by no more than the tolerances of tabulated_model.
     """
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.models.effects.covariates import CUMULATIVE
-from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
+from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import GENERIC_WIDTH, Effect
 from push_predictor.models.effects.exact import covariance_of
 from push_predictor.models.effects.traced_session import Mark, TracedSession
@@ -28,7 +28,7 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution
 from push_predictor.models.mechanics.prior import VARYING, ProcessNoise
 from push_predictor.models.mechanics.surface import PowerSurface
-from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
+from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.predictors import (
     BasePredictor,
     ExtendedPredictor,
@@ -137,38 +137,6 @@ def _table(a: SimpleNamespace) -> None:
         raise ValueError(f"a training push is longer than {LONGEST_PUSH:g} m")
 
 
-def _tails(a: SimpleNamespace) -> None:
-    if np.any(np.diff(a.quantiles, axis=0) < 0.0):
-        raise ValueError("quantiles decrease")
-
-
-def _correlation(a: SimpleNamespace) -> None:
-    n = len(a.features)
-    if a.rows is not None:
-        _check_rows("rows", a.rows, n)
-        n = len(a.rows)
-    if a.residuals.shape != (n, 3):
-        raise ValueError(f"residuals of shape {a.residuals.shape}, {(n, 3)} is needed")
-
-
-def _vhgp(a: SimpleNamespace) -> None:
-    if a.site_precisions.shape != a.outputs.shape:
-        raise ValueError(f"site_precisions of shape {a.site_precisions.shape}, {a.outputs.shape} is needed")
-
-
-def _sparse(a: SimpleNamespace) -> None:
-    _vhgp(a)
-    for name in ("inducing_signal", "inducing_noise"):
-        _check_rows(name, rows := getattr(a, name), len(a.outputs))
-        if not 0 < len(np.unique(rows)) == len(rows):
-            raise ValueError(f"{name} does not contain distinct rows")
-
-
-def _check_rows(name: str, rows: np.ndarray, n: int) -> None:
-    if rows.ndim != 1 or np.any(rows < 0) or np.any(rows >= n):
-        raise ValueError(f"{name} does not contain indices below {n}")
-
-
 def _fitted(a: SimpleNamespace) -> None:
     for name, value in a.values.items():
         _check_parameter(name, value, value)
@@ -194,10 +162,6 @@ def _mechanics(a: SimpleNamespace) -> None:
             raise ValueError("support points are far too large or too close together for the outline")
 
 
-def _of_mechanics(a: SimpleNamespace) -> None:
-    np.linalg.cholesky(a.covariance)
-
-
 def _prior(a: SimpleNamespace) -> None:
     names = list(a.fitted.values)
     if a.draws.ndim != 2 or a.draws.shape[1] != len(names) or not 2 <= len(a.draws) <= MOST_DRAWS:
@@ -209,8 +173,6 @@ def _prior(a: SimpleNamespace) -> None:
 
 
 def _basis(a: SimpleNamespace) -> None:
-    if a.name not in BASES:
-        raise ValueError(f"name {a.name!r} is not accepted, give one of {', '.join(BASES)}")
     if len(a.drivers) != (count := DRIVERS.get(a.name, 1)):
         raise ValueError(f"drivers {a.drivers!r} are not accepted for {a.name!r}, give {count} name(s)")
     if a.name in SCALED and not len(a.centre) == len(a.scale) == count:
@@ -220,8 +182,6 @@ def _basis(a: SimpleNamespace) -> None:
 
 
 def _effect(a: SimpleNamespace) -> None:
-    if a.mechanism is not None and a.mechanism not in [known.name for known in (*LIBRARY, *REFINEMENTS)]:
-        raise ValueError(f"mechanism {a.mechanism!r} is not in the library")
     width = GENERIC_WIDTH if a.mechanism is None else len(mechanism_named(a.mechanism).parameters)
     size = width * columns_of(a.basis)
     if a.coefficients.shape != (size,) or a.covariance.shape != (size, size):
@@ -259,13 +219,8 @@ def _check_covariance(covariance: Array) -> None:
 
 CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     PushTable: _table,
-    Tails: _tails,
-    Correlation: _correlation,
-    VHGP: _vhgp,
-    SparseVHGP: _sparse,
     FittedMechanics: _fitted,
     PushMechanics: _mechanics,
-    MechanicsPredictor: _of_mechanics,
     PriorPredictor: _prior,
     DriverBasis: _basis,
     Effect: _effect,

@@ -30,9 +30,16 @@ from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import load_model, model_digest
 from push_predictor.models.tabulated.prediction_table import table_from_nodes
-from push_predictor.models.tabulated.table_accuracy import Probes, TableAccuracy, probed
 from push_predictor.models.tabulated.table_nodes import TableNodes
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, of_targets, tabulate, with_table
+from push_predictor.models.tabulated.tabulated_model import (
+    Probes,
+    TableAccuracy,
+    TabulatedModel,
+    of_targets,
+    probed,
+    tabulate,
+    with_table,
+)
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 

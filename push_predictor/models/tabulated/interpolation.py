@@ -91,9 +91,11 @@ def _weights(u: Array) -> list[Array]:
     return [vv * v / 6.0, (4.0 - 6.0 * uu + 3.0 * uu * u) / 6.0, (4.0 - 6.0 * vv + 3.0 * vv * v) / 6.0, uu * u / 6.0]
 
 
-def along(axis: int, matrix: Array, values: Array) -> Array:
-    """The values with a matrix (m, k) applied along an axis of length k."""
-    return np.moveaxis(np.tensordot(matrix, values, axes=(1, axis)), 0, axis)
+def along_all(matrices: Sequence[Array], values: Array) -> Array:
+    """Values (boxes, k_1, ..., k_D) with a matrix (m_d, k_d) applied along each axis but the first."""
+    for axis, matrix in enumerate(matrices, 1):
+        values = np.moveaxis(np.tensordot(matrix, values, axes=(1, axis)), 0, axis)
+    return values
 
 
 def _knots_to_coefficients(cells: int) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from push_predictor.models.predictors import GaussianProcessPredictor, Moments
 from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
 from push_predictor.models.tabulated.grid_posterior import OnGrid
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along_all
 from push_predictor.models.tabulated.push_chart import Chart, push_chart, table_sides
 from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.tabulated.table_nodes import MOST_KNOTS, Grid, TableNodes, table_nodes
@@ -92,10 +92,9 @@ def wide_box(model: PushModel, predictor: GaussianProcessPredictor) -> tuple[Arr
 
 
 def narrow_box(model: PushModel) -> tuple[Array, Array]:
-    """The same of a table of the domain alone."""
-    inputs, chart = model.training.inputs, push_chart(model.rig.outline)
-    low, high = inputs.min(axis=0), inputs.max(axis=0)
-    low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
+    """The same of a table of all places at the speeds and angles of the training alone."""
+    low, high = model.training.inputs.min(axis=0), model.training.inputs.max(axis=0)
+    low[1], high[1] = 0.0, 1.0
     return low, high
 
 
@@ -131,7 +130,7 @@ def table_from_nodes(
     if predictor.correlation is not None:
         coupling = Grid(sides, 1.0).coupling(predictor.correlation, nodes.coarse)
         matrices = [axis.coarse_to_coefficients(count) for axis, count in zip(axes, nodes.coarse, strict=True)]
-        parts += [_along_all(matrices, values) for values in coupling]
+        parts += [along_all(matrices, values) for values in coupling]
     order = [3 * output + part for part in range(3) for output in range(3)] + list(range(9, len(parts)))
     coefficients = np.empty((*np.broadcast_shapes(*(part.shape for part in parts)), len(parts)), dtype=np.float32)
     for place, k in enumerate(order):  # what is constant has one box
@@ -145,13 +144,7 @@ def table_from_nodes(
 def _coefficients(values: Array, axes: Sequence[Axis]) -> Array:
     """Of a spline, from values (boxes, nodes_1, ...) at the nodes."""
     counts = values.shape[1:]
-    return _along_all([axis.nodes_to_coefficients(count) for axis, count in zip(axes, counts, strict=True)], values)
-
-
-def _along_all(matrices: Sequence[Array], values: Array) -> Array:
-    for d, matrix in enumerate(matrices):
-        values = along(d + 1, matrix, values)
-    return values
+    return along_all([axis.nodes_to_coefficients(count) for axis, count in zip(axes, counts, strict=True)], values)
 
 
 def _as_slice(columns: Sequence[int]) -> slice:

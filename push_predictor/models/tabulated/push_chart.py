@@ -10,7 +10,6 @@ exponential kernel is a product over the sides of the box.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -42,17 +41,10 @@ class SmoothChart:
         """Places (n,) and boxes of contacts (n,) in [0, 1)."""
         return self.order * contact % 1.0, np.zeros(len(contact), dtype=np.intp)
 
-    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
-        """The features of places (n,), column by column."""
-        turn = 2.0 * np.pi * place
-        return np.cos(turn), np.sin(turn)
-
-    def place_range(self, places: Array) -> tuple[float, float]:
-        """The part of the place's axis that a domain around places (m,) can reach.
-
-        A box of cosine and sine may be in several pieces along the outline.
-        """
-        return 0.0, 1.0
+    def place_features(self, places: Array) -> Array:
+        """The features (boxes, m, columns) of the places (m,) of every box."""
+        turn = 2.0 * np.pi * places
+        return np.column_stack([np.cos(turn), np.sin(turn)])[None]
 
 
 class PolygonChart:
@@ -69,13 +61,9 @@ class PolygonChart:
         edge = self._starts.searchsorted(contact, side="right") - 1
         return (contact - self._starts[edge]) * self._per_length[edge], edge % self.boxes
 
-    def place_features(self, place: Array, box: IntArray) -> tuple[Array, ...]:
+    def place_features(self, places: Array) -> Array:
         """See SmoothChart."""
-        return (np.asarray(EDGE_SPACING * box + place),)
-
-    def place_range(self, places: Array) -> tuple[float, float]:
-        """Where edges differ, the domain contains most of them completely."""
-        return (float(places.min()), float(places.max())) if self.boxes == 1 else (0.0, 1.0)
+        return np.asarray(EDGE_SPACING * np.arange(self.boxes)[:, None, None] + places[:, None])
 
 
 Chart: TypeAlias = SmoothChart | PolygonChart
@@ -92,26 +80,35 @@ _PATH = 65  # points along which lengthscales are counted
 
 def table_sides(scaling: Scaling, chart: Chart, low: Array, high: Array) -> list[Side]:
     """Those of velocity, place and angle that vary, over the box from low (3,) to high (3,)."""
-    groups = ((0,), chart.place_columns, (len(chart.place_columns) + 1,))
-    sides = []
-    for column, (group, features) in enumerate(zip(groups, (_itself, _places(chart), _itself), strict=True)):
+    groups, sides = ((0,), chart.place_columns, (len(chart.place_columns) + 1,)), []
+    for column, group in enumerate(groups):
         chosen = [k for k, feature in enumerate(group) if feature in scaling.columns]
         if chosen:
             used = [scaling.columns.index(group[k]) for k in chosen]
-            standardised = _standardised(features, chosen, scaling.feature_mean[used], scaling.feature_sd[used])
-            sides.append(Side(column, float(low[column]), float(high[column]), used, standardised))
+            sides.append(Side(column, float(low[column]), float(high[column]), used, chosen, chart, scaling))
     return sides
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of velocity, place and angle that the model uses: `used` are its columns among the model's features."""
+    """One of velocity, place and angle that the model uses, from low to high.
+
+    used: its columns among the model's features; chosen: which of its own features these are.
+    """
 
     column: int
     low: float
     high: float
     used: list[int]
-    features: Callable[[Array], Array]  # values (m,) -> standardised features (boxes, m, len(used))
+    chosen: list[int]
+    chart: Chart
+    scaling: Scaling
+
+    def features(self, values: Array) -> Array:
+        """Standardised features (boxes, m, len(used)) of values (m,); one box does for velocity and angle."""
+        own = self.chart.place_features(values) if self.column == 1 else values[None, :, None]
+        mean, sd = self.scaling.feature_mean[self.used], self.scaling.feature_sd[self.used]
+        return np.asarray((own[:, :, self.chosen] - mean) / sd)
 
     def lengthscales(self, kernel: ArdKernel) -> float:
         """How many lengthscales of a kernel lie between low and high; around a closed outline 2 pi at least."""
@@ -127,20 +124,3 @@ class Side:
 
     def _scaled(self, kernel: ArdKernel, features: Array) -> Array:
         return np.asarray(features / np.exp(kernel.log_lengthscales[self.used]))
-
-
-def _itself(values: Array) -> Array:
-    return values[None, :, None]
-
-
-def _places(chart: Chart) -> Callable[[Array], Array]:
-    """Features (boxes, m, columns) of the places (m,) of every box."""
-    return lambda places: np.stack(
-        [np.column_stack(chart.place_features(places, np.full(len(places), k))) for k in range(chart.boxes)]
-    )
-
-
-def _standardised(
-    features: Callable[[Array], Array], chosen: list[int], mean: Array, sd: Array
-) -> Callable[[Array], Array]:
-    return lambda values: (features(values)[:, :, chosen] - mean) / sd

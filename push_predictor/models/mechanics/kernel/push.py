@@ -12,86 +12,88 @@ import cython
 from cython.cimports.libc.math import atan2, cos, exp, sin
 from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Nearest, body_of, contact_at, nearest_to
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surface, root_of
-from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Pose, Push, Slider, Tables, Values, swept
+from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Common, Pose, Push, Tables, Values, swept
 
 CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
 QUANTITIES = cython.declare(cython.Py_ssize_t, 23)
 PARAMETERS = cython.declare(cython.int, 28)
 
 
+@cython.cclass
+class Slider:
+    """A slider as the kernel takes it: boundary, limit surfaces, pusher and accuracy."""
+
+    common: Common
+    _given: object
+
+    def __init__(
+        self,
+        boundary: cython.double[::1],
+        cells: cython.double[:, :, ::1],
+        slopes: cython.double[:, :, :, ::1],
+        quantities: cython.double[:, ::1],
+        power: cython.double,
+        pusher_radius: cython.double,
+        accuracy: cython.double,
+    ) -> None:
+        """boundary: see Outline.boundary. pusher_radius m. accuracy: relative.
+
+        cells (T, 6912, 16), slopes (T, 2, 6912, 16) or empty where no parameter needs them, quantities (T, 23): see
+        SurfaceTables; power: of the power law where there is no table, else 0.
+        """
+        arrays = boundary.base, cells.base, slopes.base, quantities.base  # pointers lead into them
+        self._given = (*arrays, power, pusher_radius, accuracy)
+        self.common.body = body_of(cython.address(boundary[0]))
+        self.common.pusher_radius, self.common.accuracy = pusher_radius, accuracy
+        tables: cython.pointer(Tables) = cython.address(self.common.tables)
+        tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
+        tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
+        tables.quantities, tables.count = cython.address(quantities[0, 0]), quantities.shape[0]
+        tables.power, tables.known = power, 0
+        exponent: cython.p_double = tables.quantities + QUANTITIES - 1
+        while tables.known < tables.count and exponent[0] != exponent[0]:  # a known support has no exponent
+            tables.known += 1
+            exponent += QUANTITIES
+
+    def __reduce__(self) -> object:
+        """Of another process: built again from the same arrays."""
+        return Slider, self._given
+
+
 def displacements(
-    values: cython.double[:, ::1],
-    pushes: cython.double[:, ::1],
-    boundary: cython.double[::1],
-    cells: cython.double[:, :, ::1],
-    slopes: cython.double[:, :, :, ::1],
-    quantities: cython.double[:, ::1],
-    power: cython.double,
-    pusher_radius: cython.double,
-    accuracy: cython.double,
-    found: cython.double[:, ::1],
+    values: cython.double[:, :, ::1], pushes: cython.double[:, ::1], slider: Slider, found: cython.double[:, :, ::1]
 ) -> None:
-    """Compute displacements (n, 3: dx, dy in m, dtheta in rad) of the recorded origin in the recorded push frame.
+    """Compute displacements (n, k, 3: dx, dy in m, dtheta in rad) of the recorded origin in the recorded push frame.
 
-    values (n, 28): of parameters.PARAMETERS, or (1, 28) for all pushes. pushes (n, 6): velocity m/s, contact, angle
-    rad, duration s, heading of the push in the world rad, number of its known table, -1 for the patch. boundary: see
-    Outline.boundary. cells (T, 6912, 16), slopes (T, 2, 6912, 16) or empty where no parameter needs them, quantities
-    (T, 23): see SurfaceTables; power: of the power law where there is no table, else 0. pusher_radius m. accuracy:
-    relative. found (n, 3) is written; what takes too many steps, or is not finite, is not a number.
+    values (n, k, 28): k rows of parameters.PARAMETERS for each push, or (1, k, 28) for all pushes. pushes (n, 6):
+    velocity m/s, contact, angle rad, duration s, heading of the push in the world rad, number of its known table, -1
+    for the patch. found (n, k, 3) is written; what takes too many steps, or is not finite, is not a number.
     """
-    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
     own: cython.Py_ssize_t = 1 if values.shape[0] > 1 else 0
-    n: cython.Py_ssize_t
-    with cython.nogil:
-        for n in range(pushes.shape[0]):
-            row: cython.p_double = cython.address(values[n * own, 0])
-            _displacement(row, cython.address(pushes[n, 0]), cython.address(slider), cython.address(found[n, 0]))
-
-
-def drawn(
-    values: cython.double[:, ::1],
-    pushes: cython.double[:, ::1],
-    boundary: cython.double[::1],
-    cells: cython.double[:, :, ::1],
-    slopes: cython.double[:, :, :, ::1],
-    quantities: cython.double[:, ::1],
-    power: cython.double,
-    pusher_radius: cython.double,
-    accuracy: cython.double,
-    found: cython.double[:, :, ::1],
-) -> None:
-    """Compute displacements (n, k, 3) of each push with each of k rows of values (k, 28). The rest as above."""
-    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
+    common: cython.pointer(Common) = cython.address(slider.common)
     n: cython.Py_ssize_t
     k: cython.Py_ssize_t
     with cython.nogil:
         for n in range(pushes.shape[0]):
-            push: cython.p_double = cython.address(pushes[n, 0])
-            for k in range(values.shape[0]):
-                row: cython.p_double = cython.address(values[k, 0])
-                _displacement(row, push, cython.address(slider), cython.address(found[n, k, 0]))
+            for k in range(values.shape[1]):
+                row: cython.p_double = cython.address(values[n * own, k, 0])
+                _displacement(row, cython.address(pushes[n, 0]), common, cython.address(found[n, k, 0]))
 
 
 def shifts(
-    values: cython.double[:, ::1],
+    values: cython.double[::1],
     changes: cython.double[:, ::1],
     moved: cython.double[:, ::1],
     pushes: cython.double[:, ::1],
-    boundary: cython.double[::1],
-    cells: cython.double[:, :, ::1],
-    slopes: cython.double[:, :, :, ::1],
-    quantities: cython.double[:, ::1],
-    power: cython.double,
-    pusher_radius: cython.double,
-    accuracy: cython.double,
+    slider: Slider,
     found: cython.double[:, :, ::1],
 ) -> None:
     """Compute what changes (n, q) of q parameters shift, and its derivatives by each of them, by central differences.
 
-    values (1, 28). moved (3, q): number of the parameter, step of its difference, least change of it. found
+    values (28,). moved (3, q): number of the parameter, step of its difference, least change of it. found
     (n, 1 + q, 3) is written: the shift, then the derivatives. The rest as in `displacements`.
     """
-    slider: Slider = _slider(boundary, cells, slopes, quantities, power, pusher_radius, accuracy)
+    common: cython.pointer(Common) = cython.address(slider.common)
     own: cython.double[28]
     tried: cython.double[3]
     column: cython.Py_ssize_t
@@ -103,9 +105,9 @@ def shifts(
         for n in range(pushes.shape[0]):
             push: cython.p_double = cython.address(pushes[n, 0])
             for i in range(PARAMETERS):
-                own[i] = values[0, i]
+                own[i] = values[i]
             for end in range(2):
-                _displacement(own, push, cython.address(slider), tried)
+                _displacement(own, push, common, tried)
                 for i in range(3):
                     found[n, 0, i] = tried[i] - found[n, 0, i] if end else tried[i]
                 if end == 0:
@@ -114,14 +116,14 @@ def shifts(
             for k in range(changes.shape[1]):
                 column = cython.cast(cython.Py_ssize_t, moved[0, k])
                 changed: cython.double = own[column]
-                least: cython.double = values[0, column] + moved[2, k]
+                least: cython.double = values[column] + moved[2, k]
                 least = changed if changed < least else least
                 low: cython.double = changed - moved[1, k]
                 low = least if low < least else low
                 high: cython.double = changed + moved[1, k]
                 for end in range(2):
                     own[column] = high if end else low
-                    _displacement(own, push, cython.address(slider), tried)
+                    _displacement(own, push, common, tried)
                     for i in range(3):
                         found[n, 1 + k, i] = (tried[i] - found[n, 1 + k, i]) / (high - low) if end else tried[i]
                 own[column] = changed
@@ -207,40 +209,15 @@ def propagated(
 
 
 @cython.cfunc
-@cython.exceptval(check=False)
-def _slider(
-    boundary: cython.double[::1],
-    cells: cython.double[:, :, ::1],
-    slopes: cython.double[:, :, :, ::1],
-    quantities: cython.double[:, ::1],
-    power: cython.double,
-    pusher_radius: cython.double,
-    accuracy: cython.double,
-) -> Slider:
-    slider: Slider
-    slider.body = body_of(cython.address(boundary[0]))
-    slider.pusher_radius, slider.accuracy = pusher_radius, accuracy
-    slider.tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
-    slider.tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
-    slider.tables.quantities, slider.tables.count = cython.address(quantities[0, 0]), quantities.shape[0]
-    slider.tables.power, slider.tables.known = power, 0
-    exponent: cython.p_double = slider.tables.quantities + QUANTITIES - 1
-    while slider.tables.known < slider.tables.count and exponent[0] != exponent[0]:  # a known support has no exponent
-        slider.tables.known += 1
-        exponent += QUANTITIES
-    return slider
-
-
-@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _displacement(
-    row: cython.p_double, given: cython.p_double, slider: cython.pointer(Slider), found: cython.p_double
+    row: cython.p_double, given: cython.p_double, common: cython.pointer(Common), found: cython.p_double
 ) -> cython.void:
     """One row of `displacements`."""
     values: cython.pointer(Values) = cython.cast(cython.pointer(Values), row)
-    body: cython.pointer(Body) = cython.address(slider.body)
-    pusher_radius: cython.double = slider.pusher_radius
+    body: cython.pointer(Body) = cython.address(common.body)
+    pusher_radius: cython.double = common.pusher_radius
     velocity: cython.double = given[0]
     contact: Contact = contact_at(given[1], body)
     c: cython.double = cos(given[2])
@@ -249,7 +226,7 @@ def _displacement(
     recorded_y: cython.double = s * contact.normal_x + c * contact.normal_y
     push: Push
     push.values, push.body = values, body
-    surface: Surface = _surface(cython.address(slider.tables), given[5], cython.address(push))
+    surface: Surface = _surface(cython.address(common.tables), given[5], cython.address(push))
     push.surface = cython.address(surface)
     push.radius = pusher_radius + values.radius_error
     along: cython.double = values.tip_offset_along + velocity * values.clock_delay
@@ -273,7 +250,7 @@ def _displacement(
     push.speed = velocity * (1.0 + values.travel_share)
     push.travel = push.speed * given[3] + (given[1] - given[1])  # not finite where the contact is not
     push.heading = given[4] - atan2(recorded_y, recorded_x)
-    pose: Pose = swept(cython.address(push), slider.accuracy)
+    pose: Pose = swept(cython.address(push), common.accuracy)
     c, s = cos(pose.heading), sin(pose.heading)
     pose.x += c * origin_x - s * origin_y - origin_x
     pose.y += s * origin_x + c * origin_y - origin_y

@@ -48,8 +48,8 @@ cdef struct Tables:
     double power
     Py_ssize_t known, count  # the first ones are of known supports, the others of the patch's exponents in order
 
-cdef struct Slider:
-    # What all pushes of a call share.
+cdef struct Common:
+    # What all pushes on a slider share.
     Body body
     Tables tables
     double pusher_radius, accuracy

@@ -13,7 +13,7 @@ import numpy as np
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of
-from push_predictor.models.effects.exact import joint, joint_shift
+from push_predictor.models.effects.exact import JointEffects, joint_shift
 from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
@@ -251,7 +251,7 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     effect = strength.effect
     on, push = mechanics_under(trace.model), _push(rows.table)
     if effect.exact:
-        bare = joint(on, [effect], push).responses(effect)
+        bare = JointEffects.of([effect]).shifted(on, push)[1].transpose(0, 2, 1)
     else:
         bare = design_of(effect.mechanism, DriverBasis("constant"), on, push, effect.outcome_scale)
     return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
