@@ -24,12 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import (
-    Likelihood,
-    NuggetKernel,
-    Ridge,
-    SmoothKernel,
-)
+from push_predictor.models.gaussian_process.likelihood import Likelihood, NuggetKernel, NuggetRidge, SmoothKernel
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
@@ -102,8 +97,8 @@ class VhgpProblem:
 
     @classmethod
     def of(cls, inputs: Array, outputs: Array, parameters: VhgpParameters) -> VhgpProblem:
-        """Build and factorise both kernel matrices of inputs (n, D)."""
-        signal, noise = (DenseKernel.of(kernel, inputs) for kernel in (parameters.signal, parameters.noise))
+        """Both kernels of inputs (n, D)."""
+        signal, noise = (DenseKernel(kernel, inputs) for kernel in (parameters.signal, parameters.noise))
         return cls.about(outputs, parameters, signal, noise)
 
     @classmethod
@@ -164,7 +159,7 @@ class Bound:
     sites: Sites
     mean_weights: Array  # b
     noise_mean: Array  # m
-    noise_ridge: Ridge
+    noise_ridge: NuggetRidge
     signal: SignalFit
     value: float
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A zero-mean Gaussian process seen through independent noise: its likelihood, and its posterior at new inputs."""
+"""The likelihood of a zero-mean Gaussian process that is seen through independent noise; kernels with a nugget."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-import scipy
 
 from push_predictor.models.gaussian_process.inducing import InducedKernel, InducedRidge
-from push_predictor.models.gaussian_process.ridge import DenseKernel, DenseRidge, cholesky_in_place
+from push_predictor.models.gaussian_process.ridge import DenseKernel, DenseRidge
 from push_predictor.types import Array, IntArray
 
 SmoothKernel: TypeAlias = DenseKernel | InducedKernel
+SmoothRidge: TypeAlias = DenseRidge | InducedRidge
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class NuggetKernel:
         """See DenseKernel."""
         return self.smooth.unexplained
 
-    def regularise(self, weights: Array) -> _NuggetRidge:
+    def regularise(self, weights: Array) -> NuggetRidge:
         """See DenseKernel."""
-        return _NuggetRidge(self.nugget, weights, self.smooth.regularise(weights / (1.0 + self.nugget * weights)))
+        return NuggetRidge(self.nugget, weights, self.smooth.regularise(weights / (1.0 + self.nugget * weights)))
 
     def times(self, vector: Array) -> Array:
         """See DenseKernel."""
@@ -41,12 +41,12 @@ class NuggetKernel:
 
 
 @dataclass(frozen=True, eq=False)
-class _NuggetRidge:
+class NuggetRidge:
     """See DenseRidge; P is that of K without the nugget and D + nugget in place of D."""
 
     nugget: float
     weights: Array
-    smooth: DenseRidge | InducedRidge
+    smooth: SmoothRidge
 
     @property
     def share(self) -> Array:
@@ -55,61 +55,28 @@ class _NuggetRidge:
 
     @property
     def log_determinant(self) -> float:
+        """See DenseRidge."""
         return self.smooth.log_determinant - float(np.log(self.share).sum())
 
     @property
     def posterior_diagonal(self) -> Array:
+        """See DenseRidge."""
         return self.share * (self.nugget + self.share * self.smooth.posterior_diagonal)
 
     def residual(self, values: Array) -> Array:
+        """See DenseRidge."""
         return self.smooth.residual(self.share * values)
 
     def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
+        """See DenseRidge."""
         of_smooth = self.smooth.gradient(added, removed, self.weights if weights is None else weights)
         squares = added**2 if removed is None else added**2 - removed**2
         precision = self.smooth.weights - self.smooth.posterior_diagonal * self.smooth.weights**2
         return np.append(of_smooth, self.nugget * float((squares - precision).sum()))
 
     def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
+        """See DenseRidge."""
         return self.smooth.held_out_errors(weights, block)
-
-
-Ridge: TypeAlias = DenseRidge | InducedRidge | _NuggetRidge  # quantities of P = (K + D)^-1, see DenseRidge
-
-
-class KernelPosterior:
-    """Posterior for a kernel matrix (n, n) between training inputs and noise variances (n,), any kernel.
-
-    After construction a prediction costs one triangular solve. Raises numpy's LinAlgError when the kernel
-    matrix plus noise is not positive definite.
-    """
-
-    def __init__(self, kernel_matrix: Array, noise_variances: Array) -> None:
-        regularised = np.array(kernel_matrix, order="C")
-        regularised.flat[:: len(regularised) + 1] += noise_variances
-        self._factor = cholesky_in_place(regularised)
-
-    def weights(self, values: Array) -> Array:
-        """(K + noise)^-1 values, shape (n,): the posterior mean at x* is k(x*, X) times this."""
-        half = scipy.linalg.blas.dtrsv(self._factor, values, lower=1)
-        return np.asarray(scipy.linalg.blas.dtrsv(self._factor, half, lower=1, trans=1))
-
-    def explained_variance(self, cross: Array) -> Array:
-        """By how much the observations reduce the prior variance at m inputs, shape (m,).
-
-        cross (m, n): kernel between the new inputs and the training inputs. The result is
-        diag(cross (K + noise)^-1 cross').
-        """
-        if len(cross) == 1:
-            half = scipy.linalg.blas.dtrsv(self._factor, cross[0], lower=1)
-            return np.array([half @ half])
-        half = scipy.linalg.blas.dtrsm(1.0, self._factor, cross.T, lower=1)
-        return np.asarray(np.einsum("ij,ij->j", half, half))
-
-    def explained_covariance(self, cross: Array) -> Array:
-        """By how much the observations reduce the prior covariance between m inputs, (m, m); cross (m, n) as above."""
-        half = scipy.linalg.blas.dtrsm(1.0, self._factor, cross.T, lower=1)
-        return np.asarray(half.T @ half)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +84,7 @@ class Likelihood:
     """log N(y | 0, K + D) - 1/2 sum_i unexplained_i / D_i, and its derivatives."""
 
     kernel: SmoothKernel
-    ridge: Ridge
+    ridge: SmoothRidge
     alpha: Array  # (K + D)^-1 y
     value: float
 
