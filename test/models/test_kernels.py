@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.likelihood import NuggetKernel
 from push_predictor.models.gaussian_process.ridge import DenseKernel, cholesky_in_place
 from push_predictor.types import Array
 
@@ -88,21 +87,6 @@ def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
     np.testing.assert_allclose(ridge.posterior_diagonal, np.diagonal(matrix - matrix @ inverse @ matrix), atol=1e-10)
     expected = np.linalg.slogdet(matrix + np.diag(diagonal))[1] - np.log(diagonal).sum()
     assert ridge.log_determinant == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize("n", [50, 300])
-def test_separate_nugget_equals_nugget_in_the_matrix(n: int) -> None:
-    smooth = DenseKernel(ArdKernel(np.full(2, 0.5), 0.1), normal(n, 2))
-    weights, values, block = np.exp(normal(n, seed=2)), normal(n, seed=3), np.arange(n) // 7
-    apart = NuggetKernel(smooth, 0.3).regularise(weights)
-    inside = DenseKernel(smooth.kernel, smooth.inputs)
-    inside.__dict__["matrix"] = smooth.matrix + 0.3 * np.eye(n)
-    ridge = inside.regularise(weights)
-    np.testing.assert_allclose(NuggetKernel(smooth, 0.3).times(values), inside.times(values), rtol=1e-12)
-    np.testing.assert_allclose(apart.residual(values), ridge.residual(values), atol=1e-10)
-    np.testing.assert_allclose(apart.posterior_diagonal, ridge.posterior_diagonal, rtol=1e-8)
-    np.testing.assert_allclose(apart.held_out_errors(values, block), ridge.held_out_errors(values, block), rtol=1e-7)
-    assert apart.log_determinant == pytest.approx(ridge.log_determinant, abs=1e-8)
 
 
 def test_posterior_of_a_noiseless_function_passes_through_its_values() -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The likelihood of a zero-mean Gaussian process that is seen through independent noise; kernels with a nugget."""
+"""The likelihood of a zero-mean Gaussian process that is seen through independent noise."""
 
 from __future__ import annotations
 
@@ -13,83 +13,23 @@ import numpy as np
 
 from push_predictor.models.gaussian_process.inducing import InducedKernel, InducedRidge
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DenseRidge
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
-SmoothKernel: TypeAlias = DenseKernel | InducedKernel
-SmoothRidge: TypeAlias = DenseRidge | InducedRidge
-
-
-@dataclass(frozen=True, eq=False)
-class NuggetKernel:
-    """K + nugget times the identity. The nugget is kept separate, because with it no matrix has low rank."""
-
-    smooth: SmoothKernel
-    nugget: float
-
-    @property
-    def unexplained(self) -> Array | float:
-        """See DenseKernel."""
-        return self.smooth.unexplained
-
-    def regularise(self, weights: Array) -> NuggetRidge:
-        """See DenseKernel."""
-        return NuggetRidge(self.nugget, weights, self.smooth.regularise(weights / (1.0 + self.nugget * weights)))
-
-    def times(self, vector: Array) -> Array:
-        """See DenseKernel."""
-        return self.smooth.times(vector) + self.nugget * vector
-
-
-@dataclass(frozen=True, eq=False)
-class NuggetRidge:
-    """See DenseRidge; P is that of K without the nugget and D + nugget in place of D."""
-
-    nugget: float
-    weights: Array
-    smooth: SmoothRidge
-
-    @property
-    def share(self) -> Array:
-        """D / (D + nugget), shape (n,)."""
-        return self.smooth.weights / self.weights
-
-    @property
-    def log_determinant(self) -> float:
-        """See DenseRidge."""
-        return self.smooth.log_determinant - float(np.log(self.share).sum())
-
-    @property
-    def posterior_diagonal(self) -> Array:
-        """See DenseRidge."""
-        return self.share * (self.nugget + self.share * self.smooth.posterior_diagonal)
-
-    def residual(self, values: Array) -> Array:
-        """See DenseRidge."""
-        return self.smooth.residual(self.share * values)
-
-    def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
-        """See DenseRidge."""
-        of_smooth = self.smooth.gradient(added, removed, self.weights if weights is None else weights)
-        squares = added**2 if removed is None else added**2 - removed**2
-        precision = self.smooth.weights - self.smooth.posterior_diagonal * self.smooth.weights**2
-        return np.append(of_smooth, self.nugget * float((squares - precision).sum()))
-
-    def held_out_errors(self, weights: Array, block: IntArray) -> tuple[Array, Array]:
-        """See DenseRidge."""
-        return self.smooth.held_out_errors(weights, block)
+Kernel: TypeAlias = DenseKernel | InducedKernel
+Ridge: TypeAlias = DenseRidge | InducedRidge
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
     """log N(y | 0, K + D) - 1/2 sum_i unexplained_i / D_i, and its derivatives."""
 
-    kernel: SmoothKernel
-    ridge: SmoothRidge
+    kernel: Kernel
+    ridge: Ridge
     alpha: Array  # (K + D)^-1 y
     value: float
 
     @classmethod
-    def of(cls, kernel: SmoothKernel, outputs: Array, noise: Array) -> Likelihood:
+    def of(cls, kernel: Kernel, outputs: Array, noise: Array) -> Likelihood:
         """For outputs y (n,) and noise variances D (n,). Raises LinAlgError."""
         weights = 1.0 / noise
         ridge = kernel.regularise(weights)

@@ -121,8 +121,8 @@ class DenseRidge:
     def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
         """1/2 tr((added added' - removed removed' - P) dK) - 1/2 sum weights d(unexplained), vectors (n,).
 
-        d is by the kernel's log_lengthscales and log_sd, and by the log standard deviation of its nugget if there is
-        one, shape (D + 1,) or (D + 2,). weights: w if not given. A dense kernel leaves nothing unexplained.
+        d is by the kernel's log_lengthscales and log_sd, shape (D + 1,). weights: w if not given. A dense kernel leaves
+        nothing unexplained.
         """
         precision, kernel = self.upper_precision(), self.of_kernel
         for sign, vector in ((-1.0, added), (1.0, removed)):

@@ -114,7 +114,7 @@ def problem_about(
     """With these inducing inputs (m, D) of f and of g."""
     signal = InducedKernel.of(parameters.signal, inputs, of_signal)
     noise = InducedKernel.of(parameters.noise, inputs, of_noise)
-    return VhgpProblem.about(outputs, parameters, signal, noise)
+    return VhgpProblem(outputs, parameters, signal, noise)
 
 
 def noise_prior(d: int, n: int) -> Prior:

@@ -49,7 +49,7 @@ class VHGP:
         """The bound on the log marginal likelihood, with the quantities that predictions need: two (n, n) matrices."""
         with one_blas_thread():
             signal, noise = (DenseKernel(k, self.inputs) for k in (self.parameters.signal, self.parameters.noise))
-            problem = VhgpProblem.about(self.outputs, self.parameters, signal, noise)
+            problem = VhgpProblem(self.outputs, self.parameters, signal, noise)
             bound = Bound.tied(problem, self.site_precisions)
             signal.free_matrix()
             noise.free_matrix()
@@ -68,7 +68,7 @@ class VHGP:
         """The posteriors of f, and of g less its prior mean and without its nugget."""
         bound = self.solved
         signal = bound.signal.likelihood
-        return signal.ridge.posterior(signal.alpha), bound.noise_ridge.smooth.posterior(bound.mean_weights)
+        return signal.ridge.posterior(signal.alpha), bound.noise_ridge.posterior(bound.mean_weights)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
