@@ -25,7 +25,8 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
-STOP, ROUGH_STOP = 1e-6, 1e-4  # relative decrease; rough: of fits that are compared, or that another begins from
+_STOP, _ROUGH_STOP = 1e-6, 1e-4  # relative decrease
+_UNIT = 0.1  # of the logarithms: about the length of the first step from the minimum of some rows
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 _FIRST_STEPS = 3  # from each start
@@ -97,18 +98,22 @@ class GaussianProcess:
 
 
 def fit_gp(
-    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, stop: float = STOP
+    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, rough: bool = False
 ) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. stop: relative decrease at which it ends. Raises
+    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. rough: whether the search ends early, with the
+    hyperparameters of MOST_SEARCHED rows, for fits that are compared, or that another begins from. Raises
     TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     box = np.array([(np.log(shortest), _LONGEST)] * inputs.shape[1] + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    rows, descent = some_rows(len(outputs), MOST_SEARCHED), Descent(box, most_iterations, stop)
+    rows, whole = some_rows(len(outputs), MOST_SEARCHED), Descent(box, most_iterations, _STOP)
+    few = replace(whole, stop=_ROUGH_STOP) if rough or len(rows) < len(outputs) else whole
     cost = _cost(inputs[rows], outputs[rows])
-    found = descent.run(cost, _start(cost, inputs[rows].shape, descent))
+    found = few.run(cost, _start(cost, inputs[rows].shape, few))
+    if not rough and len(rows) < len(outputs):
+        found = whole.run(_cost(inputs, outputs), found.point, _UNIT)
     return GaussianProcess(inputs, outputs, _parameters(found.point))
 
 

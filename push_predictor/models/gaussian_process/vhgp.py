@@ -20,7 +20,7 @@ from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
 from push_predictor.models.gaussian_process.fit import maximise_bound, precisions_from
-from push_predictor.models.gaussian_process.gp import ROUGH_STOP, SHORTEST, GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.inducing import InducedPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
@@ -110,7 +110,7 @@ def fit_vhgp(
     check_rows(inputs, outputs)
     rows = some_rows(len(outputs), MOST_SEARCHED)
     few = inputs[rows], outputs[rows]
-    near = start or fit_gp(*few, shortest=shortest, stop=ROUGH_STOP).parameters
+    near = start or fit_gp(*few, shortest=shortest, rough=True).parameters
     found = VHGP(*few, *maximise_bound(*few, near, most_iterations, shortest))
     if len(rows) == len(outputs):
         return found
