@@ -12,14 +12,7 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.features import push_features, within
-from push_predictor.models.gaussian_process.gp import (
-    ROUGH_STOP,
-    SHORTEST,
-    STOP,
-    GaussianProcess,
-    GpParameters,
-    fit_gp,
-)
+from push_predictor.models.gaussian_process.gp import SHORTEST, GaussianProcess, GpParameters, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant
 from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
@@ -54,8 +47,7 @@ class LearntOptions:
     """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
 
     about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new
-    pushes. per_path: whether outcomes are learnt per path length. stop: relative decrease of the likelihood at which
-    the search of a gp ends.
+    pushes. per_path: whether outcomes are learnt per path length. rough: whether a gp is only to be compared.
     """
 
     kind: str
@@ -64,7 +56,7 @@ class LearntOptions:
     about: FittedMechanics | None = None
     tails: bool = True
     per_path: bool = True
-    stop: float = STOP
+    rough: bool = False
 
 
 def train_learnt(
@@ -84,7 +76,7 @@ def train_learnt(
         about = fitted_mean(of_mean, rig)
     if options.about is None and about is not None and options.mean == "auto":
         watch(f"train {options.kind}: choice of the mean", 0.2)
-        rough = replace(options, kind="gp", inducing=None, stop=ROUGH_STOP)
+        rough = replace(options, kind="gp", inducing=None, rough=True)
         each = [_trained(of_mean, rig, rough, mean) for mean in (None, about)]
         zero, mechanics = (trained.density(of_mean) for trained in each)
         about = None if zero_is_better(zero, mechanics) else about
@@ -234,7 +226,7 @@ def _learnt(
     features: Array, column: Array, options: LearntOptions, shortest: float, start: GpParameters | None
 ) -> Regression:
     if options.kind == "gp":
-        return fit_gp(features, column, shortest=shortest, stop=options.stop)
+        return fit_gp(features, column, shortest=shortest, rough=options.rough)
     if options.inducing is None:
         return fit_vhgp(features, column, start=start, shortest=shortest)
     return fit_sparse_vhgp(features, column, options.inducing)

@@ -60,9 +60,9 @@ def test_held_out_predictions_are_computed_again_for_other_blocks_only() -> None
         asked.append(block.tolist())
         return LatentPrediction(*(block.astype(np.float64),) * 4)
 
-    remembered, block = Remembered(predicted), np.array([0, 0, 1])
-    first = remembered.of(block)
-    assert remembered.of(block.copy()) is first
+    remembered, block = Remembered(), np.array([0, 0, 1])
+    first = remembered.of(block, predicted)
+    assert remembered.of(block.copy(), predicted) is first
     block[0] = 1  # the caller's array may change
-    assert remembered.of(block).mean.tolist() == [1.0, 0.0, 1.0]
+    assert remembered.of(block, predicted).mean.tolist() == [1.0, 0.0, 1.0]
     assert asked == [[0, 0, 1], [1, 0, 1]]

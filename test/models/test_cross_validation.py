@@ -59,9 +59,8 @@ def refitted(regression: GaussianProcess | VHGP, block: IntArray) -> dict[str, A
     return found
 
 
-@pytest.mark.parametrize("n", [120, 400], ids=["dense", "low rank"])
-def test_held_out_gp_equals_gp_conditioned_on_other_blocks(n: int) -> None:
-    inputs, outputs, block = rows(n)
+def test_held_out_gp_equals_gp_conditioned_on_other_blocks() -> None:
+    inputs, outputs, block = rows(120)
     regression = fit_gp(inputs, outputs)
     found, expected = regression.held_out(block), refitted(regression, block)
     for name in FIELDS:

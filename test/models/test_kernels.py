@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import KernelPosterior, NuggetKernel
-from push_predictor.models.gaussian_process.ridge import DenseKernel
+from push_predictor.models.gaussian_process.ridge import DenseKernel, cholesky_in_place
 from push_predictor.types import Array
 
 KERNEL = ArdKernel(np.array([0.3, -0.4, 1.0]), 0.2)
@@ -79,7 +76,7 @@ def test_gradient_equals_finite_differences() -> None:
 
 @pytest.mark.parametrize("n", [50, 300])
 def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
-    factorised = DenseKernel.of(ArdKernel(np.array([0.5, 0.5]), 0.1), normal(n, 2))
+    factorised = DenseKernel(ArdKernel(np.array([0.5, 0.5]), 0.1), normal(n, 2))
     matrix = factorised.matrix
     diagonal = np.exp(normal(n, seed=2))
     ridge = factorised.regularise(1.0 / diagonal)
@@ -92,44 +89,14 @@ def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
     assert ridge.log_determinant == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_smooth_kernel_of_many_rows_is_factorised_and_a_rough_one_is_not() -> None:
-    inputs = normal(600, 2)
-    smooth, rough = ArdKernel(np.zeros(2), 0.0), ArdKernel(np.full(2, -4.0), 0.0)
-    assert DenseKernel.of(smooth, inputs).root is not None
-    assert DenseKernel.of(rough, inputs).root is None
-
-
-@pytest.mark.parametrize("n", [50, 300])
-def test_separate_nugget_equals_nugget_in_the_matrix(n: int) -> None:
-    smooth = DenseKernel.of(ArdKernel(np.full(2, 0.5), 0.1), normal(n, 2))
-    weights, values, block = np.exp(normal(n, seed=2)), normal(n, seed=3), np.arange(n) // 7
-    apart = NuggetKernel(smooth, 0.3).regularise(weights)
-    inside = replace(smooth, matrix=smooth.matrix + 0.3 * np.eye(n), root=None)
-    ridge = inside.regularise(weights)
-    np.testing.assert_allclose(NuggetKernel(smooth, 0.3).times(values), inside.times(values), rtol=1e-12)
-    np.testing.assert_allclose(apart.residual(values), ridge.residual(values), atol=1e-10)
-    np.testing.assert_allclose(apart.posterior_diagonal, ridge.posterior_diagonal, rtol=1e-8)
-    np.testing.assert_allclose(apart.held_out_errors(values, block), ridge.held_out_errors(values, block), rtol=1e-7)
-    assert apart.log_determinant == pytest.approx(ridge.log_determinant, abs=1e-8)
-
-
-def test_low_rank_equals_dense_for_diagonal_over_many_decades() -> None:
-    factorised = DenseKernel.of(ArdKernel(np.zeros(2), 0.0), normal(600, 2))
-    weights = 10.0 ** np.random.default_rng(1).uniform(-3, 3, 600)
-    assert factorised.root is not None
-    low, dense = factorised.regularise(weights), replace(factorised, root=None).regularise(weights)
-    np.testing.assert_allclose(low.posterior_diagonal, dense.posterior_diagonal, rtol=1e-5, atol=1e-10)
-    assert low.log_determinant == pytest.approx(dense.log_determinant, abs=1e-6)
-
-
 def test_posterior_of_a_noiseless_function_passes_through_its_values() -> None:
     inputs, values = normal(15, 3), normal(15, seed=1)
-    posterior = KernelPosterior(KERNEL.matrix(inputs), np.full(15, 1e-10))
-    cross = KERNEL.cross(inputs, inputs)
-    np.testing.assert_allclose(cross @ posterior.weights(values), values, atol=1e-6)
-    np.testing.assert_allclose(posterior.explained_variance(cross), KERNEL.variance, atol=1e-8)
+    ridge = DenseKernel(KERNEL, inputs).regularise(np.full(15, 1e10))
+    mean, explained = ridge.posterior(ridge.residual(1e10 * values)).predict(inputs)
+    np.testing.assert_allclose(mean, values, atol=1e-6)
+    np.testing.assert_allclose(explained, KERNEL.variance, atol=1e-8)
 
 
 def test_rejects_matrix_that_is_not_positive_definite() -> None:
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        KernelPosterior(np.ones((3, 3)), np.full(3, -2.0))
+        cholesky_in_place(np.ones((3, 3)) - 2.0 * np.eye(3))

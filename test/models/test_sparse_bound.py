@@ -21,7 +21,7 @@ def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAME
     inputs, outputs = rows(n)
     of_signal = InducedKernel.of(parameters.signal, inputs, inputs[:signal])
     of_noise = InducedKernel.of(parameters.noise, inputs, inputs[n - noise :])
-    return VhgpProblem.about(outputs, parameters, of_signal, of_noise)
+    return VhgpProblem(outputs, parameters, of_signal, of_noise)
 
 
 def test_bound_equals_dense_one_if_every_row_is_inducing() -> None:
@@ -151,9 +151,13 @@ def test_held_out_prediction_is_that_of_the_dense_matrices_and_has_what_is_unexp
     bound = Bound.tied(found, sites)
     held_out = bound.held_out(block)
     level = bound.signal.level
-    kernels = (found.signal, 1.0 / (level + PARAMETERS.jitter), level), (found.noise, sites, 1.0 / sites)
-    for (kernel, weights, own), variance in zip(kernels, (held_out.variance, held_out.log_noise_variance), strict=True):
-        explained = np.column_stack([kernel.times(column) for column in np.eye(n)])
+    kernels = (
+        (found.signal, found.signal.times, 1.0 / (level + PARAMETERS.jitter), level),
+        (found.noise, found.noise_times, sites, 1.0 / sites),
+    )
+    variances = held_out.variance, held_out.log_noise_variance
+    for (kernel, times, weights, own), variance in zip(kernels, variances, strict=True):
+        explained = np.column_stack([times(column) for column in np.eye(n)])
         precision = np.linalg.inv(explained + np.diag(1.0 / weights))
         assert np.max(kernel.unexplained) > 1e-3
         for number in range(9):

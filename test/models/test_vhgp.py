@@ -14,10 +14,9 @@ from likelihoods import bound_and_gradient, log_marginal_likelihood
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.fit import Found
-from push_predictor.models.gaussian_process.fit import _noise_at as noise_at
-from push_predictor.models.gaussian_process.fit import _search as search_of
+from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
+from push_predictor.models.gaussian_process.fit import precisions_from
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
@@ -40,7 +39,7 @@ def fitted() -> VHGP:
 
 @pytest.mark.parametrize(("n", "every"), [(60, 1), (220, 40)])
 def test_gradient_of_every_parameter_equals_finite_differences(n: int, every: int) -> None:
-    """Of 60 rows all, of 220 (where kernels are factorised) some of the sites and all hyperparameters."""
+    """Of 60 rows all, of 220 some of the sites and all hyperparameters."""
     inputs, outputs = rows(n)
     sites = np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
     at = np.concatenate([sites, PARAMETERS.to_vector()])
@@ -241,12 +240,6 @@ def test_priors_of_the_noise_lengthscales_keep_their_weight_in_a_row_from_a_hund
     np.testing.assert_array_equal(hundred[3:5], [0.5, 0.5])
 
 
-def test_the_search_has_the_prior_of_its_own_number_of_rows() -> None:
-    inputs, outputs = rows(400)
-    search = search_of(inputs, outputs, np.zeros(8))
-    np.testing.assert_array_equal(search.prior.spread, prior_spread(2, 400))
-
-
 def test_the_noise_at_an_input_is_the_conditional_gaussian_with_the_nugget_in_its_variance_only() -> None:
     inputs, outputs = rows(60)
     best = maximise_over_noise(VhgpProblem.of(inputs, outputs, PARAMETERS), None, 1e-12)
@@ -269,11 +262,19 @@ def test_vector_of_parameters_round_trips() -> None:
     assert PARAMETERS.count == 8
 
 
-def test_noise_at_other_rows_to_begin_with_is_what_a_model_of_the_few_predicts() -> None:
-    few, outputs = rows(60)
-    best = maximise_over_noise(VhgpProblem.of(few, outputs, PARAMETERS), None, 1e-13)
-    new = rows(20, seed=1)[0]
-    mean, variance = noise_at(new, few, Found(PARAMETERS, best.sites, 0.0))
-    prediction = VHGP(few, outputs, PARAMETERS, best.tied_precisions).predict(new)
-    np.testing.assert_allclose(mean, prediction.log_noise_mean, atol=1e-4)
-    np.testing.assert_allclose(variance, prediction.log_noise_variance, rtol=1e-4)
+def test_more_rows_than_are_searched_get_the_hyperparameters_of_some_and_their_own_noise() -> None:
+    inputs, outputs = rows(MOST_SEARCHED + 50)
+    few = some_rows(len(outputs), MOST_SEARCHED)
+    start = GpParameters(np.zeros(2), 0.0, -0.7)
+    part = fit_vhgp(inputs[few], outputs[few], start=start, most_iterations=3)
+    whole = fit_vhgp(inputs, outputs, start=start, most_iterations=3)
+    np.testing.assert_array_equal(whole.parameters.to_vector(), part.parameters.to_vector())
+    best = maximise_over_noise(VhgpProblem.of(inputs, outputs, whole.parameters), None, 1e-10).value
+    assert best - 0.05 < whole.bound <= best + 1e-9
+
+
+def test_the_noise_of_all_rows_begins_where_some_rows_predict_it(fitted: VHGP) -> None:
+    """From there one step is enough, however loose the search."""
+    problem = VhgpProblem.of(fitted.inputs, fitted.outputs, fitted.parameters)
+    precisions = precisions_from(problem, fitted.predict(fitted.inputs))
+    assert Bound.tied(problem, precisions).value == pytest.approx(fitted.bound, abs=0.05)

@@ -24,7 +24,7 @@ def coarse_models(request: pytest.FixtureRequest) -> Iterator[None]:
     """End every search for hyperparameters after few steps: half of a section's time. The whole report is as it is."""
     whole = Descent.run
 
-    def begun(self: Descent, cost: Cost, first: Array, unit: Array | float = 1.0) -> Minimum:
+    def begun(self: Descent, cost: Cost, first: Array, unit: float = 1.0) -> Minimum:
         return whole(replace(self, most_iterations=3), cost, first, unit)
 
     with pytest.MonkeyPatch.context() as coarse:

@@ -8,8 +8,8 @@ Where the printed equations differ from these: docs/explanation/errata.md.
     F = log N(y | 0, K_f + R) - 1/4 tr S - KL(N(m, S) || N(mu0, K_g)),     R_ii = exp(m_i - S_ii / 2)
     S^-1 = K_g^-1 + Lambda,     m = mu0 + K_g b,     Lambda diagonal ("site precisions"), b ("mean weights")
 
-K_g includes the nugget. At a maximum over (b, Lambda) the two are tied, b = Lambda - 1/2, which leaves one number per
-training row.
+K_g includes the nugget, but no matrix does: with it none has low rank. At a maximum over (b, Lambda) the two are tied,
+b = Lambda - 1/2, which leaves one number per training row.
 
 With inducing inputs for f and g (inducing.py; derived in docs/explanation/sparse.md), Q_f and Q_g replace K_f and
 K_g. The variances c that they do not explain add -1/2 sum_i c_f,i / R_ii, and c_g to the variances S_ii. If every row
@@ -24,12 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import (
-    Likelihood,
-    NuggetKernel,
-    Ridge,
-    SmoothKernel,
-)
+from push_predictor.models.gaussian_process.likelihood import Kernel, Likelihood, Ridge
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
@@ -97,21 +92,19 @@ class VhgpProblem:
 
     outputs: Array
     parameters: VhgpParameters
-    signal: SmoothKernel
-    noise: NuggetKernel
+    signal: Kernel
+    noise: Kernel  # without the nugget
 
     @classmethod
     def of(cls, inputs: Array, outputs: Array, parameters: VhgpParameters) -> VhgpProblem:
-        """Build and factorise both kernel matrices of inputs (n, D)."""
-        signal, noise = (DenseKernel.of(kernel, inputs) for kernel in (parameters.signal, parameters.noise))
-        return cls.about(outputs, parameters, signal, noise)
+        """Both kernels of inputs (n, D)."""
+        return cls(
+            outputs, parameters, *(DenseKernel(kernel, inputs) for kernel in (parameters.signal, parameters.noise))
+        )
 
-    @classmethod
-    def about(
-        cls, outputs: Array, parameters: VhgpParameters, signal: SmoothKernel, noise: SmoothKernel
-    ) -> VhgpProblem:
-        """With these kernels of f and g, to which g's nugget is added."""
-        return cls(outputs, parameters, signal, NuggetKernel(noise, parameters.nugget))
+    def noise_times(self, vector: Array) -> Array:
+        """K_g vector, shape (n,)."""
+        return self.noise.times(vector) + self.parameters.nugget * vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,21 +157,22 @@ class Bound:
     sites: Sites
     mean_weights: Array  # b
     noise_mean: Array  # m
-    noise_ridge: Ridge
+    noise_ridge: Ridge  # of g without its nugget, which is noise to it: D = 1 / Lambda + nugget
     signal: SignalFit
     value: float
 
     @classmethod
     def at(cls, problem: VhgpProblem, sites: Sites) -> Bound:
         """Evaluate F. Raises LinAlgError or FloatingPointError where it is not a finite number."""
-        prior_mean = problem.parameters.noise_mean
-        ridge = problem.noise.regularise(sites.precisions)
-        explained = ridge.posterior_diagonal
+        precisions, prior_mean, nugget = sites.precisions, problem.parameters.noise_mean, problem.parameters.nugget
+        ridge = problem.noise.regularise(precisions / (1.0 + nugget * precisions))
+        share = ridge.weights / precisions
+        explained = share * (nugget + share * ridge.posterior_diagonal)
         variances = explained + problem.noise.unexplained
-        mean_weights = ridge.residual(sites.potentials - sites.precisions * prior_mean)
-        deviation = problem.noise.times(mean_weights)
+        mean_weights = ridge.residual(share * (sites.potentials - precisions * prior_mean))
+        deviation = problem.noise_times(mean_weights)
         signal = SignalFit.of(problem, prior_mean + deviation, variances)
-        divergence = deviation @ mean_weights - sites.precisions @ explained + ridge.log_determinant
+        divergence = deviation @ mean_weights - precisions @ explained + ridge.log_determinant - np.log(share).sum()
         value = signal.likelihood.value - 0.25 * float(variances.sum()) - 0.5 * float(divergence)
         if not np.isfinite(value):
             raise FloatingPointError("the variational bound is not finite")
@@ -188,7 +182,7 @@ class Bound:
     def tied(cls, problem: VhgpProblem, site_precisions: Array) -> Bound:
         """F as a function of the site precisions alone, b = Lambda - 1/2."""
         mean_weights = site_precisions - 0.5
-        mean = problem.parameters.noise_mean + problem.noise.times(mean_weights)
+        mean = problem.parameters.noise_mean + problem.noise_times(mean_weights)
         return cls.at(problem, Sites(site_precisions, site_precisions * mean + mean_weights))
 
     @property
@@ -206,9 +200,12 @@ class Bound:
         signal = self.signal.likelihood.gradient()
         signal[-1] += 2.0 * self.problem.parameters.jitter * float(self.signal.likelihood.slopes.sum())
         # dF/dm = gb gives b gb' + gb b' - b b', as one difference of squares
-        optimal = self.signal.optimal_precisions - 0.5
-        noise = self.noise_ridge.gradient(optimal, optimal - self.mean_weights)
-        return np.concatenate([signal, noise[:-1], [optimal.sum()], noise[-1:]])
+        optimal, ridge = self.signal.optimal_precisions - 0.5, self.noise_ridge
+        removed = optimal - self.mean_weights
+        noise = ridge.gradient(optimal, removed, self.sites.precisions)
+        precision = ridge.weights - ridge.posterior_diagonal * ridge.weights**2
+        by_nugget = self.problem.parameters.nugget * float((optimal**2 - removed**2 - precision).sum())
+        return np.concatenate([signal, noise, [optimal.sum(), by_nugget]])
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n rows from the rows of all other blocks (n,), from these factorisations.

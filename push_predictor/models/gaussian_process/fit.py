@@ -4,23 +4,24 @@
 """Maximise the VHGP's bound over its hyperparameters, with q(g) solved for at every step.
 
 Variable projection: L-BFGS sees the 2 D + 4 hyperparameters only. A joint search over them and Lambda ends in much
-worse optima, towards the homoscedastic solution. With many rows the search is coarse to fine, see descent.py. No n x n
-matrix is kept from one evaluation to the next.
+worse optima, towards the homoscedastic solution. No n x n matrix is kept from one evaluation to
+the next.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import SignalFit, Sites, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.descent import Descent, part_of_rows
+from push_predictor.models.gaussian_process.descent import Descent
 from push_predictor.models.gaussian_process.gp import GpParameters
 from push_predictor.models.gaussian_process.inner import maximise_over_noise
-from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.types import Array
 
 # Logarithms, for inputs and outputs of unit spread; they keep line searches where the kernels are well conditioned.
@@ -49,26 +50,25 @@ def maximise_bound(
 ) -> tuple[VhgpParameters, Array]:
     """Hyperparameters where the bound plus the log prior is highest, and the site precisions (n,), tied to them.
 
-    near: the homoscedastic fit of the same rows, where the search starts. shortest: lengthscale of the signal. Raises
-    TrainingError if the bound is not finite at any point of the search.
+    near: a homoscedastic fit of these rows or some of them, where the search starts. shortest: lengthscale of the
+    signal. Raises TrainingError if the bound is not finite at any point of the search.
     """
-    box = _box(inputs.shape[1], shortest)
-    descent, centre = Descent(box, most_iterations, _STOP), np.clip(_prior_centre(near).to_vector(), *box.T)
-    search, rows = _search(inputs, outputs, centre), part_of_rows(len(outputs))
-    if rows is None:
-        descent.run(search.cost, centre)
-    else:
-        rough = _search(inputs[rows], outputs[rows], centre)
-        minimum = descent.run(rough.cost, centre)
-        if rough.best is not None:
-            search.seen = _noise_at(inputs, inputs[rows], rough.best)
-        descent.refine(search.cost, minimum)
+    d, n = inputs.shape[1], len(outputs)
+    box = _box(d, shortest)
+    centre = np.clip(_prior_centre(near).to_vector(), *box.T)
+    search = Search(partial(VhgpProblem.of, inputs, outputs), Prior(centre, _spread(d, n)), _SEARCH_TOLERANCE)
+    Descent(box, most_iterations, _STOP).run(search.cost, centre)
     return search.solved(_FINAL_TOLERANCE)
 
 
-def _search(inputs: Array, outputs: Array, centre: Array) -> Search:
-    prior = Prior(centre, _spread(inputs.shape[1], len(outputs)))
-    return Search(lambda parameters: VhgpProblem.of(inputs, outputs, parameters), prior, _SEARCH_TOLERANCE)
+def precisions_from(problem: VhgpProblem, noise: LatentPrediction) -> Array:
+    """Site precisions (n,) for these hyperparameters and rows; noise: g at the rows as a fit of some predicts it."""
+    return maximise_over_noise(problem, _sites(problem, noise), _FINAL_TOLERANCE).tied_precisions
+
+
+def _sites(problem: VhgpProblem, noise: LatentPrediction) -> Sites:
+    mean = noise.log_noise_mean
+    return Sites.optimal(SignalFit.of(problem, mean, noise.log_noise_variance).optimal_precisions, mean)
 
 
 def _box(d: int, shortest: float) -> Array:
@@ -88,16 +88,6 @@ def _spread(d: int, n: int) -> Array:
     spread = np.full(2 * d + 4, SPREAD)
     spread[d + 1 : 2 * d + 1] = NOISE_LENGTHSCALE_SPREAD * np.sqrt(min(1.0, FEW_ROWS / n))
     return spread
-
-
-def _noise_at(inputs: Array, few: Array, found: Found) -> tuple[Array, Array]:
-    """Mean and variance of g at inputs (n, D), predicted from the noise that was found at a few of them."""
-    parameters, sites = found.parameters, found.sites
-    posterior = KernelPosterior(parameters.noise.matrix(few), parameters.nugget + 1.0 / sites.precisions)
-    weights = posterior.weights(sites.potentials / sites.precisions - parameters.noise_mean)
-    cross = parameters.noise.cross(inputs, few)
-    variance = parameters.noise.variance + parameters.nugget - posterior.explained_variance(cross)
-    return parameters.noise_mean + cross @ weights, variance
 
 
 @dataclass(frozen=True)
@@ -125,13 +115,18 @@ class Found:
 class Search:
     """The cost for L-BFGS: minus the bound and the log prior. q(g) is solved for from that of `best`, the lowest point.
 
-    problem_of: the rows' problem for hyperparameters. tolerance: of the bound, nats. seen: mean and variance of g at
-    the rows as a fit of fewer rows predicts them, where q(g) begins.
+    problem_of: the rows' problem for hyperparameters. tolerance: of the bound, nats. noise: g at the rows as a fit of
+    fewer rows predicts it, where q(g) begins.
     """
 
-    def __init__(self, problem_of: Callable[[VhgpParameters], VhgpProblem], prior: Prior, tolerance: float) -> None:
-        self.problem_of, self.prior, self.tolerance = problem_of, prior, tolerance
-        self.seen: tuple[Array, Array] | None = None
+    def __init__(
+        self,
+        problem_of: Callable[[VhgpParameters], VhgpProblem],
+        prior: Prior,
+        tolerance: float,
+        noise: LatentPrediction | None = None,
+    ) -> None:
+        self.problem_of, self.prior, self.tolerance, self.noise = problem_of, prior, tolerance, noise
         self.best: Found | None = None
 
     def cost(self, vector: Array) -> tuple[float, Array]:
@@ -158,7 +153,6 @@ class Search:
         return parameters, maximise_over_noise(self.problem_of(parameters), sites, tolerance).tied_precisions
 
     def _start(self, problem: VhgpProblem) -> Sites | None:
-        if self.best is not None or self.seen is None:
-            return self.best.sites if self.best else None
-        mean, variances = self.seen
-        return Sites.optimal(SignalFit.of(problem, mean, variances).optimal_precisions, mean)
+        if self.best is not None:
+            return self.best.sites
+        return None if self.noise is None else _sites(problem, self.noise)

@@ -6,15 +6,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum, part_of_rows
+from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, Cost, Descent, some_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.posterior import KernelPosterior, Likelihood
+from push_predictor.models.gaussian_process.likelihood import Likelihood
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
-from push_predictor.models.gaussian_process.ridge import DenseKernel
+from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.
@@ -24,10 +25,11 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
-STOP, ROUGH_STOP = 1e-6, 1e-4  # relative decrease; rough: of fits that are compared, or that another begins from
+_STOP, _ROUGH_STOP = 1e-6, 1e-4  # relative decrease
+_UNIT = 0.1  # of the logarithms: about the length of the first step from the minimum of some rows
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
-_FEWEST_TO_BEGIN_FROM = 300  # rows of a part; the likelihood of fewer often has its highest maximum elsewhere
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
+_FIRST_STEPS = 3  # from each start
 
 
 @dataclass(frozen=True)
@@ -61,71 +63,73 @@ class GaussianProcess:
 
     def __init__(self, inputs: Array, outputs: Array, parameters: GpParameters) -> None:
         self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
-        noise = np.full(len(outputs), parameters.noise_variance)
-        self._posterior = KernelPosterior(parameters.kernel.matrix(inputs), noise)
-        self._weights = self._posterior.weights(outputs)
-        self._held_out = Remembered(self._predicted_without)
+        self._held_out = Remembered()
+
+    @cached_property
+    def posterior(self) -> DensePosterior:
+        """The posterior of f: a matrix of n rows, computed at the first prediction."""
+        known, weights = DenseKernel(self.parameters.kernel, self.inputs), 1.0 / self.parameters.noise_variance
+        ridge = known.regularise(np.full(len(self.outputs), weights))
+        known.free_matrix()
+        return ridge.posterior(ridge.residual(weights * self.outputs))
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and the noise at inputs (m, D)."""
-        kernel = self.parameters.kernel
-        cross = kernel.cross(inputs, self.inputs)
-        # The noise bounds the posterior variance from below by about noise / n; rounding may not.
-        smallest = np.finfo(float).eps * kernel.variance
-        variance = np.maximum(kernel.variance - self._posterior.explained_variance(cross), smallest)
-        log_noise = np.full(len(cross), 2.0 * self.parameters.log_noise_sd)
-        return LatentPrediction(cross @ self._weights, variance, log_noise, np.zeros(len(cross)))
+        mean, explained = self.posterior.predict(inputs)
+        return self._prediction(mean, self.parameters.kernel.variance - explained)
 
     def function_covariance(self, inputs: Array) -> Array:
         """Posterior covariance (m, m) of f between inputs (m, D)."""
-        kernel = self.parameters.kernel
-        return kernel.matrix(inputs) - self._posterior.explained_covariance(kernel.cross(inputs, self.inputs))
+        return self.posterior.covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
-        return self._held_out.of(block)
+        return self._held_out.of(block, self._predicted_without)
 
     def _predicted_without(self, block: IntArray) -> LatentPrediction:
-        kernel, noise = self.parameters.kernel, np.full(len(self.outputs), self.parameters.noise_variance)
-        likelihood = Likelihood.of(DenseKernel.of(kernel, self.inputs), self.outputs, noise)
-        errors, variance = likelihood.ridge.held_out_errors(likelihood.alpha, block)
-        variance = np.maximum(variance - noise, np.finfo(float).eps * kernel.variance)
-        return LatentPrediction(self.outputs - errors, variance, np.log(noise), np.zeros(len(noise)))
+        errors, variance = self.posterior.ridge.held_out_errors(self.posterior.weights, block)
+        return self._prediction(self.outputs - errors, variance - self.parameters.noise_variance)
+
+    def _prediction(self, mean: Array, variance: Array) -> LatentPrediction:
+        # The noise bounds the posterior variance from below by about noise / n; rounding may not.
+        variance = np.maximum(variance, np.finfo(float).eps * self.parameters.kernel.variance)
+        log_noise = np.full(len(mean), 2.0 * self.parameters.log_noise_sd)
+        return LatentPrediction(mean, variance, log_noise, np.zeros(len(mean)))
 
 
 def fit_gp(
-    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, stop: float = STOP
+    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, rough: bool = False
 ) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. stop: relative decrease at which it ends. Raises
+    inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. rough: whether the search ends early, with the
+    hyperparameters of MOST_SEARCHED rows, for fits that are compared, or that another begins from. Raises
     TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
-    d = inputs.shape[1]
-    box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    descent, cost = Descent(box, most_iterations, stop), _cost(inputs, outputs)
-    rows = part_of_rows(len(outputs))
-    start, rough = _first(inputs, outputs, rows, replace(descent, stop=ROUGH_STOP))
-    if rows is None or len(rows) >= _FEWEST_TO_BEGIN_FROM:
-        found = descent.refine(cost, rough)
-    else:
-        found = descent.run(cost, start)
+    box = np.array([(np.log(shortest), _LONGEST)] * inputs.shape[1] + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
+    rows, whole = some_rows(len(outputs), MOST_SEARCHED), Descent(box, most_iterations, _STOP)
+    few = replace(whole, stop=_ROUGH_STOP) if rough or len(rows) < len(outputs) else whole
+    cost = _cost(inputs[rows], outputs[rows])
+    found = few.run(cost, _start(cost, inputs[rows].shape, few))
+    if not rough and len(rows) < len(outputs):
+        found = whole.run(_cost(inputs, outputs), found.point, _UNIT)
     return GaussianProcess(inputs, outputs, _parameters(found.point))
 
 
-def _first(inputs: Array, outputs: Array, rows: IntArray | None, descent: Descent) -> tuple[Array, Minimum]:
-    """Where to begin, and the minimum of these rows that is reached from there; None for all rows.
+def _start(cost: Cost, shape: tuple[int, ...], descent: Descent) -> Array:
+    """Where to begin: unit lengthscales, or where the first steps from one short lengthscale lead, if clearly better.
 
-    Unit lengthscales, or one of them short if that is clearly better. On a polygon the outcome jumps from side to side.
-    From a long lengthscale the search may take the jumps for noise.
+    On a polygon the outcome jumps from side to side. From a long lengthscale the search may take the jumps for noise.
     """
-    d, part = inputs.shape[1], slice(None) if rows is None else rows
-    usual, cost = np.append(np.zeros(d + 1), np.log(0.3)), _cost(inputs[part], outputs[part])
-    short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)] if len(outputs) >= _FEWEST_FOR_SHORT else []
-    reached = [(start, descent.run(cost, start)) for start in (usual, *short)]
-    best = min(reached, key=lambda pair: pair[1].cost)
-    return best if best[1].cost < reached[0][1].cost - _SURELY else reached[0]
+    n, d = shape
+    usual = np.append(np.zeros(d + 1), np.log(0.3))
+    if n < _FEWEST_FOR_SHORT or descent.box[0, 0] > _SHORT:
+        return usual
+    brief = replace(descent, most_iterations=_FIRST_STEPS)
+    reached = [brief.run(cost, usual + short) for short in _SHORT * np.eye(d + 1, d + 2, -1)]
+    best = min(reached, key=lambda minimum: minimum.cost)
+    return (best if best.cost < reached[0].cost - _SURELY else reached[0]).point
 
 
 def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:
@@ -134,7 +138,7 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
     Raises LinAlgError where the kernel matrix plus noise is not positive definite.
     """
     noise = parameters.noise_variance
-    likelihood = Likelihood.of(DenseKernel.of(parameters.kernel, inputs), outputs, np.full(len(outputs), noise))
+    likelihood = Likelihood.of(DenseKernel(parameters.kernel, inputs), outputs, np.full(len(outputs), noise))
     return likelihood.value, np.append(likelihood.gradient(), 2.0 * noise * likelihood.slopes.sum())
 
 

@@ -29,6 +29,7 @@ from push_predictor.types import Array, IntArray
 _BLOCK = 2048
 _JITTER = 1e-9  # of the kernel's variance
 _CANDIDATES = 10_000
+_NOTHING = 1e-9  # of the prior variance, a thousandth of the jitter of f
 _NEGLIGIBLE = 1e-6  # of the prior variance; with a smaller conditional variance one more inducing input adds nothing
 
 
@@ -115,6 +116,17 @@ class InducedRidge:
         """Posterior mean (m,) of the whitened inducing variables, whose prior is N(0, I), given values (n,)."""
         return np.asarray(scipy.linalg.cho_solve((self.factor, True), self.induced.features.T @ values))
 
+    def posterior(self, weights: Array) -> InducedPosterior:
+        """The posterior of the function, of weights P times its values, shape (n,): V' P = inner^-1 V' W."""
+        induced = self.induced
+        share, vectors = np.linalg.eigh(self.explained)
+        kept = share > _NOTHING
+        columns = np.column_stack([induced.features.T @ weights, vectors[:, kept] * np.sqrt(share[kept])])
+        columns = scipy.linalg.blas.dtrsm(1.0, induced.factor, columns, lower=1, trans_a=1)
+        return InducedPosterior(
+            induced.kernel, induced.inducing, columns[:, 0].copy(), np.ascontiguousarray(columns[:, 1:])
+        )
+
     def residual(self, values: Array) -> Array:
         """P D values, shape (n,): the residual of a smoother of these values."""
         return np.asarray(values - self.weights * (self.induced.features @ self.mean(values)))
@@ -173,6 +185,30 @@ class InducedRidge:
         gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)
         gradient[-1] += 2.0 * _JITTER * kernel.variance * float(np.trace(weights))
         return gradient
+
+
+@dataclass(frozen=True, eq=False)
+class InducedPosterior:
+    """A function's posterior from inducing inputs Z (m, D): mean k(x, Z) weights, explained variance |k(x, Z) root|^2.
+
+    weights (m,); root (m, r).
+    """
+
+    kernel: ArdKernel
+    inducing: Array
+    weights: Array
+    root: Array
+
+    def predict(self, inputs: Array) -> tuple[Array, Array]:
+        """Mean and explained variance at inputs (q, D), (q,) each."""
+        cross = self.kernel.cross(inputs, self.inducing)
+        half = cross @ self.root
+        return cross @ self.weights, np.asarray(np.einsum("ij,ij->i", half, half))
+
+    def covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (q, q) between inputs (q, D)."""
+        half = self.kernel.cross(inputs, self.inducing) @ self.root
+        return np.asarray(self.kernel.matrix(inputs) - half @ half.T)
 
 
 def _inducing_factor(kernel: ArdKernel, inducing: Array) -> Array:

@@ -5,8 +5,7 @@
 
 Each step sets the natural parameters of q(g) to the point that the gradient makes stationary. With mean and precision
 updated separately, the first steps converge by a factor of 10 to 40 each. The seemingly equivalent iteration on Lambda
-alone, with the mean tied to it, diverges. Where a few rows make the last steps slow, the secant through the last two
-(Anderson's acceleration of depth one) shortens them.
+alone, with the mean tied to it, diverges.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProblem
-from push_predictor.types import Array
 
 _SHORTEST_STEP = 1.0 / 64.0
 _PART = 0.02
@@ -31,11 +29,11 @@ def maximise_over_noise(
     Raises LinAlgError or FloatingPointError where the bound is not finite even at a fresh start.
     """
     bound = _first(problem, start)
-    steps, progress = _Steps(), _Progress()
+    progress = _Progress()
     for _ in range(most_steps):
         value, sites, target = bound.value, bound.sites, bound.optimal_sites
         del bound  # frees its matrices before the next ones are computed
-        bound, accepted = _improved(problem, value, sites, steps.next(sites, target), target, tolerance)
+        bound, accepted = _improved(problem, value, sites, target, tolerance)
         enough = tolerance if goal is None else max(tolerance, _PART * abs(bound.value - goal))
         if not accepted or progress.remaining(bound.value - value) < enough:
             return bound
@@ -64,19 +62,18 @@ def _first(problem: VhgpProblem, start: Sites | None) -> Bound:
     return Bound.tied(problem, np.full(len(problem.outputs), 0.5))
 
 
-def _improved(
-    problem: VhgpProblem, value: float, sites: Sites, bold: Sites, target: Sites, tolerance: float
-) -> tuple[Bound, bool]:
-    """The bound at `bold`, else after the longest step of 1, 1/2, 1/4 ... to the target that does not lower it.
+def _improved(problem: VhgpProblem, value: float, sites: Sites, target: Sites, tolerance: float) -> tuple[Bound, bool]:
+    """The bound after the longest step of 1, 1/2, 1/4 ... to the target that does not lower it.
 
     Also whether there is such a step; if not, the bound is returned unchanged.
     """
-    lowest, step = value - 1e-3 * tolerance, 1.0
-    candidate = _bound_if_above(lowest, problem, bold)
-    while candidate is None and step >= _SHORTEST_STEP:
-        candidate = _bound_if_above(lowest, problem, sites.towards(target, step))
+    step = 1.0
+    while step >= _SHORTEST_STEP:
+        candidate = _bound_if_above(value - 1e-3 * tolerance, problem, sites.towards(target, step))
+        if candidate is not None:
+            return candidate, True
         step *= 0.5
-    return (candidate, True) if candidate is not None else (Bound.at(problem, sites), False)
+    return Bound.at(problem, sites), False
 
 
 def _bound_if_above(lowest: float, problem: VhgpProblem, sites: Sites) -> Bound | None:
@@ -85,24 +82,3 @@ def _bound_if_above(lowest: float, problem: VhgpProblem, sites: Sites) -> Bound 
     except (np.linalg.LinAlgError, FloatingPointError):
         return None
     return bound if bound.value >= lowest else None
-
-
-class _Steps:
-    """The next point, from the starts and targets of the last two steps."""
-
-    def __init__(self) -> None:
-        self._last: tuple[Array, Array] | None = None
-
-    def next(self, sites: Sites, target: Sites) -> Sites:
-        """The target, or the secant's estimate of where target and sites meet, if that is a valid q(g)."""
-        weights = 1.0 / np.tile(sites.precisions, 2)
-        end = np.append(target.precisions, target.potentials)
-        residual = end - np.append(sites.precisions, sites.potentials)
-        last, self._last = self._last, (end, residual)
-        if last is None:
-            return target
-        change = (residual - last[1]) * weights
-        norm = float(change @ change)
-        share = float(change @ (residual * weights)) / norm if norm > 0.0 else 0.0
-        precisions, potentials = np.split(end - share * (end - last[0]), 2)
-        return Sites(precisions, potentials) if precisions.min() > 0.1 * target.precisions.min() else target

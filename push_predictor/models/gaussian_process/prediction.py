@@ -48,14 +48,13 @@ class LatentPrediction:
 class Remembered:
     """Held-out predictions, computed again only for other blocks: choices, correlation and tails share them."""
 
-    def __init__(self, predicted: Callable[[IntArray], LatentPrediction]) -> None:
-        self._predicted = predicted
+    def __init__(self) -> None:
         self._last: tuple[IntArray, LatentPrediction] | None = None
 
-    def of(self, block: IntArray) -> LatentPrediction:
+    def of(self, block: IntArray, predicted: Callable[[IntArray], LatentPrediction]) -> LatentPrediction:
         """The prediction of the rows of each block (n,) from the others."""
         if self._last is None or not np.array_equal(self._last[0], block):
-            self._last = block.copy(), self._predicted(block)
+            self._last = block.copy(), predicted(block)
         return self._last[1]
 
 

@@ -4,15 +4,13 @@
 """A kernel matrix K regularised by a positive diagonal D, as both Gaussian processes of a VHGP need it.
 
 With w = 1/D, every quantity here belongs to the posterior of a function with prior covariance K that is seen
-through noise of variance D. Kernel matrices of smooth functions are of low numerical rank when there are many
-inputs, so K = V V' with V (n, r) from a pivoted Cholesky factorisation; the remainder, below 1e-12 of K's
-diagonal, is dropped. Where the rank is not low the dense matrix is used.
+through noise of variance D. All of them follow from one triangular matrix, L^-1 of L L' = I + w^1/2 K w^1/2.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -21,56 +19,34 @@ import scipy
 from push_predictor.models.gaussian_process.kernels import ArdKernel, mirror_upper
 from push_predictor.types import Array, IntArray
 
-_DROPPED = 1e-12
-_SMALLEST_FACTORISED = 200
-_LARGEST_SHARE = 0.5
-_LARGEST_SHARE_OF_HALF = 0.35  # of all rows: a higher rank of every second row makes the search not worthwhile
-
 
 @dataclass(frozen=True, eq=False)
 class DenseKernel:
-    """The matrix K (n, n) of a kernel between inputs (n, D), with its root (r, n), K = root' root, if r is low.
+    """A kernel between inputs (n, D), to be regularised by many diagonals.
 
-    Factorised once, to be regularised by many diagonals. unexplained: prior variance of the function that K lacks.
+    unexplained: prior variance of the function that K lacks.
     """
 
     kernel: ArdKernel
     inputs: Array
-    matrix: Array
-    root: Array | None
     unexplained: ClassVar[float] = 0.0
 
-    @classmethod
-    def of(cls, kernel: ArdKernel, inputs: Array) -> DenseKernel:
-        """Build and factorise the matrix."""
-        matrix = kernel.matrix(inputs)
-        return cls(kernel, inputs, matrix, _low_rank_root(matrix))
+    @cached_property
+    def matrix(self) -> Array:
+        """K (n, n)."""
+        return self.kernel.matrix(self.inputs)
+
+    def free_matrix(self) -> None:
+        """Free the matrix, which is computed again where it is needed."""
+        self.__dict__.pop("matrix", None)  # a cached property
 
     def regularise(self, weights: Array) -> DenseRidge:
         """The ridge for D = 1/weights, weights (n,) > 0. Raises LinAlgError if it is not positive definite."""
-        return _FullRankRidge.of(self, weights) if self.root is None else _LowRankRidge.of(self, self.root, weights)
+        return DenseRidge.of(self, weights)
 
     def times(self, vector: Array) -> Array:
         """K vector, shape (n,)."""
         return np.asarray(self.matrix @ vector)
-
-
-def _low_rank_root(matrix: Array) -> Array | None:
-    n = len(matrix)
-    if n < _SMALLEST_FACTORISED or _rank_of_half(matrix) > _LARGEST_SHARE_OF_HALF * n:
-        return None
-    factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(matrix.T, tol=_DROPPED * matrix[0, 0], lower=1)
-    if rank > _LARGEST_SHARE * n:
-        return None
-    root = np.empty((rank, n))
-    root[:, pivots - 1] = np.tril(factor[:, :rank]).T
-    return root
-
-
-def _rank_of_half(matrix: Array) -> int:
-    """The rank of every second row and column, for an eighth of the time; that of all is not lower."""
-    half = matrix[::2, ::2].T.copy(order="F")
-    return int(scipy.linalg.lapack.dpstrf(half, tol=_DROPPED * matrix[0, 0], lower=1, overwrite_a=1)[2])
 
 
 def cholesky_in_place(matrix: Array) -> Array:
@@ -86,25 +62,57 @@ def cholesky_in_place(matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class DenseRidge(ABC):
+class DenseRidge:
     """Quantities of P = (K + D)^-1 with D = 1/w: weights w (n,), log_determinant of I + w^1/2 K w^1/2."""
 
     of_kernel: DenseKernel
     weights: Array
     log_determinant: float
+    inverse_root: Array  # L^-1 (n, n)
 
-    @property
-    @abstractmethod
+    @classmethod
+    def of(cls, kernel: DenseKernel, weights: Array) -> DenseRidge:
+        """Raises LinAlgError if K + D is not positive definite."""
+        scale = np.sqrt(weights)
+        inner = kernel.matrix * scale
+        inner *= scale[:, None]
+        inner.flat[:: len(inner) + 1] += 1.0
+        factor = cholesky_in_place(inner)
+        log_determinant = 2.0 * float(np.log(np.diagonal(factor)).sum())
+        inverse, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
+        return cls(kernel, weights, log_determinant, inverse)
+
+    @cached_property
     def posterior_diagonal(self) -> Array:
         """Diagonal of K - K P K, shape (n,)."""
+        explained = np.einsum("ij,ij->j", self.inverse_root, self.inverse_root)
+        return np.asarray((1.0 - explained) / self.weights)
 
-    @abstractmethod
     def residual(self, values: Array) -> Array:
         """P D values, shape (n,): the residual of a smoother of these values."""
+        scale = np.sqrt(self.weights)
+        half = scipy.linalg.blas.dtrmv(self.inverse_root, values / scale, lower=1)
+        return np.asarray(scale * scipy.linalg.blas.dtrmv(self.inverse_root, half, lower=1, trans=1))
 
-    @abstractmethod
+    def explained(self, cross: Array) -> Array:
+        """H (n, m), H'H = cross P cross': what n values explain of the prior covariance of m others; cross (m, n)."""
+        scaled = cross * np.sqrt(self.weights)
+        if len(cross) == 1:
+            return np.asarray(scipy.linalg.blas.dtrmv(self.inverse_root, scaled[0], lower=1)[:, None])
+        return np.asarray(scipy.linalg.blas.dtrmm(1.0, self.inverse_root, scaled.T, lower=1))
+
+    def posterior(self, weights: Array) -> DensePosterior:
+        """The posterior of the function, of weights P times its values, shape (n,)."""
+        return DensePosterior(self, weights)
+
     def upper_precision(self) -> Array:
         """P in the upper triangle of a C-ordered matrix (n, n), whose other elements have no meaning."""
+        # L'L in Fortran's lower triangle, for a sixth of a product's operations.
+        matrix, _ = scipy.linalg.lapack.dlauum(self.inverse_root, lower=1)
+        scale = np.sqrt(self.weights)
+        matrix *= scale
+        matrix *= scale[:, None]
+        return np.asarray(matrix.T)
 
     def precision(self) -> Array:
         """P itself, shape (n, n)."""
@@ -113,8 +121,8 @@ class DenseRidge(ABC):
     def gradient(self, added: Array, removed: Array | None = None, weights: Array | None = None) -> Array:
         """1/2 tr((added added' - removed removed' - P) dK) - 1/2 sum weights d(unexplained), vectors (n,).
 
-        d is by the kernel's log_lengthscales and log_sd, and by the log standard deviation of its nugget if there is
-        one, shape (D + 1,) or (D + 2,). weights: w if not given. A dense kernel leaves nothing unexplained.
+        d is by the kernel's log_lengthscales and log_sd, shape (D + 1,). weights: w if not given. A dense kernel leaves
+        nothing unexplained.
         """
         precision, kernel = self.upper_precision(), self.of_kernel
         for sign, vector in ((-1.0, added), (1.0, removed)):
@@ -139,66 +147,24 @@ class DenseRidge(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class _LowRankRidge(DenseRidge):
-    shrunk_root: Array  # T (r, n) with K - K P K = T'T
+class DensePosterior:
+    """A function's posterior from all training rows: mean k(x, X) weights, explained variance k(x, X) P k(X, x).
 
-    @classmethod
-    def of(cls, kernel: DenseKernel, root: Array, weights: Array) -> _LowRankRidge:
-        weighted = root * np.sqrt(weights)
-        inner = weighted @ weighted.T
-        inner.flat[:: len(inner) + 1] += 1.0
-        factor = cholesky_in_place(inner)
-        # T' L' = root' solved from the right, so that LAPACK's columns are our rows
-        shrunk = scipy.linalg.blas.dtrsm(1.0, factor, root.T, side=1, lower=1, trans_a=1).T
-        return cls(kernel, weights, _log_determinant(factor), shrunk)
+    weights (n,): P times the values.
+    """
 
-    @property
-    def posterior_diagonal(self) -> Array:
-        return np.asarray(np.einsum("ij,ij->j", self.shrunk_root, self.shrunk_root))
+    ridge: DenseRidge
+    weights: Array
 
-    def residual(self, values: Array) -> Array:
-        return values - (self.shrunk_root @ values) @ self.shrunk_root * self.weights
+    def predict(self, inputs: Array) -> tuple[Array, Array]:
+        """Mean and explained variance at inputs (q, D), (q,) each."""
+        known = self.ridge.of_kernel
+        cross = known.kernel.cross(inputs, known.inputs)
+        half = self.ridge.explained(cross)
+        return cross @ self.weights, np.asarray(np.einsum("ij,ij->j", half, half))
 
-    def upper_precision(self) -> Array:
-        weighted = self.shrunk_root * self.weights
-        # Fortran's lower triangle is the upper one of the C-ordered transpose.
-        matrix = scipy.linalg.blas.dsyrk(-1.0, weighted.T, lower=1).T
-        matrix.flat[:: len(matrix) + 1] += self.weights
-        return np.asarray(matrix)
-
-
-@dataclass(frozen=True, eq=False)
-class _FullRankRidge(DenseRidge):
-    inverse_root: Array  # L^-1 of L L' = I + w^1/2 K w^1/2
-
-    @classmethod
-    def of(cls, kernel: DenseKernel, weights: Array) -> _FullRankRidge:
-        scale = np.sqrt(weights)
-        inner = kernel.matrix * scale
-        inner *= scale[:, None]
-        inner.flat[:: len(inner) + 1] += 1.0
-        factor = cholesky_in_place(inner)
-        log_determinant = _log_determinant(factor)
-        inverse, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
-        return cls(kernel, weights, log_determinant, inverse)
-
-    @property
-    def posterior_diagonal(self) -> Array:
-        explained = np.einsum("ij,ij->j", self.inverse_root, self.inverse_root)
-        return np.asarray((1.0 - explained) / self.weights)
-
-    def residual(self, values: Array) -> Array:
-        scale = np.sqrt(self.weights)
-        return scale * (self.inverse_root.T @ (self.inverse_root @ (values / scale)))
-
-    def upper_precision(self) -> Array:
-        # L'L in Fortran's lower triangle, for a sixth of a product's operations.
-        matrix, _ = scipy.linalg.lapack.dlauum(self.inverse_root, lower=1)
-        scale = np.sqrt(self.weights)
-        matrix *= scale
-        matrix *= scale[:, None]
-        return np.asarray(matrix.T)
-
-
-def _log_determinant(factor: Array) -> float:
-    return 2.0 * float(np.log(np.diagonal(factor)).sum())
+    def covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (q, q) between inputs (q, D)."""
+        known = self.ridge.of_kernel
+        half = self.ridge.explained(known.kernel.cross(inputs, known.inputs))
+        return np.asarray(known.kernel.matrix(inputs) - half.T @ half)

@@ -11,30 +11,24 @@ docs/explanation/errata.md lists where the printed equations differ. Inputs and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.fit import maximise_bound
-from push_predictor.models.gaussian_process.gp import ROUGH_STOP, SHORTEST, GpParameters, check_rows, fit_gp
-from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
+from push_predictor.models.gaussian_process.fit import maximise_bound, precisions_from
+from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.inducing import InducedPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
-from push_predictor.models.gaussian_process.ridge import DenseKernel
+from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
 from push_predictor.types import Array, IntArray
 
+Posterior: TypeAlias = DensePosterior | InducedPosterior
 
-@dataclass(frozen=True, eq=False)
-class _Posterior:
-    """The posteriors of f and g, the weights (n,) of their means, and the bound: matrices of n rows."""
-
-    bound: float
-    signal: KernelPosterior
-    signal_weights: Array
-    noise: KernelPosterior
-    noise_weights: Array
+_EPSILON = float(np.finfo(np.float64).eps)
 
 
 class VHGP:
@@ -48,55 +42,55 @@ class VHGP:
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
-        self._held_out = Remembered(self._predicted_without)
+        self._held_out = Remembered()
+
+    @cached_property
+    def solved(self) -> Bound:
+        """The bound on the log marginal likelihood, with the quantities that predictions need: two (n, n) matrices."""
+        with one_blas_thread():
+            signal, noise = (DenseKernel(k, self.inputs) for k in (self.parameters.signal, self.parameters.noise))
+            problem = VhgpProblem(self.outputs, self.parameters, signal, noise)
+            bound = Bound.tied(problem, self.site_precisions)
+            signal.free_matrix()
+            noise.free_matrix()
+            return bound
 
     @property
     def bound(self) -> float:
         """The variational bound on the log marginal likelihood."""
-        return self._posterior.bound
+        return self.solved.value
 
     def free_matrices(self) -> None:
         """Free the matrices, which the next prediction computes again."""
-        self.__dict__.pop("_posterior", None)  # a cached property
+        self.__dict__.pop("solved", None)  # a cached property
 
-    @cached_property
-    def _posterior(self) -> _Posterior:
-        with one_blas_thread():
-            parameters = self.parameters
-            signal, noise = (DenseKernel.of(kernel, self.inputs) for kernel in (parameters.signal, parameters.noise))
-            bound = Bound.tied(VhgpProblem.about(self.outputs, parameters, signal, noise), self.site_precisions)
-            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.signal.level
-            del bound  # frees its matrices before the factors are computed
-            of_signal = KernelPosterior(signal.matrix, noise_level + parameters.jitter)
-            of_noise = KernelPosterior(noise.matrix, parameters.nugget + 1.0 / self.site_precisions)
-            return _Posterior(value, of_signal, of_signal.weights(self.outputs), of_noise, noise_weights)
+    def functions(self) -> tuple[Posterior, Posterior]:
+        """The posteriors of f, and of g less its prior mean and without its nugget."""
+        bound = self.solved
+        signal = bound.signal.likelihood
+        return signal.ridge.posterior(signal.alpha), bound.noise_ridge.posterior(bound.mean_weights)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
-        signal, noise, posterior = self.parameters.signal, self.parameters.noise, self._posterior
-        of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
+        parameters, (signal, noise) = self.parameters, self.functions()
+        of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
+        mean, explained = signal.predict(inputs)
+        log_noise, noise_explained = noise.predict(inputs)
         # The jitter is independent of the data, so the variance of f cannot fall below it.
-        variance = signal.variance + self.parameters.jitter - posterior.signal.explained_variance(of_signal)
-        log_noise_variance = noise.variance + self.parameters.nugget - posterior.noise.explained_variance(of_noise)
-        return LatentPrediction(
-            of_signal @ posterior.signal_weights,
-            np.maximum(variance, self.parameters.jitter),
-            self.parameters.noise_mean + of_noise @ posterior.noise_weights,
-            np.maximum(log_noise_variance, self.parameters.nugget + np.finfo(float).eps * noise.variance),
-        )
+        variance = np.maximum(of_signal + parameters.jitter - explained, parameters.jitter)
+        log_noise_variance = parameters.nugget + np.maximum(of_noise - noise_explained, _EPSILON * of_noise)
+        return LatentPrediction(mean, variance, parameters.noise_mean + log_noise, log_noise_variance)
 
     def function_covariance(self, inputs: Array) -> Array:
         """Posterior covariance (m, m) of f between inputs (m, D), without the jitter, of which data tell nothing."""
-        kernel = self.parameters.signal
-        return kernel.matrix(inputs) - self._posterior.signal.explained_covariance(kernel.cross(inputs, self.inputs))
+        return self.functions()[0].covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
-        return self._held_out.of(block)
+        return self._held_out.of(block, self._predicted_without)
 
     def _predicted_without(self, block: IntArray) -> LatentPrediction:
-        problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
-        return Bound.tied(problem, self.site_precisions).held_out(block)
+        return self.solved.held_out(block)
 
 
 def fit_vhgp(
@@ -111,8 +105,14 @@ def fit_vhgp(
 
     inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of these rows or some of them; None
     computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
-    finite.
+    finite. The hyperparameters are those of at most MOST_SEARCHED rows.
     """
     check_rows(inputs, outputs)
-    near = start or fit_gp(inputs, outputs, shortest=shortest, stop=ROUGH_STOP).parameters
-    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, most_iterations, shortest))
+    rows = some_rows(len(outputs), MOST_SEARCHED)
+    few = inputs[rows], outputs[rows]
+    near = start or fit_gp(*few, shortest=shortest, rough=True).parameters
+    found = VHGP(*few, *maximise_bound(*few, near, most_iterations, shortest))
+    if len(rows) == len(outputs):
+        return found
+    problem = VhgpProblem.of(inputs, outputs, found.parameters)
+    return VHGP(inputs, outputs, found.parameters, precisions_from(problem, found.predict(inputs)))

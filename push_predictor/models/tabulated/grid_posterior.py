@@ -20,13 +20,11 @@ from typing import TypeAlias
 import numpy as np
 import scipy
 
-from push_predictor.models.gaussian_process.bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.gp import GaussianProcess
+from push_predictor.models.gaussian_process.inducing import InducedPosterior
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.regression import ConstantNoise, Regression
-from push_predictor.models.gaussian_process.ridge import DenseKernel
-from push_predictor.models.gaussian_process.sparse_vhgp import InducedPosterior, SparseVHGP
-from push_predictor.models.gaussian_process.vhgp import VHGP
+from push_predictor.models.gaussian_process.vhgp import Posterior
 from push_predictor.types import Array, IntArray
 
 _DROPPED = 1e-4  # of the smallest noise variance: a prior variance that is negligible next to the noise
@@ -84,44 +82,23 @@ def on_grid(regression: Regression) -> OnGrid:
     if isinstance(regression, ConstantNoise):
         return regression
     if isinstance(regression, GaussianProcess):
-        return _of_gp(regression)
-    return _of_vhgp(regression) if isinstance(regression, VHGP) else _of_sparse(regression)
+        parameters, prior = regression.parameters, regression.parameters.kernel.variance
+        signal = _of_function(regression.posterior, prior, _EPSILON * prior)
+        return GridRegression(signal, 2.0 * parameters.log_noise_sd, None)
+    of_vhgp, (f, g) = regression.parameters, regression.functions()
+    of_noise, nugget = of_vhgp.noise.variance, of_vhgp.nugget
+    signal = _of_function(f, of_vhgp.signal.variance + of_vhgp.jitter, of_vhgp.jitter)
+    noise = _of_function(g, of_noise + nugget, nugget + _EPSILON * of_noise)
+    return GridRegression(signal, of_vhgp.noise_mean, noise)
 
 
-def _of_gp(regression: GaussianProcess) -> GridRegression:
-    kernel, noise = regression.parameters.kernel, regression.parameters.noise_variance
-    noises = np.full(len(regression.outputs), noise)
-    ridge = DenseKernel.of(kernel, regression.inputs).regularise(1.0 / noises)
-    weights, prior = ridge.residual(regression.outputs / noise), kernel.variance
-    signal = _factorised(kernel, regression.inputs, noises, weights, prior, _EPSILON * prior)
-    return GridRegression(signal, float(np.log(noise)), None)
-
-
-def _of_vhgp(regression: VHGP) -> GridRegression:
-    inputs, parameters = regression.inputs, regression.parameters
-    problem = VhgpProblem.of(inputs, regression.outputs, parameters)
-    bound = Bound.tied(problem, regression.site_precisions)
-    jitter, nugget = parameters.jitter, parameters.nugget
-    of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
-    seen_through, least = nugget + 1.0 / bound.sites.precisions, nugget + _EPSILON * of_noise
-    jittered = bound.signal.level + jitter
-    signal = _factorised(parameters.signal, inputs, jittered, bound.signal.likelihood.alpha, of_signal + jitter, jitter)
-    noise = _factorised(parameters.noise, inputs, seen_through, bound.mean_weights, of_noise + nugget, least)
-    return GridRegression(signal, parameters.noise_mean, noise)
-
-
-def _of_sparse(regression: SparseVHGP) -> GridRegression:
-    parameters = regression.parameters
-    jitter, of_noise, nugget = parameters.jitter, parameters.noise.variance, parameters.nugget
-    signal = _induced(regression.signal, parameters.signal.variance + jitter, jitter)
-    noise = _induced(regression.noise, of_noise + nugget, nugget + _EPSILON * of_noise)
-    return GridRegression(signal, parameters.noise_mean, noise)
-
-
-def _factorised(
-    kernel: ArdKernel, inputs: Array, noises: Array, weights: Array, prior_variance: float, least_variance: float
-) -> GridPosterior:
-    """The posterior from rows that are seen through noise variances (n,)."""
+def _of_function(posterior: Posterior, prior_variance: float, least_variance: float) -> GridPosterior:
+    if isinstance(posterior, InducedPosterior):  # needs no factorisation
+        kernel, inputs, root = posterior.kernel, posterior.inducing, posterior.kernel.variance * posterior.root
+        pivots = np.arange(len(inputs))
+        return GridPosterior(kernel, inputs, posterior.weights, pivots, root, prior_variance, least_variance)
+    known, noises = posterior.ridge.of_kernel, 1.0 / posterior.ridge.weights
+    kernel, inputs = known.kernel, known.inputs
     dropped = max(_DROPPED * float(noises.min()) / kernel.variance, _ROUNDING)
     factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(kernel.matrix(inputs), tol=dropped * kernel.variance, lower=1)
     basis, order = np.tril(factor[:, :rank]), pivots - 1
@@ -131,15 +108,7 @@ def _factorised(
     kept = share > dropped
     scaled = vectors[:, kept] * np.sqrt(share[kept])
     root = scipy.linalg.blas.dtrsm(kernel.variance, basis[:rank], scaled, lower=1, trans_a=1)
-    return GridPosterior(kernel, inputs, weights, order[:rank], root, prior_variance, least_variance)
-
-
-def _induced(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> GridPosterior:
-    """The posterior from inducing inputs, which needs no factorisation."""
-    kernel, inputs, root = posterior.kernel, posterior.inducing, posterior.kernel.variance * posterior.root
-    return GridPosterior(
-        kernel, inputs, posterior.weights, np.arange(len(inputs)), root, prior_variance, least_variance
-    )
+    return GridPosterior(kernel, inputs, posterior.weights, order[:rank], root, prior_variance, least_variance)
 
 
 def weighted_sums(factors: Sequence[Array], weights: Array) -> Array:
