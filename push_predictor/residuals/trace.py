@@ -35,8 +35,7 @@ from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend
-from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
-from push_predictor.residuals.extension.recalibration import held_out_windows
+from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain, held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict, size_of
 from push_predictor.residuals.question import SHARES, Question

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import get_args
 
 import numpy as np
 
@@ -154,7 +155,11 @@ class Nuisance:
         if constants:
             parts += [self.response(name) for name in self.mechanisms if name != kept]
         columns = np.concatenate(parts, axis=2) if parts else np.empty((len(self.evidence.table), 3, 0))
-        return _orthonormal(columns, Residualizer(controls_for(kind, self.inputs)))
+        return _orthonormal(columns, self._residualizers[kind])
+
+    @cached_property
+    def _residualizers(self) -> dict[Kind, Residualizer]:
+        return {kind: Residualizer(controls_for(kind, self.inputs)) for kind in get_args(Kind)}
 
     @cached_property
     def _late_touch(self) -> Array:

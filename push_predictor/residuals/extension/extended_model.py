@@ -23,7 +23,7 @@ from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fi
 from push_predictor.residuals.evidence.drivers import COUNT, DISTANCE, TIME
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.extension.recalibration import held_out_windows
+from push_predictor.residuals.extension.held_out_gain import held_out_windows
 from push_predictor.residuals.extension.refit import spread_rows, with_predictor
 from push_predictor.residuals.selection.search import Term
 
