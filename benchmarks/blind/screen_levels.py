@@ -25,8 +25,7 @@ from benchmarks.blind.scores import wilson
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train_learnt import MEANS
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.candidates.candidate import Candidate, candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.alarm.evidence import alarm_sentence
     from push_predictor.evaluation.alarm.scores import recording_alarm
     from push_predictor.evaluation.judgement import judgement
-    from push_predictor.evaluation.metrics_text import metrics_lines
+    from push_predictor.evaluation.metrics import metrics_lines
     from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
     from push_predictor.evaluation.report.summary import opening_sentences
     from push_predictor.evaluation.validation import metrics_json, trained_on

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The result of a trace: all that its JSON contains and its report shows."""
+"""The result of a trace, all that its report shows, and its JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
-from push_predictor.evaluation.validation import Comparison
+from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
@@ -246,3 +246,67 @@ def _length(coefficients: Array, change: Array, count: int) -> float:
     """Change of one parameter with its sign, or the length of the change of several."""
     changes = coefficients.reshape(count, -1) @ change
     return float(changes[0]) if count == 1 else float(np.linalg.norm(changes))
+
+
+def trace_json(trace: Trace) -> dict[str, Any]:
+    """The JSON of a trace; unknown numbers are null, never NaN."""
+    held_out = trace.held_out
+    return {
+        "verdict": trace.verdict,
+        "input_shift": [_shift(shift) for shift in trace.input_shift],
+        "effect_present": trace.verdict != "none",
+        "channel": CHANNELS[trace.verdict],
+        "kind": trace.kind,
+        "covariates": [effect.covariate for effect in trace.effects],
+        "equivalent": list(trace.equivalent),
+        "undecided": trace.undecided,
+        "motion_model_changed": trace.extended is not None,
+        "effects": [_effect(effect, trace.weak) for effect in trace.effects],
+        "harmless": [{"mechanism": each.mechanism, "parameter": vars(each.parameter)} for each in trace.harmless],
+        "before": metrics_json(held_out.before),
+        "refit": metrics_json(held_out.refit),
+        "after": metrics_json(held_out.after),
+        "gain": {"nmse": trace.gain_nmse.json(), "nlpd": trace.gain_nlpd.json()},
+        "gain_over": trace.gain_over,
+        "minimum_detectable": {name: dict(size) for name, size in trace.minimum_detectable.items()},
+        "remaining": {"effect_present": trace.remaining is not None, "strongest": _strongest(trace)},
+        "experiment": [],  # of the contract; advice on further pushes is in words, on the page
+        "tested": [vars(tested) for tested in trace.tested],
+        "pushes": {"analysis": len(trace.analysis.pushes), "held_out": len(held_out.table.pushes)},
+        "held_out_sha256": held_out.digest,
+        "mechanisms": list(trace.mechanisms),
+        "alpha": trace.alpha,
+        "model": trace.model.name,
+        "notes": list(trace.notes),
+    }
+
+
+def _effect(effect: FoundEffect, weak: bool) -> dict[str, Any]:
+    return {
+        "mechanism": effect.mechanism,
+        "covariate": effect.covariate,
+        "outputs": list(effect.outputs),
+        "form": effect.basis,
+        "parameter": None if effect.parameter is None else vars(effect.parameter),
+        "p_value": effect.p_value,
+        "share_of_residual": effect.share_of_residual,
+        "resembles": effect.resembles,
+        "weak": weak,
+    }
+
+
+def _strongest(trace: Trace) -> str | None:
+    if trace.remaining is None:
+        return None
+    mechanism, covariate = trace.remaining
+    return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
+
+
+def _shift(shift: ShiftedInput) -> dict[str, Any]:
+    return {
+        "covariate": shift.covariate,
+        "training": [float(end) for end in shift.training],
+        "now": [float(end) for end in shift.now],
+        "share_outside": float(shift.share_outside),
+        "share_unvisited": float(shift.share_unvisited),
+    }

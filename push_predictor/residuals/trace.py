@@ -34,9 +34,8 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend
+from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain, held_out_windows
-from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict, size_of
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift

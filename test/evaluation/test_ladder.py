@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from synthetic import square_rig
 
-from push_predictor.evaluation.ladder.ladder_page import write_ladder_page
-from push_predictor.evaluation.ladder.ladder_text import ladder_answer, ladder_json
-from push_predictor.evaluation.ladder.scored_ladder import ScoredLadder, changed, score_ladder
+from push_predictor.evaluation.ladder_page import ladder_answer, ladder_json, write_ladder_page
+from push_predictor.evaluation.scored_ladder import ScoredLadder, changed, score_ladder
 from push_predictor.models.mechanics.fit import FitRows, JointFit
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics

@@ -342,11 +342,11 @@ def test_covariates_have_documented_names() -> None:
 
 
 def test_mechanism_is_removed_only_inside_the_context() -> None:
-    from push_predictor.residuals.candidates import enumeration
+    from push_predictor.residuals.candidates import candidate
 
     with library_without("tilted_surface"):
-        assert "tilted_surface" not in {mechanism.name for mechanism in enumeration.LIBRARY}
-    assert enumeration.LIBRARY is LIBRARY
+        assert "tilted_surface" not in {mechanism.name for mechanism in candidate.LIBRARY}
+    assert candidate.LIBRARY is LIBRARY
     with pytest.raises(SystemExit, match="perpetual"), library_without("perpetual"):
         pass
 

@@ -19,14 +19,13 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.extended_model import extend, refit_base, spread_rows
 from push_predictor.residuals.extension.held_out_gain import (
     held_out_gain,
     held_out_windows,
     new_windows,
     uncertainty_of_effects,
 )
-from push_predictor.residuals.extension.refit import refit_base, spread_rows
 from push_predictor.residuals.outcome import Sized, size_of
 
 CONSTANT = DriverBasis("constant")

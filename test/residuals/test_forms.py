@@ -12,7 +12,7 @@ import pytest
 from made_up_traces import pushes
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.residuals.selection.forms import MOST_PLACES, STEPS, forms_of, step_places, step_places_near
+from push_predictor.residuals.evidence.drivers import MOST_PLACES, STEPS, forms_of, step_places, step_places_near
 
 TABLE = pushes(60, 2)
 

@@ -15,7 +15,6 @@ from push_predictor.evaluation.report.figures.calibration import paint_pit
 from push_predictor.evaluation.report.figures.ellipses import ENOUGH, examples, paint_examples
 from push_predictor.evaluation.report.figures.residuals import paint_residuals, time_axis
 from push_predictor.evaluation.report.figures.tracks import paint_tracks
-from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     Condition,
@@ -24,6 +23,8 @@ from push_predictor.evaluation.report.maps import (
     coarse_cells,
     commonest_condition,
     fine_cells,
+    fixed_covariates,
+    fixed_covariates_text,
     fold_order,
     paint_maps,
     predicted_at_windows,

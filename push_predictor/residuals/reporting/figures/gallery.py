@@ -14,6 +14,7 @@ from push_predictor.reporting import html
 from push_predictor.reporting.chart import WIDE, Chart, Dots
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.channels import (
+    error_charts,
     force_chart,
     gap_chart,
     input_chart,
@@ -25,10 +26,8 @@ from push_predictor.residuals.reporting.figures.driver_basis import (
     Strength,
     analysis_rows,
     basis_charts,
-    held_out_rows,
     strength_of,
 )
-from push_predictor.residuals.reporting.figures.errors import coverage_charts, error_charts
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     count,
@@ -49,12 +48,13 @@ HOVER = "Hover over a mark to see its push and its value."
 
 
 def effect_figures(trace: Trace) -> list[str]:
-    """Each effect that depends on a covariate, against that."""
-    driven = [effect for effect in trace.terms if effect.basis.drivers]
-    if not driven:
+    """Each effect that depends on a covariate against that, but for what the key picture shows."""
+    every = [strength_of(term, trace.analysis) for term in trace.terms if term.basis.drivers]
+    shown = [one for one in every if one.effect is not trace.terms[0] or len(one.names) > 1 or not _is_named(trace)]
+    if not shown:
         return []
-    analysis, held_out = analysis_rows(trace), _held_out_rows(trace)
-    return [_basis_figure(trace, strength_of(effect, trace.analysis), analysis, held_out) for effect in driven]
+    rows = analysis_rows(trace)
+    return [_basis_figure(trace, one, rows) for one in shown]
 
 
 def error_figure(trace: Trace) -> list[str]:
@@ -69,22 +69,7 @@ def error_figure(trace: Trace) -> list[str]:
     return [html.charts(error_charts(table, covariate, shown), caption)]
 
 
-def calibration_figures(trace: Trace) -> list[str]:
-    """Coverage and PIT before, after the refit and with the effects."""
-    shown = [comparison for comparison in trace.comparisons if len(comparison.observed)]
-    if not shown:
-        return []
-    caption = (
-        f"Calibration on {count(len(trace.held_out.table.pushes), 'held-out push', 'held-out pushes')}. First column: "
-        "share of outcomes inside the central predicted interval, against its nominal share; band: 95 %, bootstrap of "
-        "pushes. Others: probability integral transform (PIT), uniform for a calibrated model. A hump: the predicted "
-        "uncertainty is too large. A trough: it is too small. A slope: the mean is biased. Grey: 95 % range of the "
-        "bars of a calibrated model, where windows of a push resemble each other."
-    )
-    return [html.charts([chart for one in shown for chart in coverage_charts(one)], caption, 4)]
-
-
-def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> str:
+def _basis_figure(trace: Trace, strength: Strength, rows: Rows) -> str:
     effect = strength.effect
     name = capitalised(moved_noun(effect.mechanism))
     covariates = listed([covariate_phrase(driver) for driver in effect.basis.drivers])
@@ -101,12 +86,7 @@ def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Ro
         f"{100.0 * strength.share:.0f} % of the fitted coefficients' sum of squares."
     )
     caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}{pattern}"
-    return html.charts(basis_charts(trace, strength, analysis, held_out), caption)
-
-
-def _held_out_rows(trace: Trace) -> Rows | None:
-    held = trace.held_out
-    return held_out_rows(trace) if len(held.table) and len(held.after.observed) == len(held.table) else None
+    return html.charts(basis_charts(trace, strength, rows), caption)
 
 
 def _data_words(trace: Trace) -> str:
@@ -136,10 +116,15 @@ def _charts(trace: Trace) -> tuple[list[Chart], str]:
         return _known(noise_chart(trace)), SIZE
     if trace.verdict == "input_shift":
         return _known(*(input_chart(trace, shift.covariate) for shift in trace.input_shift)), INPUTS
-    if trace.terms and trace.effects[0].mechanism is not None:
+    if _is_named(trace):
         return [_effect_chart(trace)], MAP if len(trace.terms[0].basis.drivers) > 1 else EFFECT
     covariate = trace.effects[0].covariate if trace.effects else ""
     return _known(size_chart(trace, covariate, list(range(len(OUTPUTS))))), SIZE
+
+
+def _is_named(trace: Trace) -> bool:
+    """Whether the key picture is the first effect's parameter: there is one, of a known mechanism."""
+    return bool(trace.terms) and trace.effects[0].mechanism is not None
 
 
 def _effect_chart(trace: Trace) -> Chart:
@@ -147,7 +132,7 @@ def _effect_chart(trace: Trace) -> Chart:
     strength = strength_of(trace.terms[0], trace.analysis)
     values = strength.curve(trace.analysis.covariates, len(trace.analysis))[0]
     most = int(np.argmax(np.abs(values).max(axis=0)))
-    return basis_charts(trace, strength, analysis_rows(trace), None)[most]
+    return basis_charts(trace, strength, analysis_rows(trace))[most]
 
 
 def _known(*charts: Chart | None) -> list[Chart]:
