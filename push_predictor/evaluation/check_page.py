@@ -16,7 +16,7 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.checks.checked import CheckedData
 from push_predictor.recordings.checks.coverage import Coverage
-from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.checks.outline.contact_fit import OFF, ContactFit
 from push_predictor.recordings.rig import Rig
@@ -99,7 +99,7 @@ def _contact_parts(checked: CheckedData) -> list[str]:
     parts = []
     if (fit := checked.contacts) is not None:
         caption = f"Median gap between tip and outline by {fit.side}. Counted counter-clockwise from the first vertex."
-        rows = [[str(k + 1), _millimetres(gap)] for k, gap in enumerate(fit.gaps)]
+        rows = [[str(k + 1), html.number(gap and 1e3 * gap, 2)] for k, gap in enumerate(fit.gaps)]
         parts.append(html.folded_table(caption, (fit.side, "gap, mm"), rows))
     if (chart := track_chart(checked)) is not None:
         parts.append(html.charts([chart], TRACKS))
@@ -109,7 +109,11 @@ def _contact_parts(checked: CheckedData) -> list[str]:
 def _numbers(checked: CheckedData) -> list[str]:
     """A folded table of the estimates."""
     rows = [
-        [f"{finding.name}, {name}", f"{html.number(value.value)} {_unit(value)}", _sd(value)]
+        [
+            f"{finding.name}, {name}",
+            f"{html.number(value.value)} {'' if value.unit == '1' else value.unit}",
+            html.number(value.sd, 2),
+        ]
         for finding in checked.findings
         for name, value in finding.values.items()
     ]
@@ -133,22 +137,10 @@ def _coverage(checked: CheckedData) -> list[str]:
     ]
 
 
-def _millimetres(gap: float | None) -> str:
-    return html.NOTHING if gap is None else html.number(1e3 * gap, 2)
-
-
 def _listed(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(html.number(each, 3) for each in value)
     return html.number(float(value), 3) if isinstance(value, int | float) else html.NOTHING
-
-
-def _unit(value: Value) -> str:
-    return "" if value.unit == "1" else value.unit
-
-
-def _sd(value: Value) -> str:
-    return html.number(value.sd, 2)
 
 
 @dataclass(frozen=True)
@@ -191,7 +183,23 @@ def contact_chart(checked: CheckedData) -> Chart | None:
 def track_chart(checked: CheckedData) -> Chart | None:
     """The tracks of slider and tip, None for a table, and where they have no common time."""
     motion = _motion(checked)
-    return None if motion is None else _tracks(motion)
+    if motion is None:
+        return None
+    slider, tip = MM * motion.slider[:, :2], MM * motion.tip
+    thin = slice(None, None, max(1, -(-len(tip) // MOST_POINTS)))
+    marks: list[Mark] = [Line("push", *tip[thin].T, name="tip")]
+    numbers = np.unique(motion.push[motion.contact])
+    every = max(1, -(-int(motion.contact.sum()) // MOST_POINTS))
+    for count, number in enumerate(numbers):
+        rows = np.flatnonzero(motion.contact & (motion.push == number))
+        rows = np.unique(np.append(rows[::every], rows[-1]))
+        marks += [
+            Line("before", *tip[rows].T, name="" if count else "tip while the slider moves"),
+            Line("fit", *slider[rows].T, name="" if count else "slider's frame, pushed"),
+        ]
+    x, y = _equal(np.concatenate([slider, tip]))
+    label = "Tracks of the tip and of the slider from above"
+    return Chart(label, "x, mm", "y, mm", x, y, tuple(marks), "Tracks from above", SQUARE)
 
 
 def _motion(checked: CheckedData) -> Motion | None:
@@ -236,24 +244,6 @@ def coverage_charts(coverage: Coverage, table: PushTable) -> list[Chart]:
     return charts
 
 
-def _tracks(motion: Motion) -> Chart:
-    slider, tip = MM * motion.slider[:, :2], MM * motion.tip
-    thin = slice(None, None, max(1, -(-len(tip) // MOST_POINTS)))
-    marks: list[Mark] = [Line("push", *tip[thin].T, name="tip")]
-    numbers = np.unique(motion.push[motion.contact])
-    every = max(1, -(-int(motion.contact.sum()) // MOST_POINTS))
-    for count, number in enumerate(numbers):
-        rows = np.flatnonzero(motion.contact & (motion.push == number))
-        rows = np.unique(np.append(rows[::every], rows[-1]))
-        marks += [
-            Line("before", *tip[rows].T, name="" if count else "tip while the slider moves"),
-            Line("fit", *slider[rows].T, name="" if count else "slider's frame, pushed"),
-        ]
-    x, y = _equal(np.concatenate([slider, tip]))
-    label = "Tracks of the tip and of the slider from above"
-    return Chart(label, "x, mm", "y, mm", x, y, tuple(marks), "Tracks from above", SQUARE)
-
-
 def _contacts(motion: Motion, rig: Rig, correction: Correction | None) -> Chart:
     rows = np.flatnonzero(motion.contact)
     rows = rows[:: max(1, -(-len(rows) // MOST_CONTACTS))]
@@ -290,8 +280,7 @@ def answer_of(checked: CheckedData) -> tuple[tuple[str, str, str], str]:
     """What was found, what to do, what was pushed; and a label: refused, check first, or sound."""
     worst = min(checked.findings, key=lambda finding: ORDER.index(finding.severity), default=None)
     label = "sound" if worst is None else LABELS[worst.severity]
-    sentences = _found(checked, worst), _to_do(checked, worst), pushed(checked)
-    found, to_do, done = map(with_minus, sentences)
+    found, to_do, done = map(with_minus, (_found(checked, worst), _to_do(checked, worst), pushed(checked)))
     return (found, to_do, done), label
 
 
@@ -319,9 +308,8 @@ def _to_do(checked: CheckedData, worst: Finding | None) -> str:
 
 def pushed(checked: CheckedData) -> str:
     """What was pushed: sides, speeds and angles."""
-    if checked.coverage is None:
-        return "Pushes are searched for once this is corrected."
-    return coverage_sentence(checked.coverage)
+    covered = checked.coverage
+    return "Pushes are searched for once this is corrected." if covered is None else coverage_sentence(covered)
 
 
 def contact_sentence(fit: ContactFit) -> str:

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +15,8 @@ from push_predictor.evaluation.judgement import FEWEST
 from push_predictor.evaluation.scored_ladder import FittedParameter, ScoredLadder, ScoredStep, changed
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
-from push_predictor.reporting.canvas import NEARBY, OBSERVED, Picture, draw, grid
 from push_predictor.reporting.chart import Bars, Chart, limits_of
 from push_predictor.reporting.html import number
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PARAMETER_HEAD = ("Meaning", "Value", "Unit", "Textbook", "Parameter")
 METHOD = (
@@ -38,25 +33,22 @@ ERROR = (
     "Total NMSE of held-out pushes after each step, with 95 % intervals. Step 0 has the textbook values. Hover over a "
     "point to see what its step adds."
 )
-PARAMETERS = "Fitted parameters in prior standard deviations from the textbook value, with 95 % intervals."
 COLUMNS = ("step", "free parameters", "held-out NMSE", "held-out NLPD", "gain, nats per push")
 
 
 def write_ladder_page(path: Path, ladder: ScoredLadder) -> Path:
-    """Write the page; return its path. Raises OSError, or PushPredictorError without matplotlib or Jinja2."""
-    with TemporaryDirectory() as folder:
-        parts = _parts(Path(folder), ladder)
-    write_whole(path, html.page(f"Fitted mechanics of the model {ladder.model.name}", parts).encode())
+    """Write the page; return its path. Raises OSError, or PushPredictorError without Jinja2."""
+    write_whole(path, html.page(f"Fitted mechanics of the model {ladder.model.name}", _parts(ladder)).encode())
     return path
 
 
-def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
+def _parts(ladder: ScoredLadder) -> list[str]:
+    label = "textbook values" if len(ladder.steps) == 1 else f"{len(ladder.final)} fitted"
     steps = [(f"{row[0]}  {row[1]}", *row[2:]) for row in ladder_rows(ladder)]
     head = ["Step and free parameters", *(column[0].upper() + column[1:] for column in COLUMNS[2:])]
-    parts = [
-        html.opening(ladder_answer(ladder), _label(ladder), html.charts([error_chart(ladder)], ERROR)),
+    return [
+        html.opening(ladder_answer(ladder), label, html.charts([error_chart(ladder)], ERROR)),
         html.heading("Fitted parameters"),
-        html.figure(_picture(folder, ladder.final)),
         html.folded_table(
             "Fitted parameters. Values with 95 % intervals from the variation between pushes.",
             PARAMETER_HEAD,
@@ -67,7 +59,6 @@ def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
         html.heading("Method"),
         html.bullets(METHOD),
     ]
-    return parts
 
 
 def error_chart(ladder: ScoredLadder) -> Chart:
@@ -88,10 +79,6 @@ def error_chart(ladder: ScoredLadder) -> Chart:
     )
 
 
-def _label(ladder: ScoredLadder) -> str:
-    return "textbook values" if len(ladder.steps) == 1 else f"{len(ladder.final)} fitted"
-
-
 def _parameter_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:
     return [
         (
@@ -103,28 +90,6 @@ def _parameter_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:
         )
         for p in ladder.final
     ]
-
-
-def _picture(folder: Path, parameters: list[FittedParameter]) -> Picture:
-    size = (6.0, 1.2 + 0.36 * max(len(parameters), 3))
-    path = draw(folder / "ladder.png", size, lambda figure: _paint(figure, parameters))
-    return Picture(path, "The fitted parameters and their 95 % intervals", PARAMETERS)
-
-
-def _paint(figure: Figure, parameters: list[FittedParameter]) -> None:
-    axes, place = figure.subplots(), range(len(parameters))
-    axes.axvline(0.0, color=NEARBY, linewidth=0.8)
-    for k, p in enumerate(parameters):
-        value, low, high = (
-            (end - p.parameter.textbook) / p.parameter.spread
-            for end in (p.estimate.value, p.estimate.low, p.estimate.high)
-        )
-        axes.plot([low, high], [k, k], color=OBSERVED, linewidth=1.6)
-        axes.plot(value, k, "o", color=OBSERVED, markersize=4.5)
-    axes.set_yticks(place, [p.parameter.name for p in parameters])
-    axes.set_ylim(max(len(parameters), 1) - 0.5, -0.5)
-    axes.set_xlabel("Prior standard deviations")
-    grid(axes)
 
 
 def ladder_answer(ladder: ScoredLadder) -> tuple[str, str, str]:

@@ -78,11 +78,12 @@ def metrics_lines(metrics: Mapping[str, Any]) -> list[str]:
 def _output_line(metrics: Mapping[str, Any], name: str) -> str:
     shares = [level and level.get(name) for level in metrics["coverage"].values()]
     exact = (metrics["exact_nlpd"] or {}).get(name)
-    cells = [_cell(metrics["nmse"][name], 9), _cell(metrics["nlpd"][name], 10), _cell(exact, 12)]
-    return f"{name:8s}" + "".join(cells + [_cell(share, 9) for share in shares])
+    cells = [cell(metrics["nmse"][name], 9), cell(metrics["nlpd"][name], 10), cell(exact, 12)]
+    return f"{name:8s}" + "".join(cells + [cell(share, 9) for share in shares])
 
 
-def _cell(value: float | None, width: int) -> str:
+def cell(value: float | None, width: int) -> str:
+    """A score right-aligned in a column of a terminal's table."""
     return f"{'-':>{width}s}" if value is None else f"{value:{width}.3f}"
 
 

@@ -35,6 +35,7 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Sized, Trace, Verdict, trace_json
 from push_predictor.residuals.reporting.figures.channels import error_charts
 from push_predictor.residuals.reporting.figures.driver_basis import analysis_rows, basis_charts, determined, strength_of
+from push_predictor.residuals.reporting.figures.gallery import effect_figures
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import interval_cell
@@ -280,10 +281,20 @@ def test_bins_that_do_not_determine_the_parameter_are_not_drawn() -> None:
 
 def test_key_chart_shows_the_step_of_the_effect() -> None:
     trace = trace_of("effect")
-    (chart,) = basis_charts(trace, strength_of(trace.terms[0], trace.analysis), analysis_rows(trace))
+    (chart,) = basis_charts(trace, strength_of(trace.terms[0]), analysis_rows(trace))
     dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
     before, after = dots.x < JUMP.place, dots.x > JUMP.place
     assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
+
+
+def test_effect_is_drawn_once_with_all_its_parameters() -> None:
+    """The key picture shows the first effect's only parameter, and the noise along the covariate if it is unknown."""
+    along = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+    grain = made_up_trace(slippery(0.06), planted("anisotropic_friction", "elapsed_time", along, 0.1, 0.05))
+    (figure,) = effect_figures(grain)
+    assert figure.count('<svg class="chart') == 2
+    assert "irection-dependent friction of the table against elapsed time (linear)" in figure
+    assert effect_figures(trace_of("effect")) == [] == effect_figures(trace_of("driver_only"))
 
 
 def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:

@@ -29,7 +29,6 @@ from push_predictor.residuals.reporting.figures.driver_basis import (
     bins_of,
     per_push,
     responses,
-    shift_of,
     strength_of,
 )
 from push_predictor.residuals.reporting.page import best_of, role_of, write_trace_report
@@ -39,7 +38,6 @@ from push_predictor.residuals.reporting.sizes import shift_sizes
 
 LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
 FIFTH = Sized("change", 0.2, 0.1, 0.3, "1")
-UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +175,7 @@ def test_advice_matches_the_rivals() -> None:
 
 
 def test_bins_recover_the_planted_drift_with_and_without_an_extended_model(drift: Trace) -> None:
-    strength = strength_of(drift.terms[0], drift.analysis)
+    strength = strength_of(drift.terms[0])
     for rows in (analysis_rows(drift), analysis_rows(replace(drift, extended=None))):
         time = rows.table.covariates["elapsed_time"]
         found = binned(strength, rows, responses(drift, strength, rows), time, bins_of(DRIFT, rows.table))
@@ -192,7 +190,7 @@ def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
     """A step, fitted by a line: the bins stay on the step."""
     trace = made_up_trace(planted("contact_friction", "elapsed_time", made_up.JUMP, 0.15), count=200)
     line = made_up.traced(trace.model, trace.analysis, trace.held_out.table, (slippery(0.1),))
-    strength, rows = strength_of(line.terms[0], line.analysis), analysis_rows(line)
+    strength, rows = strength_of(line.terms[0]), analysis_rows(line)
     found = binned(
         strength,
         rows,
@@ -207,29 +205,17 @@ def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
 
 
 def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
-    strength = strength_of(drift.terms[0], drift.analysis)
+    strength = strength_of(drift.terms[0])
     _, half = strength.curve({"elapsed_time": np.array([500.0, 800.0])}, 2)
     np.testing.assert_allclose(half[:, 0], [0.0, 1.96 * np.sqrt(drift.terms[0].covariance[0, 0])], rtol=1e-12)
 
 
 def test_single_pushes_have_the_curve_as_median(drift: Trace) -> None:
-    strength, rows = strength_of(drift.terms[0], drift.analysis), analysis_rows(drift)
+    strength, rows = strength_of(drift.terms[0]), analysis_rows(drift)
     place, value = per_push(strength, rows, responses(drift, strength, rows), rows.table.covariates["elapsed_time"])
     assert len(place) == len(drift.analysis.pushes)
     off = value[:, 0] - strength.curve({"elapsed_time": place}, len(place))[0][:, 0]
     assert abs(np.nanmedian(off)) < 0.02
-
-
-def test_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
-    trace = made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN))
-    strength = strength_of(trace.terms[0], trace.analysis)
-    rows = analysis_rows(trace)
-    value = strength.curve(rows.table.covariates, len(rows.table))[0]
-    assert np.sqrt(np.mean(value**2)) == pytest.approx(1.0)
-    shown = np.einsum("nkq,nq->nk", responses(trace, strength, rows), value)
-    whole = np.einsum("nij,nj->ni", rows.whitener, shift_of(trace, trace.terms[0], trace.analysis))
-    np.testing.assert_allclose(shown, whole, atol=1e-9)  # one column of the basis: the pattern is all of it
-    assert strength.share == pytest.approx(1.0)
 
 
 def test_shift_intervals_contain_the_planted_size(drift: Trace) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The covariates that an effect may depend on, the basis in which each enters the screen, and the forms of the search."""
+"""The covariates that an effect may depend on, and the bases of the screen and of the search."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nlpd, total_nmse
+from push_predictor.evaluation.metrics import cell
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
@@ -384,9 +385,5 @@ def _line(comparison: Comparison) -> str:
     metrics: dict[str, Any] = metrics_json(comparison)
     exact = (metrics["exact_nlpd"] or {}).get("total")
     coverage = metrics["coverage"]["0.9"] or {}
-    cells = [_cell(metrics["nmse"]["total"], 9), _cell(metrics["nlpd"]["total"], 10), _cell(exact, 12)]
-    return f"{comparison.model:8s}{''.join(cells)}{''.join(_cell(share, 10) for share in coverage.values())}"
-
-
-def _cell(value: float | None, width: int) -> str:
-    return f"{'-':>{width}s}" if value is None else f"{value:{width}.3f}"
+    cells = [cell(metrics["nmse"]["total"], 9), cell(metrics["nlpd"]["total"], 10), cell(exact, 12)]
+    return f"{comparison.model:8s}{''.join(cells)}{''.join(cell(share, 10) for share in coverage.values())}"

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.evaluation.push_scores import by_push
-from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
-from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.pushes import Push
@@ -175,19 +175,16 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """An effect as q parameters that depend on its covariate.
+    """An effect of a known mechanism as q parameters that depend on its covariate.
 
-    pattern (p, q): of the mechanism's p responses. coefficients (q, m) and their covariance (q, m, m). share: of the
-    fitted coefficients' sum of squares that the pattern covers, 1 unless the mechanism is unknown.
+    coefficients (q, m) and their covariance (q, m, m).
     """
 
     effect: Effect
     names: tuple[str, ...]
     units: tuple[str, ...]
-    pattern: Array
     coefficients: Array
     covariance: Array
-    share: float
 
     def curve(self, covariates: Mapping[str, Array], n: int) -> tuple[Array, Array]:
         """Fitted parameters (n, q) and half of their 95 % band (n, q)."""
@@ -202,47 +199,26 @@ def analysis_rows(trace: Trace) -> Rows:
         evidence = evidence_of(trace.extended, trace.analysis)
         return Rows(trace.analysis, evidence.z, evidence.whitener)
     evidence = evidence_of(trace.model, trace.analysis)
-    shift = sum((shift_of(trace, term, trace.analysis) for term in trace.terms), np.zeros_like(evidence.residual))
+    shift = joint_shift(mechanics_under(trace.model), trace.terms, _push(trace.analysis))
     unexplained = replace(evidence, residual=evidence.residual - shift)
     return Rows(trace.analysis, unexplained.z, unexplained.whitener)
 
 
-def shift_of(trace: Trace, effect: Effect, table: PushTable) -> Array:
-    """Shift of the mean (n, 3) by an effect."""
-    return joint_shift(mechanics_under(trace.model), [effect], _push(table))
-
-
-def strength_of(effect: Effect, table: PushTable) -> Strength:
-    """The effect's physical parameters; for an unknown mechanism its strongest pattern, scaled to RMS 1."""
-    m = columns_of(effect.basis)
-    coefficients = effect.coefficients.reshape(-1, m)
-    p = len(coefficients)
+def strength_of(effect: Effect) -> Strength:
+    """The effect's physical parameters."""
+    parameters = mechanism_named(str(effect.mechanism)).parameters
+    coefficients = effect.coefficients.reshape(len(parameters), -1)
+    p, m = coefficients.shape
     blocks = effect.covariance.reshape(p, m, p, m)
-    if effect.mechanism is not None:
-        parameters = mechanism_named(effect.mechanism).parameters
-        own = np.array([blocks[j, :, j] for j in range(p)])
-        names, units = tuple(q.name for q in parameters), tuple(q.unit for q in parameters)
-        return Strength(effect, names, units, np.eye(p), coefficients, own, 1.0)
-    left, size, _ = np.linalg.svd(coefficients, full_matrices=False)
-    u = left[:, 0]
-    along = u @ coefficients
-    along_values = effect.basis.values(table.covariates, len(table)) @ along
-    rms = max(float(np.sqrt(np.mean(along_values**2))), np.finfo(float).tiny)
-    own = np.einsum("p,pmqk,q->mk", u, blocks, u)[None] / rms**2
-    share = float(size[0] ** 2 / max(float(np.sum(size**2)), np.finfo(float).tiny))
-    names = ("Strength of the fitted pattern (RMS 1)",)
-    return Strength(effect, names, ("1",), u[:, None] * rms, along[None] / rms, own, share)
+    own = np.array([blocks[j, :, j] for j in range(p)])
+    return Strength(effect, tuple(q.name for q in parameters), tuple(q.unit for q in parameters), coefficients, own)
 
 
 def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     """Standardised outcome (n, 3, q) per unit of each of the q parameters."""
     effect = strength.effect
-    on, push = mechanics_under(trace.model), _push(rows.table)
-    if effect.exact:
-        bare = joint(on, [effect], push).responses(effect)
-    else:
-        bare = design_of(effect.mechanism, DriverBasis("constant"), on, push, effect.outcome_scale)
-    return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
+    bare = joint(mechanics_under(trace.model), [effect], _push(rows.table)).responses(effect)
+    return np.asarray(np.einsum("nij,njq->niq", rows.whitener, bare))
 
 
 def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: IntArray) -> Bins:

@@ -48,9 +48,10 @@ HOVER = "Hover over a mark to see its push and its value."
 
 
 def effect_figures(trace: Trace) -> list[str]:
-    """Each effect that depends on a covariate against that, but for what the key picture shows."""
-    every = [strength_of(term, trace.analysis) for term in trace.terms if term.basis.drivers]
-    shown = [one for one in every if one.effect is not trace.terms[0] or len(one.names) > 1 or not _is_named(trace)]
+    """Each known effect that depends on a covariate against that, but for what the key picture shows."""
+    known = [term for term in trace.terms if term.basis.drivers and term.mechanism is not None]
+    every = [strength_of(term) for term in known]
+    shown = [one for one in every if one.effect is not trace.terms[0] or len(one.names) > 1]
     if not shown:
         return []
     rows = analysis_rows(trace)
@@ -79,13 +80,7 @@ def _basis_figure(trace: Trace, strength: Strength, rows: Rows) -> str:
         else "Line: fitted, with its 95 % band. Points: estimated separately in each bin, from the residuals of the "
         f"model and the other effects. {BARS} Grey dots: single pushes; those with too small a response are not shown."
     )
-    pattern = (
-        ""
-        if strength.share > 0.999
-        else " The mechanism is unknown, so the strongest pattern over contact point and push angle is shown: "
-        f"{100.0 * strength.share:.0f} % of the fitted coefficients' sum of squares."
-    )
-    caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}{pattern}"
+    caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}"
     return html.charts(basis_charts(trace, strength, rows), caption)
 
 
@@ -116,20 +111,15 @@ def _charts(trace: Trace) -> tuple[list[Chart], str]:
         return _known(noise_chart(trace)), SIZE
     if trace.verdict == "input_shift":
         return _known(*(input_chart(trace, shift.covariate) for shift in trace.input_shift)), INPUTS
-    if _is_named(trace):
+    if trace.terms and trace.effects[0].mechanism is not None:
         return [_effect_chart(trace)], MAP if len(trace.terms[0].basis.drivers) > 1 else EFFECT
     covariate = trace.effects[0].covariate if trace.effects else ""
     return _known(size_chart(trace, covariate, list(range(len(OUTPUTS))))), SIZE
 
 
-def _is_named(trace: Trace) -> bool:
-    """Whether the key picture is the first effect's parameter: there is one, of a known mechanism."""
-    return bool(trace.terms) and trace.effects[0].mechanism is not None
-
-
 def _effect_chart(trace: Trace) -> Chart:
     """The chart of the first effect's parameter that changes most."""
-    strength = strength_of(trace.terms[0], trace.analysis)
+    strength = strength_of(trace.terms[0])
     values = strength.curve(trace.analysis.covariates, len(trace.analysis))[0]
     most = int(np.argmax(np.abs(values).max(axis=0)))
     return basis_charts(trace, strength, analysis_rows(trace))[most]
