@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
@@ -122,11 +122,12 @@ class Trace:
 
     effects: in the order of selection; terms: the same as effects of a model, then parts of these; empty if the mean
     of the motion is unchanged. equivalent: rivals of the first effect's covariate; mechanisms: rivals of its
-    mechanism. analysis: the windows that were searched; residual, unexplained (n, 3): their standardised residuals
-    before and after. gain_over: the better of the two models without the effects, with which the gain compares.
-    extended: the model with the effects, None if the motion model does not change. remaining: mechanism and covariate
-    of the strongest effect that is still significant. input_shift: inputs that differ from those of training. harmless:
-    findings that change neither windows nor predictions. notes: further sentences for the reader.
+    mechanism. analysis: the windows that were searched; residual (n, 3): their standardised residuals before;
+    find_unexplained: computes those after, which only pages and sizes of noise need. gain_over: the better of the two
+    models without the effects, with which the gain compares. extended: the model with the effects, None if the motion
+    model does not change. remaining: mechanism and covariate of the strongest effect that is still significant.
+    input_shift: inputs that differ from those of training. harmless: findings that change neither windows nor
+    predictions. notes: further sentences for the reader.
     """
 
     verdict: Verdict
@@ -139,7 +140,7 @@ class Trace:
     undecided: bool
     analysis: PushTable
     residual: Array
-    unexplained: Array
+    find_unexplained: Callable[[], Array]
     held_out: HeldOut
     gain_nmse: Estimate
     gain_nlpd: Estimate
@@ -152,6 +153,11 @@ class Trace:
     input_shift: tuple[ShiftedInput, ...] = ()
     harmless: tuple[Harmless, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def unexplained(self) -> Array:
+        """Standardised residuals (n, 3) of the analysis after the trace."""
+        return self.find_unexplained()
 
     @property
     def relearnt(self) -> bool:

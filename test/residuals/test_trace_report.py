@@ -109,7 +109,9 @@ def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path) -> None:
         covariance=after.covariance[fewer],
         observed=after.observed[fewer],
     )
-    text = written(tmp_path, replace(trace, held_out=replace(held, after=cut), unexplained=trace.unexplained[:90]))
+    text = written(
+        tmp_path, replace(trace, held_out=replace(held, after=cut), find_unexplained=lambda: trace.unexplained[:90])
+    )
     assert "on windows cut again" in text and "The motion was not searched" in text
 
 

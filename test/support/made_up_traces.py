@@ -117,7 +117,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         undecided=False,
         analysis=analysis,
         residual=evidence.z,
-        unexplained=evidence_of(after, analysis).z,
+        find_unexplained=lambda: evidence_of(after, analysis).z,
         held_out=HeldOut(held, before, again, last, digest_of(held)),
         gain_nmse=nmse,
         gain_nlpd=nlpd,

@@ -50,7 +50,6 @@ from push_predictor.residuals.evidence.drivers import (
     between_ends,
     screening_bases,
     step_places,
-    step_places_near,
 )
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.split import FEWEST_PUSHES
@@ -238,8 +237,18 @@ def _as_step(force: _Force, z: Array, best: Contrast, seed: int) -> Contrast:
     found = min(fitting, key=lambda t: SIMPLEST_FIRST.index(t.basis.name))
     if found.basis.name != "step":
         return found
-    near = stepped(step_places_near(values, found.basis.place, MOST_NEAR))
+    near = stepped(step_places_near(values, found.basis.place))
     return best_and_rivals(z, [found, *near], force.levelled, force.block, seed)[0]
+
+
+def step_places_near(values: Array, place: float, most: int = MOST_NEAR) -> list[float]:
+    """Midpoints between neighbouring values, from the next place that was tried below to the next above."""
+    ordered, tried = np.unique(values), step_places(values)
+    low = max((other for other in tried if other < place), default=-np.inf)
+    high = min((other for other in tried if other > place), default=np.inf)
+    middle = 0.5 * (ordered[1:] + ordered[:-1])
+    inside = middle[(middle > low) & (middle < high)]
+    return [float(middle) for middle in inside[:: max(1, -(-len(inside) // most))]]
 
 
 def _is_level(tried: Contrast) -> bool:

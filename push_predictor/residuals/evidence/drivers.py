@@ -29,7 +29,6 @@ MOST_LEVELS = 12  # guards against a category that has a level for every few pus
 ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 STEPS = 9  # places of a step that are tried first, at quantiles of the covariate
-MOST_PLACES = 60  # that are tried near the best of these
 SOON = 0.03  # of the covariate's range: scale of an effect that grows early in it
 
 
@@ -118,13 +117,3 @@ def step_places(values: Array) -> list[float]:
     marks = np.quantile(values, np.arange(1, STEPS + 1) / (STEPS + 1.0))
     index = np.unique(np.clip(np.searchsorted(ordered, marks), 1, len(ordered) - 1))
     return [float(0.5 * (ordered[k - 1] + ordered[k])) for k in index]
-
-
-def step_places_near(values: Array, place: float, most: int = MOST_PLACES) -> list[float]:
-    """Midpoints between neighbouring values, from the next place that was tried below to the next above."""
-    ordered, tried = np.unique(values), step_places(values)
-    low = max((other for other in tried if other < place), default=-np.inf)
-    high = min((other for other in tried if other > place), default=np.inf)
-    middle = 0.5 * (ordered[1:] + ordered[:-1])
-    inside = middle[(middle > low) & (middle < high)]
-    return [float(middle) for middle in inside[:: max(1, -(-len(inside) // most))]]
