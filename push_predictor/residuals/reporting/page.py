@@ -51,7 +51,6 @@ UNNAMED = (
     "A mechanism is named only if it explains nearly as much as a general pattern over contact point and push angle. "
     "Here no mechanism does. A tested mechanism can be significant because it resembles the pattern."
 )
-AT_ONCE = 15  # candidates shown before the reader opens the rest
 
 
 def write_trace_report(path: Path, trace: Trace) -> Path:
@@ -157,7 +156,7 @@ def _tested(trace: Trace) -> list[str]:
     if not trace.tested:
         return [*parts, html.paragraph("Nothing could be tested: see the notes.", "warning")]
     closest = [] if trace.effects else [html.paragraph(evidence(trace))]
-    return [*parts, *closest, *tested_tables(trace)]
+    return [*parts, *closest, tested_table(trace)]
 
 
 def _remaining(trace: Trace) -> list[str]:
@@ -194,23 +193,15 @@ def effects_table(trace: Trace) -> str:
     return html.folded_table(caption, [head[k] for k in used], [[row[k] for k in used] for row in rows])
 
 
-def tested_tables(trace: Trace) -> list[str]:
-    """All candidates, smallest p first; all but fifteen are in a table of their own."""
+def tested_table(trace: Trace) -> str:
+    """All candidates, smallest p first."""
     best = best_of(trace.tested)
-    shown = _at_once(trace, best)
-    rest = [tested for tested in best if tested not in shown]
-    head = ("mechanism", "depends on", "family-wise p", "")
     caption = (
-        f"{count(len(shown), 'pair', 'pairs')} of mechanism and covariate with the smallest p, of {len(best)}, each in "
-        "its best basis, before any effect is subtracted. Neighbours of a true effect are often significant too, "
-        "because covariates and responses correlate."
+        f"{count(len(best), 'pair', 'pairs')} of mechanism and covariate, each in its best basis, before any effect is "
+        "subtracted. Neighbours of a true effect are often significant too, because covariates and responses correlate."
     )
-    parts = [html.folded_table(caption, head, [_tested_row(trace, tested) for tested in shown])]
-    if rest:
-        title = f"The other {count(len(rest), 'pair', 'pairs')}"
-        table = html.table(f"{title}.", head, [_tested_row(trace, tested) for tested in rest])
-        parts.append(html.details(title, table))
-    return parts
+    head = ("mechanism", "depends on", "family-wise p", "")
+    return html.folded_table(caption, head, [_tested_row(trace, tested) for tested in best])
 
 
 def held_out_table(trace: Trace) -> str:
@@ -280,30 +271,16 @@ def _with_interval(metrics: Mapping[str, Any], name: str) -> str:
     return interval_cell(Estimate(value, ends["low"], ends["high"]))
 
 
-def _at_once(trace: Trace, best: Sequence[Tested]) -> list[Tested]:
-    """At most fifteen candidates: those that the answer names, then those with the smallest p."""
-    named = [tested for tested in best if role_of(trace, tested)]
-    others = [tested for tested in best if not role_of(trace, tested)]
-    chosen = [*named, *others][:AT_ONCE]
-    return [tested for tested in best if tested in chosen]
-
-
 def _tested_row(trace: Trace, tested: Tested) -> list[str]:
     names = mechanism_phrase(tested.mechanism), covariate_phrase(tested.covariate)
-    return [*map(bare, names), p_text(tested.p_value), _mark(trace, tested)]
+    mark = role_of(trace, tested) or ("p below alpha" if tested.p_value <= trace.alpha else "")
+    return [*map(bare, names), p_text(tested.p_value), mark]
 
 
 def _size_cell(size: Mapping[str, Any]) -> str:
     value = size.get("value")
     factor, unit = shown_unit(str(size.get("unit", "")))
     return html.NOTHING if value is None else f"{_cell(factor * float(value))} {unit}".strip()
-
-
-def _mark(trace: Trace, tested: Tested) -> str:
-    role = role_of(trace, tested)
-    if role:
-        return role
-    return "p below alpha" if tested.p_value <= trace.alpha else ""
 
 
 def _cell(value: float | None) -> str:
