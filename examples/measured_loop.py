@@ -34,8 +34,8 @@ from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import load_evidence
+from push_predictor.residuals.extension.extended_model import refit_base
 from push_predictor.residuals.extension.held_out_gain import compared
-from push_predictor.residuals.extension.refit import refit_base
 
 OUT = Path(__file__).resolve().parents[1] / "out" / "measured_loop"
 VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"

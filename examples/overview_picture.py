@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from push_predictor.evaluation.report.figures.ellipses import Example, examples, inside, paint_ellipse
-from push_predictor.evaluation.report.map_conditions import fixed_covariates
 from push_predictor.evaluation.report.maps import (
     coarse_cells,
     colour_scale,
     commonest_condition,
     fine_cells,
+    fixed_covariates,
     paint_panel,
     push_map,
     recorded_map,

@@ -22,7 +22,7 @@ import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import DataWarning, RequestError
-from push_predictor.evaluation.metrics_text import metrics_lines
+from push_predictor.evaluation.metrics import metrics_lines
 from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import LEARNT, PushModel

@@ -101,7 +101,7 @@ def score(options: argparse.Namespace) -> None:
 
 def trace_one(folder: Path, alpha: float, without: str | None) -> dict[str, Any]:
     """The verdict on one recording, and the CPU seconds of the trace."""
-    from push_predictor.residuals.reporting.trace_json import trace_json
+    from push_predictor.residuals.outcome import trace_json
     from push_predictor.residuals.trace import trace_data
 
     begin = time.process_time()

@@ -28,8 +28,9 @@ class Judged:
     unknown: whether the mechanism was reported as outside the library. wrong: whether a wrong mechanism was named
     first. superfluous: number of further effects that do not act. in_set, set_size: of the drivers that fit equally
     well; 0 if none was named. covered: whether the interval of the first effect's parameter covers the true value, None
-    if they are not compared. shift: whether shifted inputs were reported. share: of the oracle's gain. seconds: of
-    processor time, if known.
+    if they are not compared. shift: whether shifted inputs were reported. share: of the oracle's gain. worse: whether
+    the interval of the reported gain lies wholly above zero. harm: whether a model was extended although it is worse.
+    seconds: of processor time, if known.
     """
 
     group: str
@@ -53,6 +54,7 @@ class Judged:
     covered: bool | None
     shift: bool
     share: float | None
+    worse: bool
     harm: bool
     seconds: float | None
     failed: bool
@@ -79,7 +81,8 @@ def judge(truth: Json, result: Json) -> Judged:
     accepted = {name for one in ([named] if named else acting) for name in one.covariates}
     undriven = truth["channel"] == "measurement" and named is not None  # it has no driver that could be wrong
     found = not failed and _found(truth, result)
-    low = None if failed else result["gain"]["nlpd"]["low"]
+    changed = not failed and bool(result["motion_model_changed"])
+    worse = not failed and bool(result["gain"]["nlpd"]["low"] > 0.0)
     missed, superfluous = missed_and_superfluous(effects, acting)
     return Judged(
         group=truth["group"],
@@ -91,7 +94,7 @@ def judge(truth: Json, result: Json) -> Judged:
         outside=None in acting[0].names and truth["channel"] == "motion",
         verdict="failed" if failed else result["verdict"],
         found=found,
-        changed=not failed and bool(result["motion_model_changed"]),
+        changed=changed,
         name=found and (named is not None if truth["names"] else result.get("kind") == "variance"),
         both=found and len(acting) > 1 and not missed,
         driver=found and (driver in accepted or undriven),
@@ -103,7 +106,8 @@ def judge(truth: Json, result: Json) -> Judged:
         covered=covers(truth, named.record, effects[0]) if found and named and effects else None,
         shift=not failed and bool(result.get("input_shift")),
         share=_share(truth, result, failed),
-        harm=low is not None and low > 0.0,
+        worse=worse,
+        harm=changed and worse,  # nobody uses an extension that was refused
         seconds=result.get("seconds"),
         failed=failed,
     )

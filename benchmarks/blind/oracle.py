@@ -20,9 +20,8 @@ from push_predictor.residuals.evidence.drivers import standard_basis, two_dimens
 from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.extended_model import extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import gain, held_out_gain
-from push_predictor.residuals.extension.refit import refit_base
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, Any] | None:

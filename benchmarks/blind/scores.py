@@ -59,7 +59,8 @@ def rates(judged: Sequence[Judged]) -> list[Rate]:
         rate("interval of the parameter covers the true value", compared, lambda j: bool(j.covered), "85 to 98 %"),
         rate("superfluous further effects", real, lambda j: j.superfluous > 0, "at most 5 %"),
         rate("gain at least 0.9 of the oracle's, medium and large", gained, lambda j: (j.share or 0.0) >= 0.9),
-        rate("harm: interval of the gain wholly above zero", judged, lambda j: j.harm, "none"),
+        rate("harm: extended, interval of the gain wholly above zero", judged, lambda j: j.harm, "none"),
+        rate("extension refused, interval of the gain wholly above zero", judged, lambda j: j.worse and not j.harm),
         rate("traces that failed", judged, lambda j: j.failed, "none"),
     ]
 

@@ -29,8 +29,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.candidates.candidate import Candidate, candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.loading import cut_again
 from push_predictor.residuals.evidence.split import held_out_rows

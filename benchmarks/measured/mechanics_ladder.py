@@ -20,9 +20,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.measured.ladder import HEAD, LADDERS, step_row
-from push_predictor.evaluation.ladder.ladder_text import parameter_lines
-from push_predictor.evaluation.ladder.scored_ladder import score_ladder
+from push_predictor.evaluation.ladder_page import parameter_lines
 from push_predictor.evaluation.push_scores import PushScores, push_scores
+from push_predictor.evaluation.scored_ladder import score_ladder
 from push_predictor.models.mechanics.fit import fit_jointly
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.ladder import Rung

@@ -28,7 +28,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Score the model, print the scores, and warn about training pushes and other sliders."""
-    from push_predictor.evaluation.metrics_text import metrics_lines
+    from push_predictor.evaluation.metrics import metrics_lines
     from push_predictor.evaluation.offline import rig_difference, training_overlap
     from push_predictor.evaluation.validation import compare, metrics_json
     from push_predictor.models.request import check_pushes

@@ -101,7 +101,7 @@ def _names(text: str) -> list[str]:
 def _write_results(options: argparse.Namespace, found: Trace) -> bool:
     """Write JSON and extended model; warn, and return False, if no model was written."""
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.residuals.reporting.trace_json import trace_json
+    from push_predictor.residuals.outcome import trace_json
 
     write_json(options, trace_json(found))
     path = options.save_model
@@ -129,7 +129,7 @@ def _write_report(options: argparse.Namespace, found: Trace) -> None:
 def _print(found: Trace, saved: Path | None) -> None:
     """Print the verdict, and where the extended model is."""
     from push_predictor.models.push_model import defaults_in_words
-    from push_predictor.residuals.reporting.summary import summary_lines
+    from push_predictor.residuals.reporting.sentences import summary_lines
 
     print("\n".join(summary_lines(found)))
     if saved is not None and found.extended is not None:

@@ -189,9 +189,8 @@ def _saved_ladder(model: PushModel, ladder: list[Rung], out: Path) -> list[str]:
     """Save the ladder of fitted mechanics next to the model as JSON and as a page; return it as lines of text."""
     if not ladder:
         return []
-    from push_predictor.evaluation.ladder.ladder_page import write_ladder_page
-    from push_predictor.evaluation.ladder.ladder_text import ladder_json, ladder_lines
-    from push_predictor.evaluation.ladder.scored_ladder import score_ladder
+    from push_predictor.evaluation.ladder_page import ladder_json, ladder_lines, write_ladder_page
+    from push_predictor.evaluation.scored_ladder import score_ladder
 
     scored = score_ladder(model, ladder)
     numbers, page = _ladder_files(out)

@@ -46,8 +46,8 @@ def run(options: argparse.Namespace) -> None:
     """Compare, print the scores, and warn about training pushes and other sliders."""
     from push_predictor.evaluation.alarm.evidence import alarm_sentence
     from push_predictor.evaluation.alarm.scores import recording_alarm
-    from push_predictor.evaluation.judgement import judgement
-    from push_predictor.evaluation.metrics_text import metrics_lines
+    from push_predictor.evaluation.judgement import judged
+    from push_predictor.evaluation.metrics import metrics_lines
     from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
     from push_predictor.evaluation.report.summary import opening_sentences
     from push_predictor.evaluation.validation import metrics_json, trained_on
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
         table = windows_to_table(windows)
         alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, 1.0))
         metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}
-        metrics["judgement"] = judgement(metrics)
+        metrics["judgement"] = judged(metrics).sentence
     for text in remarks(model, rig, table):
         warn(text)
     if options.windows:

@@ -32,11 +32,6 @@ class Judgement:
     action: str
 
 
-def judgement(metrics: Mapping[str, Any]) -> str:
-    """The sentence for the JSON of `validate`, which has the alarm."""
-    return judged(metrics).sentence
-
-
 def judged(metrics: Mapping[str, Any]) -> Judgement:
     """Judge a model by the JSON of `validate`, which has the alarm, of at least one push.
 

@@ -52,7 +52,8 @@ class TrainingOptions:
     better. about: mechanics to learn about, as they are; mean is then not used. per_path: of a learnt model: whether
     outcomes are learnt per path length of the tip (models/features.py); without it, as they are, as in Bauza and
     Rodriguez 2017. tails: of a learnt model: whether to fit the distribution of new pushes (predictors/tails.py);
-    without it, windows of a push are taken for independent.
+    without it, windows of a push are taken for independent. near: a predictor about the same mechanics, at whose
+    hyperparameters the search of a VHGP begins: half of its time.
     """
 
     n_train: int | None = None
@@ -64,6 +65,7 @@ class TrainingOptions:
     per_path: bool = True
     supports: Mapping[int, Array] = field(default_factory=dict)
     tails: bool = True
+    near: GaussianProcessPredictor | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("n_train", self.n_train), ("inducing", self.inducing)):
@@ -122,7 +124,9 @@ def _predictor(
 ) -> tuple[Predictor, list[Rung]]:
     inducing = inducing_inputs(kind, len(rows), options.inducing)
     if kind in LEARNT:
-        learnt = LearntOptions(kind, inducing, options.mean, options.about, options.tails, options.per_path)
+        learnt = LearntOptions(
+            kind, inducing, options.mean, options.about, options.tails, options.per_path, near=options.near
+        )
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
     if kind == "analytical" and not options.fit:
         return predictor_about(analytical_mechanics(rig.outline, rig.pusher_radius), rows), []
@@ -136,10 +140,10 @@ def _predictor(
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted, per path length or not as before, on at most 1000 rows drawn evenly over
-    the pushes. Mechanics keep their parameters, alone and as the mean of a learnt model: a change of these is what a
-    trace looks for. The covariance of an analytical model is estimated again. The priors of a prior model are updated
-    by the table. Raises TrainingError for too few rows.
+    A learnt one is refitted, per path length or not as before, on at most 1000 rows drawn evenly over the pushes; the
+    search of a VHGP begins at its hyperparameters. Mechanics keep their parameters, alone and as the mean of a learnt
+    model: a change of these is what a trace looks for. The covariance of an analytical model is estimated again. The
+    priors of a prior model are updated by the table. Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
@@ -149,6 +153,7 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
             about=predictor.mean,
             per_path=predictor.scaling.travel is not None,
             tails=predictor.tails is not None,
+            near=predictor,
         )
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)

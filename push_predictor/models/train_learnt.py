@@ -12,7 +12,8 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.features import push_features, within
-from push_predictor.models.gaussian_process.gp import SHORTEST, GaussianProcess, GpParameters, fit_gp
+from push_predictor.models.gaussian_process.bound import VhgpParameters
+from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression, best_held_out, fit_constant
 from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
@@ -47,7 +48,8 @@ class LearntOptions:
     """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
 
     about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new
-    pushes. per_path: whether outcomes are learnt per path length. rough: whether a gp is only to be compared.
+    pushes. per_path: whether outcomes are learnt per path length. rough: whether a gp is only to be compared. near: a
+    predictor about the same mechanics, at which the search of a vhgp begins.
     """
 
     kind: str
@@ -57,6 +59,7 @@ class LearntOptions:
     tails: bool = True
     per_path: bool = True
     rough: bool = False
+    near: GaussianProcessPredictor | None = None
 
 
 def train_learnt(
@@ -68,7 +71,7 @@ def train_learnt(
     outcomes that do not vary, and for options that the kind does not have.
     """
     _check_rows(rows, rig)
-    about, near = None, None
+    about, near = None, options.near
     if options.about is not None:
         about = FittedMean(options.about, rows.outcomes - _moved(options.about, rows))
     elif options.mean != "zero":
@@ -80,7 +83,8 @@ def train_learnt(
         each = [_trained(of_mean, rig, rough, mean) for mean in (None, about)]
         zero, mechanics = (trained.density(of_mean) for trained in each)
         about = None if zero_is_better(zero, mechanics) else about
-        near = each[0 if about is None else 1]
+        chosen = each[0 if about is None else 1]
+        near = replace(chosen.predictor, regressions=chosen.fitted)
     trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9), near)
     return _completed(trained, rows, options, watch)
 
@@ -170,9 +174,9 @@ def _trained(
     options: LearntOptions,
     about: FittedMean | None,
     watch: Watch = no_watch,
-    near: _Trained | None = None,
+    near: GaussianProcessPredictor | None = None,
 ) -> _Trained:
-    """near: GPs of some of the rows about the same mean, where the search of a VHGP begins."""
+    """near: regressions of similar rows about the same mean, where the search of a VHGP begins."""
     mean = None if about is None else about.mean
     path = rows.inputs[:, 0] * rows.duration
     size = (path / path.mean() if options.per_path else np.ones(len(path)))[:, None]
@@ -215,11 +219,20 @@ def _blocks(rows: PushTable) -> IntArray:
     return np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
 
 
-def _starts(near: _Trained | None, scaling: Scaling) -> list[GpParameters | None]:
+def _starts(near: GaussianProcessPredictor | None, scaling: Scaling) -> list[GpParameters | None]:
     """Hyperparameters of each output's GP, where there is one of the same features."""
-    if near is None or near.predictor.scaling.columns != scaling.columns:
+    if near is None or near.scaling.columns != scaling.columns:
         return [None] * len(OUTPUTS)
-    return [one.parameters if isinstance(one, GaussianProcess) else None for one in near.fitted]
+    return [_alike(regression) for regression in near.regressions]
+
+
+def _alike(regression: Regression) -> GpParameters | None:
+    """Those of a GP with the signal and the mean noise variance of a regression; None of noise alone."""
+    parameters = regression.parameters
+    if isinstance(parameters, VhgpParameters):
+        noise = parameters.noise_mean + 0.5 * (parameters.noise.variance + parameters.nugget)
+        return GpParameters(parameters.log_lengthscales, parameters.log_signal_sd, 0.5 * noise)
+    return parameters if isinstance(parameters, GpParameters) else None
 
 
 def _learnt(

@@ -1,11 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The result of a trace: all that its JSON contains and its report shows."""
+"""The result of a trace, all that its report shows, and its JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
-from push_predictor.evaluation.validation import Comparison
+from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
@@ -122,11 +122,12 @@ class Trace:
 
     effects: in the order of selection; terms: the same as effects of a model, then parts of these; empty if the mean
     of the motion is unchanged. equivalent: rivals of the first effect's covariate; mechanisms: rivals of its
-    mechanism. analysis: the windows that were searched; residual, unexplained (n, 3): their standardised residuals
-    before and after. gain_over: the better of the two models without the effects, with which the gain compares.
-    extended: the model with the effects, None if the motion model does not change. remaining: mechanism and covariate
-    of the strongest effect that is still significant. input_shift: inputs that differ from those of training. harmless:
-    findings that change neither windows nor predictions. notes: further sentences for the reader.
+    mechanism. analysis: the windows that were searched; residual (n, 3): their standardised residuals before;
+    find_unexplained: computes those after, which only pages and sizes of noise need. gain_over: the better of the two
+    models without the effects, with which the gain compares. extended: the model with the effects, None if the motion
+    model does not change. remaining: mechanism and covariate of the strongest effect that is still significant.
+    input_shift: inputs that differ from those of training. harmless: findings that change neither windows nor
+    predictions. notes: further sentences for the reader.
     """
 
     verdict: Verdict
@@ -139,7 +140,7 @@ class Trace:
     undecided: bool
     analysis: PushTable
     residual: Array
-    unexplained: Array
+    find_unexplained: Callable[[], Array]
     held_out: HeldOut
     gain_nmse: Estimate
     gain_nlpd: Estimate
@@ -152,6 +153,11 @@ class Trace:
     input_shift: tuple[ShiftedInput, ...] = ()
     harmless: tuple[Harmless, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def unexplained(self) -> Array:
+        """Standardised residuals (n, 3) of the analysis after the trace."""
+        return self.find_unexplained()
 
     @property
     def relearnt(self) -> bool:
@@ -246,3 +252,67 @@ def _length(coefficients: Array, change: Array, count: int) -> float:
     """Change of one parameter with its sign, or the length of the change of several."""
     changes = coefficients.reshape(count, -1) @ change
     return float(changes[0]) if count == 1 else float(np.linalg.norm(changes))
+
+
+def trace_json(trace: Trace) -> dict[str, Any]:
+    """The JSON of a trace; unknown numbers are null, never NaN."""
+    held_out = trace.held_out
+    return {
+        "verdict": trace.verdict,
+        "input_shift": [_shift(shift) for shift in trace.input_shift],
+        "effect_present": trace.verdict != "none",
+        "channel": CHANNELS[trace.verdict],
+        "kind": trace.kind,
+        "covariates": [effect.covariate for effect in trace.effects],
+        "equivalent": list(trace.equivalent),
+        "undecided": trace.undecided,
+        "motion_model_changed": trace.extended is not None,
+        "effects": [_effect(effect, trace.weak) for effect in trace.effects],
+        "harmless": [{"mechanism": each.mechanism, "parameter": vars(each.parameter)} for each in trace.harmless],
+        "before": metrics_json(held_out.before),
+        "refit": metrics_json(held_out.refit),
+        "after": metrics_json(held_out.after),
+        "gain": {"nmse": trace.gain_nmse.json(), "nlpd": trace.gain_nlpd.json()},
+        "gain_over": trace.gain_over,
+        "minimum_detectable": {name: dict(size) for name, size in trace.minimum_detectable.items()},
+        "remaining": {"effect_present": trace.remaining is not None, "strongest": _strongest(trace)},
+        "experiment": [],  # of the contract; advice on further pushes is in words, on the page
+        "tested": [vars(tested) for tested in trace.tested],
+        "pushes": {"analysis": len(trace.analysis.pushes), "held_out": len(held_out.table.pushes)},
+        "held_out_sha256": held_out.digest,
+        "mechanisms": list(trace.mechanisms),
+        "alpha": trace.alpha,
+        "model": trace.model.name,
+        "notes": list(trace.notes),
+    }
+
+
+def _effect(effect: FoundEffect, weak: bool) -> dict[str, Any]:
+    return {
+        "mechanism": effect.mechanism,
+        "covariate": effect.covariate,
+        "outputs": list(effect.outputs),
+        "form": effect.basis,
+        "parameter": None if effect.parameter is None else vars(effect.parameter),
+        "p_value": effect.p_value,
+        "share_of_residual": effect.share_of_residual,
+        "resembles": effect.resembles,
+        "weak": weak,
+    }
+
+
+def _strongest(trace: Trace) -> str | None:
+    if trace.remaining is None:
+        return None
+    mechanism, covariate = trace.remaining
+    return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
+
+
+def _shift(shift: ShiftedInput) -> dict[str, Any]:
+    return {
+        "covariate": shift.covariate,
+        "training": [float(end) for end in shift.training],
+        "now": [float(end) for end in shift.now],
+        "share_outside": float(shift.share_outside),
+        "share_unvisited": float(shift.share_unvisited),
+    }

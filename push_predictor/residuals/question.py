@@ -58,8 +58,8 @@ class Question:
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model
-        every = widened(evidence_of(searched, loaded.table), searched, shift)
         table, held = loaded.table, held_out_rows(loaded.table)
+        windows, own = table.take(~held), replace(shift, outside=shift.outside[~held])
         return cls(
             deployed=model,
             model=searched,
@@ -67,9 +67,9 @@ class Question:
             alpha=alpha,
             covariates=None if covariates is None else tuple(covariates),
             seed=seed,
-            windows=table.take(~held),
-            evidence=every.take(~held),
-            inside=~shift.outside[~held],
+            windows=windows,
+            evidence=widened(evidence_of(searched, windows), searched, own),
+            inside=~own.outside,
             held_out=table.take(held),
             shifted=shift.inputs,
         )

@@ -34,10 +34,8 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend
-from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
-from push_predictor.residuals.extension.recalibration import held_out_windows
-from push_predictor.residuals.extension.refit import refit_base
+from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend, refit_base
+from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain, held_out_windows
 from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict, size_of
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
@@ -127,7 +125,7 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         undecided=bool(first.rivals),
         analysis=question.windows,
         residual=question.evidence.z,
-        unexplained=(corrected.evidence or question.evidence).z,
+        find_unexplained=lambda: (corrected.evidence or question.evidence).z,
         held_out=_held_out(question, refit, model, corrected.held_out or question.held_out),
         gain_nmse=NO_GAIN,
         gain_nlpd=NO_GAIN,
@@ -163,7 +161,7 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         undecided=bool(equivalent),
         analysis=question.windows,
         residual=question.evidence.z,
-        unexplained=evidence_of(after, question.evidence.table).z,
+        find_unexplained=lambda: evidence_of(after, question.evidence.table).z,
         held_out=_held_out(question, extension.refit, after, question.held_out),
         gain_nmse=gain.nmse if gain else NO_GAIN,
         gain_nlpd=gain.nlpd if gain else NO_GAIN,

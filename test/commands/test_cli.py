@@ -26,7 +26,7 @@ from repository import REPOSITORY
 
 from push_predictor import __version__
 from push_predictor.cli import COMMANDS, main
-from push_predictor.evaluation.judgement import judged, judgement
+from push_predictor.evaluation.judgement import judged
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.predictors import MechanicsPredictor
@@ -291,7 +291,7 @@ def test_evaluate_and_validate_equal_the_library(kind: str, place: Place, run):
     assert evaluated.json == json.loads(json.dumps(metrics_json(compare(loaded, load_data([Path(recording)])))))
     _, comparison = validate_recording(loaded, Path(recording))
     online = validated.json
-    assert judgement(online) == online.pop("judgement")
+    assert judged(online).sentence == online.pop("judgement")
     assert online.pop("alarm")["fired"] is False
     assert online.pop("n_training_pushes") == 0
     assert online == json.loads(json.dumps(metrics_json(comparison)))
@@ -429,7 +429,7 @@ def test_report_writes_a_page_and_the_metrics(place: Place, run, tmp_path: Path,
     found = run(*call, "--json", "-").json
     page = Path(found["report"]).read_text()
     assert page.startswith("<!") and '<span class="verdict">no longer fits</span>' in page
-    assert {"map_mean.png", "tracks.png", "calibration.png", "residuals.png"} <= {*drawn}
+    assert {"map_mean.png", "calibration.png", "residuals.png"} <= {*drawn}
     assert [metrics["model"] for metrics in found["models"]] == ["hetero", "analytical"]
     assert json.loads((tmp_path / "validation.json").read_text()) == found["models"]
     for metrics in found["models"]:

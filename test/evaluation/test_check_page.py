@@ -13,13 +13,15 @@ import pytest
 from mistakes import another_body, tracked
 from repository import REPOSITORY
 
-from push_predictor.evaluation.check_page.answer import answer_of, contact_sentence, with_minus
-from push_predictor.evaluation.check_page.page import (
+from push_predictor.evaluation.check_page import (
     Correction,
+    answer_of,
     check_json,
     contact_chart,
+    contact_sentence,
     correction_of,
     track_chart,
+    with_minus,
     write_check_page,
 )
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording

@@ -320,7 +320,7 @@ def test_judgement_of_the_page_is_that_of_its_alarm(
 
 def test_figures_and_numbers_are_written_next_to_the_page(page: Path, comparisons: list[Comparison]) -> None:
     files = {path.name for path in page.parent.iterdir()}
-    assert files == PICTURES | {"tracks.png", "report.html", "report.json"}  # and no temporary file
+    assert files == PICTURES | {"report.html", "report.json"}  # and no temporary file
     for name in files & PICTURES:
         assert (page.parent / name).read_bytes().startswith(b"\x89PNG")
     content = json.loads((page.parent / "report.json").read_text())

@@ -236,6 +236,19 @@ def test_drivers_of_small_effects_count_where_an_oracle_could_decide() -> None:
     assert counted(scored, "right driver in the named set, all sizes") == (4, 4)
 
 
+@pytest.mark.parametrize(("extended", "low", "harm", "refused"), [
+    (True, 0.01, 1, 0), (False, 0.01, 0, 1), (True, -0.01, 0, 0), (False, -0.01, 0, 0),
+])  # fmt: skip
+def test_an_extension_that_makes_predictions_worse_is_harm_unless_it_is_refused(
+    extended: bool, low: float, harm: int, refused: int
+) -> None:
+    gain = {"nlpd": {"value": 0.05, "low": low, "high": 0.1}}
+    result = verdict("contact_friction", "slid_distance", motion_model_changed=extended, gain=gain)
+    scored = score_of({"000": truth(), "001": truth()}, {"000": result, "001": {"failed": "no push"}})
+    assert counted(scored, "harm: extended, interval of the gain wholly above zero") == (harm, 2)
+    assert counted(scored, "extension refused, interval of the gain wholly above zero") == (refused, 2)
+
+
 def test_intervals_are_wilson_intervals() -> None:
     assert wilson(0, 30) == pytest.approx((0.0, 0.1135), abs=1e-4)
     assert wilson(27, 30) == pytest.approx((0.7438, 0.9654), abs=1e-4)
@@ -329,11 +342,11 @@ def test_covariates_have_documented_names() -> None:
 
 
 def test_mechanism_is_removed_only_inside_the_context() -> None:
-    from push_predictor.residuals.candidates import enumeration
+    from push_predictor.residuals.candidates import candidate
 
     with library_without("tilted_surface"):
-        assert "tilted_surface" not in {mechanism.name for mechanism in enumeration.LIBRARY}
-    assert enumeration.LIBRARY is LIBRARY
+        assert "tilted_surface" not in {mechanism.name for mechanism in candidate.LIBRARY}
+    assert candidate.LIBRARY is LIBRARY
     with pytest.raises(SystemExit, match="perpetual"), library_without("perpetual"):
         pass
 
@@ -356,6 +369,6 @@ def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     assert record["recordings"] == 3
     assert counted(record, "traces that failed") == (0, 3)
     assert counted(record, "motion model changed without cause") == (0, 2)
-    assert counted(record, "harm: interval of the gain wholly above zero") == (0, 3)
+    assert counted(record, "harm: extended, interval of the gain wholly above zero") == (0, 3)
     assert counted(record, "wrench-only changes reported as such") == (1, 1)
     assert "motion model changed without cause | 0 of 2" in table.read_text()

@@ -44,10 +44,8 @@ from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend
-from push_predictor.residuals.extension.held_out_gain import gain
-from push_predictor.residuals.extension.recalibration import held_out_windows
-from push_predictor.residuals.extension.refit import refit_base
+from push_predictor.residuals.extension.extended_model import extend, refit_base
+from push_predictor.residuals.extension.held_out_gain import gain, held_out_windows
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
 WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))

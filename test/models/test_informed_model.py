@@ -15,7 +15,9 @@ from synthetic import RADIUS, square_rig
 from push_predictor.models import train, train_learnt
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process import vhgp
+from push_predictor.models.gaussian_process.bound import VhgpParameters
+from push_predictor.models.gaussian_process.gp import GpParameters, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
 from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
@@ -263,6 +265,23 @@ def test_retrained_without_mechanics_it_learns_what_it_did(per_path: bool) -> No
     assert again.mean is None
     np.testing.assert_allclose(targets(again), targets(learnt(plain)), rtol=1e-12)
     assert np.allclose(targets(again), table.outcomes, rtol=1e-9, atol=0.0) == (not per_path)
+
+
+def test_a_vhgp_is_retrained_from_its_own_hyperparameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not from those of a GP that is fitted first; that takes half of the time."""
+    plain = trained(pushes(40, 10, (0.02, 0.05)), "vhgp", mean="zero")
+    begun: list[GpParameters] = []
+    monkeypatch.setattr(vhgp, "fit_gp", None)
+    search = vhgp.maximise_bound
+    monkeypatch.setattr(vhgp, "maximise_bound", lambda *given: begun.append(given[2]) or search(*given))
+    retrain_model(plain, pushes(40, 11, (0.02, 0.05)))
+    assert len(begun) == 3
+    for start, regression in zip(begun, learnt(plain).regressions, strict=True):
+        found = regression.parameters
+        assert isinstance(found, VhgpParameters) and np.array_equal(start.log_lengthscales, found.log_lengthscales)
+        assert start.log_signal_sd == found.log_signal_sd
+        noise = np.exp(found.noise_mean + 0.5 * (found.noise.variance + found.nugget))  # the mean of a log-normal
+        assert start.noise_variance == pytest.approx(noise)
 
 
 def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:

@@ -14,7 +14,7 @@ import pytest
 from synthetic import RADIUS, noisy_pushes, square_pushes, square_rig
 
 from push_predictor.cli import main
-from push_predictor.evaluation.metrics_text import metrics_lines
+from push_predictor.evaluation.metrics import metrics_lines
 from push_predictor.evaluation.report.summary import error_sentence
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.mechanics.fitted import FittedMechanics

@@ -17,7 +17,7 @@ from synthetic import square_rig
 
 from push_predictor.cli import main
 from push_predictor.errors import ModelFileError, RequestError
-from push_predictor.evaluation.report.map_conditions import fixed_covariates
+from push_predictor.evaluation.report.maps import fixed_covariates
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.traced_session import Mark, TracedSession

@@ -205,7 +205,7 @@ def test_the_messages_page_names_every_interface():
 
 
 def test_the_json_page_names_every_field_of_a_trace():
-    source = (REPOSITORY / "push_predictor" / "residuals" / "reporting" / "trace_json.py").read_text()
+    source = (REPOSITORY / "push_predictor" / "residuals" / "outcome.py").read_text()
     page = (REFERENCE / "json.md").read_text()
     fields = re.findall(r'^ {8}"(\w+)":', source, re.MULTILINE)
     assert len(fields) > 20

@@ -16,8 +16,13 @@ from repository import BAGS
 
 from examples.overview_picture import readme_picture
 from push_predictor.cli import main
-from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text, map_covariates
-from push_predictor.evaluation.report.maps import fine_cells, push_map
+from push_predictor.evaluation.report.maps import (
+    fine_cells,
+    fixed_covariates,
+    fixed_covariates_text,
+    map_covariates,
+    push_map,
+)
 from push_predictor.evaluation.report.page import SECTIONS
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis

@@ -19,14 +19,13 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend
-from push_predictor.residuals.extension.held_out_gain import held_out_gain
-from push_predictor.residuals.extension.recalibration import (
+from push_predictor.residuals.extension.extended_model import extend, refit_base, spread_rows
+from push_predictor.residuals.extension.held_out_gain import (
+    held_out_gain,
     held_out_windows,
     new_windows,
     uncertainty_of_effects,
 )
-from push_predictor.residuals.extension.refit import refit_base, spread_rows
 from push_predictor.residuals.outcome import Sized, size_of
 
 CONSTANT = DriverBasis("constant")
@@ -68,8 +67,8 @@ def test_further_covariance_takes_its_share_of_the_calibrated_deviation(deployed
     plain = new_windows(deployed, ANALYSIS).calibrated()
     variance = np.diagonal(plain.predict_rows(ANALYSIS.inputs, ANALYSIS.duration).covariance, axis1=1, axis2=2)
     extra = 0.36 * np.stack([np.diag(row) for row in variance])
-    narrower = new_windows(deployed, ANALYSIS).calibrated(extra)
-    assert scale_of(narrower) == pytest.approx(0.8 * scale_of(plain), rel=1e-3)
+    narrower = new_windows(deployed, ANALYSIS).factor(extra)
+    assert narrower == pytest.approx(0.8 * scale_of(plain), rel=1e-3)
 
 
 def test_the_uncertainty_of_a_models_own_effects_is_not_scaled(deployed: PushModel) -> None:

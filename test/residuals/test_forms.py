@@ -12,7 +12,8 @@ import pytest
 from made_up_traces import pushes
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.residuals.selection.forms import MOST_PLACES, STEPS, forms_of, step_places, step_places_near
+from push_predictor.residuals.channels.wrench import MOST_NEAR, step_places_near
+from push_predictor.residuals.evidence.drivers import STEPS, forms_of, step_places
 
 TABLE = pushes(60, 2)
 
@@ -87,13 +88,13 @@ def test_few_values_have_few_places(values: list[float], places: list[float]) ->
 def test_near_a_place_are_all_places_between_its_neighbours() -> None:
     values = np.arange(100.0)
     tried = step_places(values)
-    near = step_places_near(values, tried[3])
+    near = step_places_near(values, tried[3], 60)
     assert near == [v + 0.5 for v in range(100) if tried[2] < v + 0.5 < tried[4]]
-    assert min(step_places_near(values, tried[0])) == 0.5
-    assert max(step_places_near(values, tried[-1])) == 98.5
+    assert min(step_places_near(values, tried[0], 60)) == 0.5
+    assert max(step_places_near(values, tried[-1], 60)) == 98.5
 
 
 def test_not_more_places_are_tried_near_another_than_the_most() -> None:
     values = np.arange(3000.0)
     near = step_places_near(values, step_places(values)[4])
-    assert 0.5 * MOST_PLACES < len(near) <= MOST_PLACES
+    assert 0.5 * MOST_NEAR < len(near) <= MOST_NEAR

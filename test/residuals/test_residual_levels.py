@@ -16,7 +16,7 @@ from synthetic import square_rig
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.candidates.candidate import candidates_of
 from push_predictor.residuals.channels.motion import motion_effects
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of

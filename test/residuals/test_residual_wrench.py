@@ -16,8 +16,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.contrast import ChannelFinding
-from push_predictor.residuals.channels.limit_load import loads
-from push_predictor.residuals.channels.wrench import wrench_effects
+from push_predictor.residuals.channels.wrench import loads, wrench_effects
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array
 

@@ -25,7 +25,7 @@ from square_session import (
 )
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.candidates.candidate import candidates_of
 
 ALWAYS = DriverBasis("constant")
 

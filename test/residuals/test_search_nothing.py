@@ -28,7 +28,7 @@ from square_session import (
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
+from push_predictor.residuals.candidates.candidate import candidates_of, confounded
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.screening import Controlled, screen

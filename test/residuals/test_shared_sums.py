@@ -16,8 +16,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
-from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.enumeration import Nuisance
+from push_predictor.residuals.candidates.candidate import Nuisance, candidate
 from push_predictor.residuals.evidence import standardised
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis

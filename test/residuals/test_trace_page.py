@@ -32,17 +32,15 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.outcome import Sized, Trace, Verdict
+from push_predictor.residuals.outcome import Sized, Trace, Verdict, trace_json
+from push_predictor.residuals.reporting.figures.channels import error_charts
 from push_predictor.residuals.reporting.figures.driver_basis import analysis_rows, basis_charts, determined, strength_of
-from push_predictor.residuals.reporting.figures.errors import error_charts
-from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts, map_figures
+from push_predictor.residuals.reporting.figures.gallery import effect_figures
 from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.phrases import interval_cell
-from push_predictor.residuals.reporting.sentences import answer, evidence, worth
+from push_predictor.residuals.reporting.sentences import answer, evidence, summary_lines, worth
 from push_predictor.residuals.reporting.sizes import shift_sizes
-from push_predictor.residuals.reporting.summary import summary_lines
-from push_predictor.residuals.reporting.trace_json import trace_json
 
 ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
@@ -251,20 +249,11 @@ def test_unknown_numbers_are_dashes(tmp_path: Path) -> None:
 # --- order, folding and pictures -------------------------------------------------------------------------------------
 
 
-def test_fifteen_candidates_come_first_and_the_others_are_folded_apart(pages: Callable[[str], str]) -> None:
+def test_all_candidates_are_listed_and_the_found_one_is_marked(pages: Callable[[str], str]) -> None:
     page = pages("effect")
     section = page[page.index("What else was tested") : page.index("What remains")]
-    shown, folded = section.split("<details>")
-    assert shown.count(ROW) == 15 and folded.count(ROW) == len(trace_of("effect").tested) - 15
-    assert "The other 9 pairs" in folded and "<details open" not in page
-
-
-def test_found_candidate_comes_first_however_large_its_p(tmp_path: Path) -> None:
-    trace = trace_of("effect")
-    tested = tuple(replace(t, p_value=0.9) if t.covariate == "elapsed_time" else t for t in trace.tested)
-    page = write_trace_report(tmp_path / "trace.html", replace(trace, tested=tested)).read_text()
-    shown = page[page.index("What else was tested") :].split("<details>")[0]
-    assert shown.count(ROW) == 15 and shown.count(">found<") == 1
+    assert section.count(ROW) == len(trace_of("effect").tested) and section.count(">found<") == 1
+    assert "<details open" not in page
 
 
 @pytest.mark.parametrize("name", ["none", "effect", "constant", "map", "driver_only", "variance"])
@@ -283,10 +272,20 @@ def test_bins_that_do_not_determine_the_parameter_are_not_drawn() -> None:
 
 def test_key_chart_shows_the_step_of_the_effect() -> None:
     trace = trace_of("effect")
-    (chart,) = basis_charts(trace, strength_of(trace.terms[0], trace.analysis), analysis_rows(trace), None)
+    (chart,) = basis_charts(trace, strength_of(trace.terms[0]), analysis_rows(trace))
     dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
     before, after = dots.x < JUMP.place, dots.x > JUMP.place
     assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
+
+
+def test_effect_is_drawn_once_with_all_its_parameters() -> None:
+    """The key picture shows the first effect's only parameter, and the noise along the covariate if it is unknown."""
+    along = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+    grain = made_up_trace(slippery(0.06), planted("anisotropic_friction", "elapsed_time", along, 0.1, 0.05))
+    (figure,) = effect_figures(grain)
+    assert figure.count('<svg class="chart') == 2
+    assert "irection-dependent friction of the table against elapsed time (linear)" in figure
+    assert effect_figures(trace_of("effect")) == [] == effect_figures(trace_of("driver_only"))
 
 
 def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
@@ -386,49 +385,6 @@ def test_json_lists_the_input_shift() -> None:
         }
     ]
     assert trace_json(trace_of("none"))["input_shift"] == []
-
-
-# --- maps ------------------------------------------------------------------------------------------------------------
-
-
-def test_maps_of_a_step_are_split_at_its_place() -> None:
-    trace = trace_of("effect")
-    halves = halves_of(strength_of(trace.terms[0], trace.analysis), trace.analysis)
-    time = trace.analysis.covariates["elapsed_time"]
-    assert halves.names == ("until 620 s", "since 620 s")
-    assert time[halves.masks[0]].max() < JUMP.place <= time[halves.masks[1]].min()
-
-
-def test_maps_show_the_held_out_pushes_without_and_with_the_effect() -> None:
-    (shown,) = map_figures(trace_of("effect"))
-    assert "Map of the mean residual of dx, refit;" in shown and "Map of the mean residual of dx, after;" in shown
-    assert "Mean residual of" in shown and "held-out pushes over contact point" in shown
-
-
-@pytest.mark.parametrize("place", [-1.0, 30.0, 990.0, 2000.0])
-def test_maps_are_whole_where_a_half_would_be_empty(place: float) -> None:
-    trace = trace_of("effect")
-    step = planted("contact_friction", "elapsed_time", replace(JUMP, place=place), 0.15)
-    halves = halves_of(strength_of(step, trace.analysis), trace.analysis)
-    assert len(halves.masks) == 1 and halves.masks[0].all()
-    charts = map_charts(trace.model.rig.outline, columns_of("before", trace.analysis, trace.residual, halves))
-    assert len(charts) == 3
-
-
-def test_maps_of_an_effect_with_levels_are_split_between_levels() -> None:
-    trace = trace_of("category")
-    rare = np.arange(len(trace.analysis)) % 10 == 0
-    sides = replace(trace.analysis, covariates={**trace.analysis.covariates, "edge": np.where(rare, 0.0, 1.0)})
-    first, second = halves_of(strength_of(trace.terms[0], sides), sides).masks
-    np.testing.assert_array_equal(first, rare)
-    np.testing.assert_array_equal(second, ~rare)
-
-
-def test_step_in_few_late_pushes_splits_off_those() -> None:
-    trace = trace_of("effect")
-    step = planted("contact_friction", "elapsed_time", replace(JUMP, place=850.0), 0.15)
-    first, second = halves_of(strength_of(step, trace.analysis), trace.analysis).masks
-    assert 24 <= second.sum() < 0.25 * first.sum()
 
 
 # --- numbers ---------------------------------------------------------------------------------------------------------

@@ -30,11 +30,10 @@ from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.evidence.input_shift import about_mechanics
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.outcome import Sized, Trace
+from push_predictor.residuals.outcome import Sized, Trace, trace_json
 from push_predictor.residuals.question import Question
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.sentences import answer, worth
-from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.selection.naming import Naming
 from push_predictor.residuals.selection.search import Term
 from push_predictor.residuals.trace import trace

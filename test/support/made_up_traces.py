@@ -24,9 +24,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.extended_model import extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import compared, gain
-from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, HeldOut, Sized, Tested, Trace
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
@@ -118,7 +117,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         undecided=False,
         analysis=analysis,
         residual=evidence.z,
-        unexplained=evidence_of(after, analysis).z,
+        find_unexplained=lambda: evidence_of(after, analysis).z,
         held_out=HeldOut(held, before, again, last, digest_of(held)),
         gain_nmse=nmse,
         gain_nlpd=nlpd,

@@ -11,7 +11,7 @@ import pytest
 
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.candidates.candidate import candidates_of
 from push_predictor.residuals.channels.motion import _rows
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -26,7 +26,7 @@ def in_library(patch: pytest.MonkeyPatch, *names: str) -> None:
     """Only these mechanisms, of the library or its refinements, are tried: responses take most of the time."""
     for library, every in (("LIBRARY", LIBRARY), ("REFINEMENTS", REFINEMENTS)):
         few = tuple(mechanism for mechanism in every if mechanism.name in names)
-        patch.setattr(f"push_predictor.residuals.candidates.enumeration.{library}", few)
+        patch.setattr(f"push_predictor.residuals.candidates.candidate.{library}", few)
 
 
 def gate_of(

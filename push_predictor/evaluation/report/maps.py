@@ -4,7 +4,8 @@
 """Maps of the outcome by contact and angle: predictions and recordings in the same cells.
 
 A map is for one speed and one duration. Contacts are folded by the outline's rotational symmetry, as in the models, and
-given as arc length. A circle, whose contacts are all equal to a model, is not folded.
+given as arc length. A circle, whose contacts are all equal to a model, is not folded. The covariates of an extended
+model are fixed.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from push_predictor.errors import TableError
-from push_predictor.evaluation.report.map_conditions import map_covariates
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.outline import Outline
+from push_predictor.models.effects.covariates import HEADINGS
+from push_predictor.models.effects.covariates import UNITS as COVARIATE_UNITS
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.canvas import EMPTY, UNITS, output_label
@@ -38,6 +41,7 @@ WIDEST_ANGLE = np.radians(89.0)
 ANGLE_STEP = np.radians(5.0)
 CLIPPED = 3.0  # % of a panel's values that may exceed the colour scale at each end
 ONE_SIGNED = 0.1  # largest share of the other sign in a scale of one sign
+OF_SLIDER, OF_PUSH = HEADINGS
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,3 +311,51 @@ def _write_counts(ax: Axes, shown: PushMap, values: Array, image: ScalarMappable
         middle = contact[column : column + 2].mean(), angle[row : row + 2].mean()
         text = str(shown.pushes[row, column]) if shown.pushes is not None else ""
         ax.text(*middle, text, ha="center", va="center", fontsize=8.0, color="black" if brightness > 0.5 else "white")
+
+
+def fixed_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
+    """The median in the table of each covariate that the model takes; empty if it takes none.
+
+    For a heading it is the value nearest to the mean direction. If the slider's heading is known, it is fixed and the
+    push's heading follows from it. Raises KeyError if the table lacks a covariate that the model needs.
+    """
+    known, given = model.continued(table).covariates, [name for name in model.defaults if name in table.covariates]
+    names = [OF_SLIDER if name == OF_PUSH and OF_SLIDER in known else name for name in (*model.needs, *given)]
+    return {name: _middle(name, known[name]) for name in names}
+
+
+def map_covariates(outline: Outline, fixed: Mapping[str, float], inputs: Array) -> dict[str, Array]:
+    """The covariates (n,) of the pushes (n, 3) of a map, with these fixed."""
+    columns = {name: np.full(len(inputs), value) for name, value in fixed.items()}
+    if OF_SLIDER in fixed and OF_PUSH not in fixed:
+        normal = outline.inward_normal(inputs[:, 1])
+        columns[OF_PUSH] = wrap_angle(fixed[OF_SLIDER] + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2])
+    return columns
+
+
+def fixed_covariates_text(model: PushModel, fixed: Mapping[str, float]) -> str:
+    """Sentences for a caption: the values at which a model's map is drawn, and what that means; empty without them."""
+    if not fixed:
+        return ""
+    values = " and ".join(_value(*pair) for pair in fixed.items())
+    sentences = [f"The map of {model.name} is drawn at {values}, the median of these windows."]
+    if headings := [name for name in fixed if name in HEADINGS]:
+        follows = f" ({OF_PUSH} follows from it)" if OF_PUSH in model.needs and OF_PUSH not in fixed else ""
+        sentences.append(f"The {headings[0]} is the one nearest to the mean direction{follows}.")
+        sentences.append("At another heading the map differs.")
+    for name, value in fixed.items():
+        known = model.covariate_ranges.get(name)
+        if known is not None and not known.contains(np.array([value]))[0]:
+            sentences.append(f"Nothing is drawn: the model was extended on {name} from {known}.")
+    return " ".join(sentences)
+
+
+def _value(name: str, value: float) -> str:
+    return f"{name} {value:.3g} {COVARIATE_UNITS.get(name, '')}".rstrip()
+
+
+def _middle(name: str, values: Array) -> float:
+    if name not in HEADINGS:
+        return float(np.sort(values)[(len(values) - 1) // 2])
+    mean = np.arctan2(np.sin(values).mean(), np.cos(values).mean())
+    return float(values[np.argmin(np.abs(wrap_angle(values - mean)))])

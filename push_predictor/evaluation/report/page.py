@@ -41,8 +41,6 @@ SECTIONS: tuple[tuple[str, Callable[[Path, Validation], list[Picture]]], ...] = 
     ("Calibration of the predicted uncertainty", calibration_pictures),
     ("Residuals over time", residual_pictures),
 )
-
-
 NO_ALARM: Mapping[str, object] = {"fired": False, "off": "the report was made without it"}
 NOTHING_FOUND = (
     "No window was found, so the model cannot be judged.",

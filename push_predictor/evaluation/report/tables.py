@@ -27,9 +27,6 @@ def metrics_tables(comparisons: Sequence[Comparison], metrics: Sequence[Metrics]
     """HTML tables of the metrics_json of these comparisons; the others are compared with the first."""
     pairs = list(zip(comparisons, metrics, strict=True))
     tables = [_error_table(pairs), _density_table(pairs), _coverage_table(pairs)]
-    exact = [(c, m) for c, m in pairs if m["exact_nlpd"] is not None]
-    if exact:
-        tables.insert(2, _exact_table(exact))
     if len(pairs) > 1 and len(comparisons[0].observed):
         tables.append(_difference_table(comparisons))
     return tables
@@ -76,23 +73,16 @@ def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         values = [*(m["nlpd"][name] for name in COLUMNS), m["joint_nlpd"]]
         draws = np.column_stack([_with_total(push_scores(c).resampled().nlpd), joint])
         rows.append([c.model, *_cells(values, draws)])
+        if m["exact_nlpd"] is not None:
+            draws = _with_total(push_scores(c).resampled().exact_nlpd)
+            own = _cells([m["exact_nlpd"][name] for name in COLUMNS], draws)
+            rows.append([f"{c.model}, own density", *own, html.NOTHING])
     caption = (
-        f"Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
-        f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
+        "Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
+        f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance. "
+        "Own density: the predictive density of a model for which this is no Gaussian."
     )
     return html.folded_table(caption, ("model", *COLUMNS, "joint"), rows)
-
-
-def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
-    rows = []
-    for c, m in pairs:
-        draws = _with_total(push_scores(c).resampled().exact_nlpd)
-        rows.append([c.model, *_cells([m["exact_nlpd"][name] for name in COLUMNS], draws)])
-    caption = (
-        "NLPD of the model's own predictive density: a Student t, or the exact density of a VHGP. For models without "
-        "either it is that of the Gaussian above."
-    )
-    return html.folded_table(caption, ("model", *COLUMNS), rows)
 
 
 def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:

@@ -3,5 +3,5 @@
 
 """Step 4: every mechanism with every covariate, and what is regressed out of each candidate.
 
-Import `candidate` and `enumeration`; only `evidence` is imported here.
+Import `candidate` and `joint_fit`; only `evidence` is imported here.
 """

@@ -16,8 +16,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, concatenate
-from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate
-from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
+from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate, candidates_of, confounded
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.geometry.frames import rotate
 from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -40,13 +41,19 @@ from push_predictor.residuals.channels.contrast import (
     sized,
     stacked,
 )
-from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.channels.sensor_zero import BIAS, WRENCH_BIAS, zero_shift
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
+from push_predictor.residuals.evidence.drivers import (
+    CONSTANT,
+    LOCAL,
+    PLACE,
+    SESSION,
+    between_ends,
+    screening_bases,
+    step_places,
+)
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.forms import step_places, step_places_near
 from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION = "surface_friction"
@@ -57,6 +64,7 @@ PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
 PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
+FORCES = ("normal_force", "tangential_force")
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,8 +237,18 @@ def _as_step(force: _Force, z: Array, best: Contrast, seed: int) -> Contrast:
     found = min(fitting, key=lambda t: SIMPLEST_FIRST.index(t.basis.name))
     if found.basis.name != "step":
         return found
-    near = stepped(step_places_near(values, found.basis.place, MOST_NEAR))
+    near = stepped(step_places_near(values, found.basis.place))
     return best_and_rivals(z, [found, *near], force.levelled, force.block, seed)[0]
+
+
+def step_places_near(values: Array, place: float, most: int = MOST_NEAR) -> list[float]:
+    """Midpoints between neighbouring values, from the next place that was tried below to the next above."""
+    ordered, tried = np.unique(values), step_places(values)
+    low = max((other for other in tried if other < place), default=-np.inf)
+    high = min((other for other in tried if other > place), default=np.inf)
+    middle = 0.5 * (ordered[1:] + ordered[:-1])
+    inside = middle[(middle > low) & (middle < high)]
+    return [float(middle) for middle in inside[:: max(1, -(-len(inside) // most))]]
 
 
 def _is_level(tried: Contrast) -> bool:
@@ -261,3 +279,81 @@ def _over_range(force: _Force, best: Contrast) -> Array:
     change = None if best.basis.name == "quadratic" else between_ends(best.basis, force.table)
     values = best.basis.values(force.table.covariates, len(force.table)) if change is None else change[None]
     return np.asarray(values / force.unit[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Per window: log load on the limit surface, direction (rad, from the inward normal), and predicted direction.
+
+    bias (n, 2, 2): change of load and direction per N of sensor bias in the world.
+    """
+
+    size: Array
+    direction: Array
+    predicted: Array
+    bias: Array
+
+
+def loads(table: PushTable, mechanics: FittedMechanics) -> Load:
+    """Load, direction and their sensitivity to a bias, for windows with both forces."""
+    normal_force, left_force = (table.covariates[name] for name in FORCES)
+    velocity, contact, angle = table.inputs.T
+    normal = mechanics.outline.inward_normal(contact)
+    left = np.column_stack([-normal[:, 1], normal[:, 0]])
+    arm = (mechanics.outline.point(contact) - mechanics.ellipsoid.centre) / mechanics.ellipsoid.length
+    p = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+    q = arm[:, 0] * left[:, 1] - arm[:, 1] * left[:, 0]
+    moment = p * normal_force + q * left_force
+    square = normal_force**2 + left_force**2 + moment**2
+    along, across = velocity * np.cos(angle), velocity * np.sin(angle)
+    direction = _force_direction(p, q, along, across, mechanics.value("contact_friction"))
+    by_load = np.column_stack([normal_force + p * moment, left_force + q * moment]) / square[:, None]
+    by_turn = np.column_stack([-left_force, normal_force]) / (normal_force**2 + left_force**2)[:, None]
+    axes = _world_axes(table, angle)
+    bias = -np.stack([np.einsum("nk,nkw->nw", by, axes) for by in (by_load, by_turn)], axis=1)
+    return Load(0.5 * np.log(square), np.arctan2(left_force, normal_force), direction, bias)
+
+
+def _force_direction(p: Array, q: Array, along: Array, across: Array, friction: float) -> Array:
+    """Angle (n,) rad of the contact force from the inward normal, on the ellipsoid of Lynch et al. (1992).
+
+    p, q (n,): moment arms over the length of unit forces along the normal and its left; along, across (n,): the
+    pusher's velocity in that basis. A contact that sticks moves with the pusher; beyond an edge of the friction cone it
+    slips, with the force of that edge.
+    """
+    push = (1.0 + q * q) * along - p * q * across
+    rub = (1.0 + p * p) * across - p * q * along
+    edge = np.arctan(friction)
+    return np.clip(np.arctan2(rub, push), -edge, edge)
+
+
+def _world_axes(table: PushTable, angle: Array) -> Array:
+    """Inward normal and its left in the world (n, 2, 2), as rows; zero if no heading was recorded."""
+    heading = table.covariates.get("push_heading")
+    if heading is None:
+        return np.zeros((len(table), 2, 2))
+    normal = rotate(np.array([[1.0, 0.0]]), heading - angle)
+    return np.stack([normal, np.column_stack([-normal[:, 1], normal[:, 0]])], axis=1)
+
+
+def inputs_of(table: PushTable, mechanics: FittedMechanics, most: int) -> Array:
+    """A basis (n, m) of the model's inputs with at most that many columns, for tables of few pushes."""
+    velocity, contact, angle = table.inputs.T
+    turn = 2.0 * np.pi * contact
+    normal = mechanics.outline.inward_normal(contact)
+    arm = mechanics.outline.point(contact) / mechanics.ellipsoid.length
+    lever = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+    columns = [
+        np.ones_like(turn),
+        lever**2,
+        velocity,
+        np.cos(turn),
+        np.sin(turn),
+        angle**2,
+        lever * angle,
+        angle,
+        lever,
+    ]
+    columns += [np.cos(2.0 * turn), np.sin(2.0 * turn), angle**3, lever * angle**2, lever**2 * angle, lever**3]
+    columns += [np.cos(4.0 * turn), np.sin(4.0 * turn)]
+    return np.column_stack(columns[:most])

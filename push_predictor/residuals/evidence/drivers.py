@@ -1,11 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The covariates that an effect may depend on, and the basis in which each enters the screen."""
+"""The covariates that an effect may depend on, and the bases of the screen and of the search."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +28,8 @@ UNDRIVEN = (CONSTANT, SESSION)
 MOST_LEVELS = 12  # guards against a category that has a level for every few pushes: it would explain anything
 ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported
 SETTLED = 0.03  # s of contact after which pusher and slider move together
+STEPS = 9  # places of a step that are tried first, at quantiles of the covariate
+SOON = 0.03  # of the covariate's range: scale of an effect that grows early in it
 
 
 def screening_bases(table: PushTable, names: Sequence[str] | None = None) -> list[tuple[str, DriverBasis]]:
@@ -78,3 +81,39 @@ def _bases_of(name: str, values: Array) -> list[DriverBasis]:
 
 def _varies(values: Array) -> bool:
     return bool(np.all(np.isfinite(values)) and np.ptp(values) > 1e-9 * (1.0 + np.abs(values).max()))
+
+
+def forms_of(covariate: str, table: PushTable) -> list[DriverBasis]:
+    """Growing from zero at the start, a step at an onset, any line or curve; of a heading periodic; simplest first."""
+    if float(np.ptp(table.covariates[covariate])) == 0.0:  # in the windows of a fit, though not in all
+        return [DriverBasis("constant")]
+    if covariate in CATEGORIES:
+        levels = tuple(float(level) for level in np.unique(table.covariates[covariate]))
+        return [DriverBasis("category", (covariate,), levels=levels, offset=True)]
+    if covariate in HEADINGS:
+        return [DriverBasis(name, (covariate,), offset=True) for name in ("periodic", "periodic, twice around")]
+    values = table.covariates[covariate]
+    linear, logarithmic, quadratic = (
+        standard_basis(n, covariate, values) for n in ("linear", "logarithmic", "quadratic")
+    )
+    forms = [replace(linear, centre=(float(values.min()),)), logarithmic]
+    if covariate in CUMULATIVE:
+        forms.append(replace(logarithmic, scale=(SOON * float(np.ptp(values)),)))
+    forms += [DriverBasis("step", (covariate,), place=place) for place in step_places(values)]
+    forms.append(replace(linear, offset=True))
+    if covariate in CUMULATIVE:
+        return forms
+    forms += [linear, replace(quadratic, offset=True)]
+    if covariate in PLACE and all(name in table.covariates for name in PLACE):
+        forms.append(replace(two_dimensional(table), offset=True))
+    return forms
+
+
+def step_places(values: Array) -> list[float]:
+    """Places that are tried first: midpoints between the values at even quantiles and the values before them."""
+    ordered = np.unique(values)
+    if len(ordered) < 2:
+        return []
+    marks = np.quantile(values, np.arange(1, STEPS + 1) / (STEPS + 1.0))
+    index = np.unique(np.clip(np.searchsorted(ordered, marks), 1, len(ordered) - 1))
+    return [float(0.5 * (ordered[k - 1] + ordered[k])) for k in index]

@@ -87,9 +87,9 @@ def sums_by(block: IntArray, values: Array) -> Array:
 def _rows_of(block: IntArray) -> list[IntArray]:
     """Rows (b, k) of the blocks of k rows, for each k: equal blocks are computed together."""
     order = np.argsort(block, kind="stable")
-    rows = np.split(order, _starts(block[order])[1:])
-    sizes = sorted({len(each) for each in rows})
-    return [np.array([each for each in rows if len(each) == size]) for size in sizes]
+    starts = _starts(block[order])
+    sizes = np.diff(starts, append=len(order))
+    return [order[starts[sizes == size, None] + np.arange(size)] for size in np.unique(sizes)]
 
 
 def _starts(ordered: IntArray) -> IntArray:

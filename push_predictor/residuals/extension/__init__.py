@@ -3,5 +3,5 @@
 
 """Step 9 and 10: the refit, the model with its effects, their size, and the gain on held-out pushes.
 
-Import `extended_model`, `refit` and `held_out_gain`.
+Import `extended_model` and `held_out_gain`.
 """

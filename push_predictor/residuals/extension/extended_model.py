@@ -1,7 +1,10 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A model extended by effects: the effects shift its mean, and its base is retrained on the outcomes minus them."""
+"""The refit, which is the same model trained on the new pushes, and the model extended by effects.
+
+Effects shift the mean, and the base is retrained on the outcomes minus them. The refit is the fair reference.
+"""
 
 from __future__ import annotations
 
@@ -10,22 +13,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor import __version__
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.train import retrain_model
+from push_predictor.models.train import retrain_model, training_rows
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.drivers import COUNT, DISTANCE, TIME
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.extension.recalibration import held_out_windows
-from push_predictor.residuals.extension.refit import spread_rows, with_predictor
+from push_predictor.residuals.extension.held_out_gain import held_out_windows
 from push_predictor.residuals.selection.search import Term
+
+FEWEST_ROWS, MOST_ROWS = 300, 500  # guard against a refit from too few rows, and against hours of it
 
 
 def extend(
@@ -77,3 +82,31 @@ def by_the_clock(term: Term, table: PushTable) -> Candidate:
 def along(named: Candidate, effect: Effect) -> Effect:
     """The effect along the covariate of the candidate that it was named after, which has the same values."""
     return replace(effect, covariate=named.covariate, basis=named.basis)
+
+
+def refit_base(model: PushModel, table: PushTable) -> PushModel:
+    """Refit a model to these pushes in its own inputs alone; effects that it already has stay as they are.
+
+    See `retrain_model` for what is estimated again. Raises TrainingError for too few rows.
+    """
+    predictor, table = model.predictor, spread_rows(model, table)
+    if not predictor.effects:
+        return retrain_model(model, table)
+    shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
+    base = retrain_model(model.base, replace(table, outcomes=table.outcomes - shift))
+    return with_predictor(base, table, predictor.with_base(base.predictor.base))
+
+
+def spread_rows(model: PushModel, table: PushTable) -> PushTable:
+    """The rows that a learnt model is retrained on: as many as it has, within bounds, spread over the pushes."""
+    if not model.predictor.learnt:
+        return table
+    most = int(np.clip(len(model.training), FEWEST_ROWS, MOST_ROWS))
+    return table.take(training_rows(table, None, model.provenance.seed, most))
+
+
+def with_predictor(base: PushModel, table: PushTable, predictor: Predictor) -> PushModel:
+    """The model of a predictor; its training rows are those that the base was trained on, as observed."""
+    seed, sources = base.provenance.seed, base.provenance.sources
+    provenance = Provenance(sources, len(table.pushes), seed, __version__)
+    return replace(base, predictor=predictor, training=table, provenance=provenance)

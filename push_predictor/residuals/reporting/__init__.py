@@ -3,5 +3,5 @@
 
 """What a person or a program reads of a trace: page, tables, sentences, JSON.
 
-Import `page`, `summary`, `sentences` and `trace_json`; phrases and numbers come from `phrases`.
+Import `page` and `sentences`; phrases and numbers come from `phrases`. The JSON is in `outcome`.
 """

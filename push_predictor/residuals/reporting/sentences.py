@@ -1,23 +1,27 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A trace in sentences: what changed, how large it is, what to do; then the evidence and the held-out gain."""
+"""A trace in sentences: what changed, how large it is, what to do; then evidence, held-out gain, rivals and advice."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, floor, log10
+from typing import Any
 
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nlpd, total_nmse
+from push_predictor.evaluation.metrics import cell
 from push_predictor.evaluation.push_scores import push_scores
-from push_predictor.evaluation.validation import Comparison
-from push_predictor.reporting.html import number
+from push_predictor.evaluation.validation import Comparison, metrics_json
+from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
+from push_predictor.reporting.html import NOTHING, number
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting import phrases as say
-from push_predictor.residuals.reporting.rivals import ANEW, grew_early
+from push_predictor.residuals.reporting.phrases import effect_phrase
 from push_predictor.residuals.reporting.sizes import detectable, effect_size, largest_ratio, noise_ratios, parameter
 
 MOST_NAMES = 3  # rivals that one sentence lists
@@ -31,6 +35,34 @@ REMEDIES = {
     "tool_offset": "Measure the tool point again",
     "wrench_bias": "Zero the force sensor",
 }
+ANEW = "To decide, restore the rig to its state at the start of the session, and push again"
+HEADED = (*HEADINGS, "edge")
+ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two rivals, one of each group
+    (
+        CUMULATIVE,
+        CUMULATIVE,
+        "Pause for about half a session, then continue: time passes, push count and distance do not. Then alternate "
+        "blocks of short and of long pushes: in long pushes the distance grows faster than the count.",
+    ),
+    (
+        CUMULATIVE,
+        ("slider_x", "slider_y"),
+        "Return to places where the slider was early on: an effect of the place recurs, a drift does not.",
+    ),
+    (
+        HEADED,
+        HEADED,
+        "Place the slider at many headings, and push every side at each heading. That separates the side, the slider's "
+        "heading and the push direction.",
+    ),
+    (CUMULATIVE, ("velocity", "angle", "contact"), "Randomise speed, push angle and contact point over the session."),
+    (CUMULATIVE, ("dwell_time",), "Randomise the pause before each push over the session."),
+    (
+        CUMULATIVE,
+        ("recording",),
+        "Repeat the setting of an early recording in a new one: an effect of the setting recurs, a drift does not.",
+    ),
+)
 
 
 def answer(trace: Trace) -> tuple[str, str, str]:
@@ -292,3 +324,66 @@ def _held_out_pushes(trace: Trace) -> str:
 
 def _difference(first: Comparison, second: Comparison) -> Estimate:
     return difference_by_push(push_scores(first), push_scores(second), total_nlpd)
+
+
+def rivals(trace: Trace) -> str:
+    """The covariates and mechanisms that fit as well; empty without any."""
+    found = []
+    if trace.effects and grew_early(trace):
+        found.append("It was there from the first push, or it grew early in the session: these pushes do not decide.")
+    elif trace.equivalent:
+        names = [say.covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)]
+        found.append(f"{say.capitalised(say.listed(names))} fit equally well.")
+    if trace.mechanisms:
+        names = [say.mechanism_phrase(name) for name in trace.mechanisms]
+        found.append(f"{say.capitalised(say.listed(names))} would explain these pushes as well.")
+    return " ".join(found)
+
+
+def advice(trace: Trace) -> list[str]:
+    """How to push so that the rival covariates separate; empty without rivals."""
+    if not trace.equivalent:
+        return []
+    if grew_early(trace):
+        return [f"{ANEW}."]
+    return separating_words((trace.effects[0].covariate, *trace.equivalent))
+
+
+def separating_words(names: Sequence[str]) -> list[str]:
+    """How to push so that these covariates separate."""
+    known = {*names}
+    found = [
+        text for one, other, text in ADVICE if len({*one, *other} & known) > 1 and {*one} & known and {*other} & known
+    ]
+    every = say.listed([say.covariate_phrase(name) for name in names])
+    return found or [f"Vary {every} independently: change one while the others stay constant."]
+
+
+def grew_early(trace: Trace) -> bool:
+    """Whether all that rivals a constant effect is that it grew early in the session."""
+    first = trace.effects[0]
+    return first.basis == "constant" and bool(trace.equivalent) and {*trace.equivalent} <= {*CUMULATIVE}
+
+
+def summary_lines(trace: Trace) -> list[str]:
+    """The page's answer, its evidence, held-out figures and notes; plain ASCII."""
+    details = filter(None, (evidence(trace), rivals(trace), *advice(trace), worth(trace)))
+    lines = [*answer(trace), "", *details, "", *_held_out(trace)]
+    if trace.remaining is not None:
+        lines.append(f"Still significant after these effects: {effect_phrase(*trace.remaining)}.")
+    lines += [f"Note: {note}" for note in trace.notes]
+    return [line.replace("−", "-").replace(NOTHING, "-") for line in lines]
+
+
+def _held_out(trace: Trace) -> list[str]:
+    head = f"Held out: {len(trace.held_out.table.pushes)} pushes, SHA-256 {trace.held_out.digest}"
+    titles = f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact NLPD':>12s}{'90 % coverage, dx dy dtheta':>30s}"
+    return [head, titles, *map(_line, trace.comparisons)]
+
+
+def _line(comparison: Comparison) -> str:
+    metrics: dict[str, Any] = metrics_json(comparison)
+    exact = (metrics["exact_nlpd"] or {}).get("total")
+    coverage = metrics["coverage"]["0.9"] or {}
+    cells = [cell(metrics["nmse"]["total"], 9), cell(metrics["nlpd"]["total"], 10), cell(exact, 12)]
+    return f"{comparison.model:8s}{''.join(cells)}{''.join(cell(share, 10) for share in coverage.values())}"

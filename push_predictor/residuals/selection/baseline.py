@@ -19,8 +19,7 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.enumeration import Nuisance, usable
+from push_predictor.residuals.candidates.candidate import Candidate, Nuisance, usable
 from push_predictor.residuals.evidence.drivers import OF_SESSION
 from push_predictor.residuals.evidence.input_shift import among
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.candidates.enumeration import HEADED, SIDES
+from push_predictor.residuals.candidates.candidate import HEADED, SIDES, Candidate
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for
 from push_predictor.residuals.evidence.residualizer import sums_by

@@ -21,11 +21,10 @@ import numpy as np
 from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.ladder import least_gain
-from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.candidates.enumeration import constant_refinements
+from push_predictor.residuals.candidates.candidate import Candidate, candidate, constant_refinements
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows, best_place, fitted, standard_error
+from push_predictor.residuals.evidence.drivers import forms_of
 from push_predictor.residuals.evidence.standardised import FEWEST_BLOCKS
-from push_predictor.residuals.selection.forms import forms_of
 from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import Naming, Trial, chosen_of, naming_of
 from push_predictor.residuals.selection.screening import Screened

@@ -14,8 +14,6 @@ import numpy as np
 from push_predictor.evaluation.report.figures.calibration import paint_pit
 from push_predictor.evaluation.report.figures.ellipses import ENOUGH, examples, paint_examples
 from push_predictor.evaluation.report.figures.residuals import paint_residuals, time_axis
-from push_predictor.evaluation.report.figures.tracks import paint_tracks
-from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     Condition,
@@ -24,6 +22,8 @@ from push_predictor.evaluation.report.maps import (
     coarse_cells,
     commonest_condition,
     fine_cells,
+    fixed_covariates,
+    fixed_covariates_text,
     fold_order,
     paint_maps,
     predicted_at_windows,
@@ -67,18 +67,13 @@ def map_pictures(out: Path, shown: Validation) -> list[Picture]:
 
 
 def example_pictures(out: Path, shown: Validation) -> list[Picture]:
-    """Ellipses with outcomes in the push frame and, if windows are known, along whole pushes."""
+    """Ellipses with outcomes in the push frame."""
     rig, comparison = shown.models[0].rig, shown.comparisons[0]
     chosen = examples(rig.outline, shown.table, comparison, EXAMPLES)
     path = out / "examples.png"
     height = 2.6 * -(-len(chosen) // 2) + 0.2
     draw(path, (WIDTH, height), lambda figure: paint_examples(figure, rig, shown.table, comparison, chosen))
-    pictures = [Picture(path, _example_alt(len(chosen)), _example_caption(comparison.model))]
-    if windows := shown.windows:
-        tracks = out / "tracks.png"
-        draw(tracks, (WIDTH, 6.6), lambda figure: paint_tracks(figure, windows, comparison))
-        pictures.append(Picture(tracks, "Tracks of the slider's centre with predicted ellipses.", TRACK_CAPTION))
-    return pictures
+    return [Picture(path, _example_alt(len(chosen)), _example_caption(comparison.model))]
 
 
 def calibration_pictures(out: Path, shown: Validation) -> list[Picture]:
@@ -175,12 +170,6 @@ def _example_caption(model: str) -> str:
     )
 
 
-TRACK_CAPTION = (
-    "Whole pushes from above: the path of the slider's centre, rotated to point right. About 95 % of the "
-    "observed points should lie in their ellipses. Each ellipse is predicted from the observed pose at the start of "
-    "its window. Shown are three long pushes: the largest clockwise rotation, the median, the largest "
-    "counter-clockwise."
-)
 CALIBRATION_CAPTION = (
     "A calibrated model has bars in the grey band. Probability integral transform (PIT): predicted probability of a "
     "smaller outcome. A hump: the predicted uncertainty is too large. A trough: it is too small. A slope: the mean is "

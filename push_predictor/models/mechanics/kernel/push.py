@@ -101,12 +101,18 @@ def shifts(
     k: cython.Py_ssize_t
     i: cython.Py_ssize_t
     end: cython.int
+    unchanged: cython.bint
     with cython.nogil:
         for n in range(pushes.shape[0]):
             push: cython.p_double = cython.address(pushes[n, 0])
             for i in range(PARAMETERS):
                 own[i] = values[i]
-            for end in range(2):
+            unchanged = True
+            for k in range(changes.shape[1]):
+                unchanged = unchanged and changes[n, k] == 0.0
+            for i in range(3):
+                found[n, 0, i] = 0.0
+            for end in range(0 if unchanged else 2):
                 _displacement(own, push, common, tried)
                 for i in range(3):
                     found[n, 0, i] = tried[i] - found[n, 0, i] if end else tried[i]

@@ -1,17 +1,20 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The data behind a finding that shifts no mean: the force, the gap at the contact, the noise, the inputs."""
+"""Pushes along an axis: the force, the gap at the contact, the inputs, and errors before and after."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.reporting.chart import SMALL, Band, Chart, Columns, Dots, Line, Mark, limits_of
+from push_predictor.reporting.canvas import UNITS
+from push_predictor.reporting.chart import HALF, SMALL, Band, Chart, Columns, Dots, Line, Mark, limits_of
 from push_predictor.residuals.channels.measurement import gap_responses
 from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SETTLED
@@ -29,6 +32,7 @@ from push_predictor.types import Array, TextArray
 NORMAL = "Direction of the contact normal in the world (deg)"
 SHARE = 0.02  # of the windows at either end that the limits may cut off
 HISTOGRAM = 16  # bars
+MODELS = {"before": "before", "refit": "push", "after": "after"}  # the mark of each
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,23 +90,12 @@ def size_chart(trace: Trace, covariate: str, outputs: list[int]) -> Chart | None
         shown.append(("after", trace.unexplained))
     if any(len(z) != len(table) for _, z in shown):
         return None
-    axis = axis_of(table, covariate)
-    place = push_means(table.push_id, axis.x)[1]
-    dots: list[Mark] = []
-    bars: list[Mark] = []
-    tops = [1.5]
-    one = "" if len(shown) > 1 else "one push"
-    for kind, z in shown:
-        size = np.sqrt(np.mean(z[:, outputs] ** 2, axis=1))
-        names, square = push_means(table.push_id, size**2)
-        bins = means_along(axis, table.push_id, size, square=True)
-        dots.append(
-            Dots("push" if len(shown) == 1 else kind, place, np.sqrt(square), titles(names, np.sqrt(square)), name=one)
-        )
-        bars.append(bins.bars(kind, "", kind if len(shown) > 1 else "pushes, in bins"))
-        tops += [float(np.quantile(np.sqrt(square), 1.0 - SHARE)), float(bins.high.max(initial=0.0))]
+    axis, alone = axis_of(table, covariate), len(shown) == 1
+    sizes = [Values(axis, table.push_id, np.sqrt(np.mean(z[:, outputs] ** 2, axis=1))) for _, z in shown]
+    kinds = ["push"] if alone else [kind for kind, _ in shown]
+    dots, bars, top = _sizes(sizes, kinds, "", ["pushes, in bins"] if alone else kinds, "one push" if alone else "")
     label = "Error of a push / predicted standard deviation"
-    x, y = limits_of(axis.x, margin=0.02), (0.0, 1.1 * max(tops))
+    x, y = limits_of(axis.x, margin=0.02), (0.0, 1.1 * max(top, 1.5))
     marks = (Line("held", np.array(x), np.ones(2), name="as predicted"), *dots, *bars)
     return Chart(f"{label}.", axis.label, label, x, y, marks, names=axis.names)
 
@@ -117,6 +110,51 @@ def input_chart(trace: Trace, covariate: str) -> Chart | None:
     marks = Columns("push", edges, shares[0], name="training"), Columns("before", edges, shares[1], name="now")
     ends = (float(edges[0]), float(edges[-1])), (0.0, 1.1 * float(np.max(shares)))
     return Chart(f"{now.label} in training and now.", now.label, "% of windows", *ends, marks, size=SMALL)
+
+
+def error_charts(table: PushTable, covariate: str, shown: Sequence[Comparison]) -> list[Chart]:
+    """Error of the position (mm) and of the heading (deg) of each push under each model, along the covariate.
+
+    A model may have been judged on other windows of the same pushes.
+    """
+    axis = axis_of(table, covariate)
+    place = dict(zip(*push_means(table.push_id, axis.x), strict=True))
+    return [
+        _error_chart(axis, [_error(c, place, axis, k) for c in shown], [MODELS[c.model] for c in shown], *each)
+        for k, each in enumerate((("Position error of a push (mm)", "mm"), ("Heading error of a push (deg)", "deg")))
+    ]
+
+
+def _error(comparison: Comparison, place: dict[str, float], axis: Axis, k: int) -> Values:
+    """Error of the position (k = 0) or of the heading in each window of known pushes, in shown units."""
+    known = np.array([push in place for push in comparison.push_id.tolist()], dtype=np.bool_)
+    push_id, error = comparison.push_id[known], ((comparison.observed - comparison.mean) * UNITS)[known]
+    x = np.array([place[push] for push in push_id.tolist()])
+    return Values(replace(axis, x=x), push_id, np.abs(error[:, 2]) if k else np.hypot(error[:, 0], error[:, 1]))
+
+
+def _error_chart(axis: Axis, errors: Sequence[Values], kinds: Sequence[str], label: str, unit: str) -> Chart:
+    dots, bars, top = _sizes(errors, kinds, unit, kinds)
+    x, y = limits_of(axis.x, margin=0.02), (0.0, limits_of(np.array([0.0, top]))[1])
+    return Chart(f"{label} before and after.", axis.label, label, x, y, (*dots, *bars), size=HALF, names=axis.names)
+
+
+def _sizes(
+    every: Sequence[Values], kinds: Sequence[str], unit: str, names: Sequence[str], one: str = ""
+) -> tuple[list[Mark], list[Mark], float]:
+    """Root mean square of each push, and in bins with their intervals; and the largest value to be shown."""
+    dots: list[Mark] = []
+    bars: list[Mark] = []
+    top = 0.0
+    for values, kind, name in zip(every, kinds, names, strict=True):
+        pushes, square = push_means(values.push_id, values.y**2)
+        size, bins = np.sqrt(square), means_along(values.axis, values.push_id, values.y, square=True)
+        dots.append(
+            Dots(kind, push_means(values.push_id, values.axis.x)[1], size, titles(pushes, size, unit), name=one)
+        )
+        bars.append(bins.bars(kind, unit, name))
+        top = max(top, float(bins.high.max(initial=0.0)), float(np.quantile(size, 1.0 - SHARE)) if len(size) else 0.0)
+    return dots, bars, top
 
 
 def _force(table: PushTable, covariate: str, mechanism: str | None) -> Values | None:

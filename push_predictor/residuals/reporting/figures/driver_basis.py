@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
+from push_predictor.evaluation.push_scores import by_push
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import JointEffects, joint_shift
 from push_predictor.models.mechanisms import mechanism_named
@@ -19,6 +19,7 @@ from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.chart import HALF, WIDE, Band, Bars, Cells, Chart, Dots, Line, Mark, limits_of
 from push_predictor.reporting.html import number
+from push_predictor.residuals.channels.contrast import estimate_with_draws
 from push_predictor.residuals.evidence.standardised import evidence_of, mechanics_under
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.pushes import (
@@ -37,11 +38,9 @@ GRID = 400
 PUSHES_PER_BIN = 12
 FEWEST_BINS, MOST_BINS = 3, 12
 MAP_CELLS = 16
-ASIDE = 0.08  # offset of the points of a category's levels, to either side
 WIDEST = 8.0  # median widths of an interval that is shown; a bin of pushes that all stick has a far wider one
 ROOM = 0.35  # of the range of curve and bins, above and below them
 PERIODIC = ("periodic", "periodic, twice around")
-DRAWS = 400
 CENTRAL = 1.96  # standard deviations that cover 95 % of a Gaussian
 
 
@@ -56,14 +55,13 @@ class Seen:
     bins: Bins
 
 
-def basis_charts(trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> list[Chart]:
+def basis_charts(trace: Trace, strength: Strength, rows: Rows) -> list[Chart]:
     """A chart for each parameter of the effect: the fit, single pushes and bins, along its covariate or the time."""
     every = range(len(strength.names))
     if len(strength.effect.basis.drivers) > 1:
-        return [_map_chart(trace, strength, analysis, q) for q in every]
-    seen = _seen(trace, strength, analysis)
-    later = None if held_out is None else _seen(trace, strength, held_out)
-    return [_chart(strength, analysis.table, seen, later, q) for q in every]
+        return [_map_chart(trace, strength, rows, q) for q in every]
+    seen = _seen(trace, strength, rows)
+    return [_chart(strength, rows.table, seen, q) for q in every]
 
 
 def bins_of(basis: DriverBasis, table: PushTable) -> IntArray:
@@ -96,22 +94,19 @@ def _axis(basis: DriverBasis, table: PushTable) -> Axis:
     return axis_of(table, basis.drivers[0] if basis.drivers else "")
 
 
-def _chart(strength: Strength, table: PushTable, seen: Seen, later: Seen | None, q: int) -> Chart:
+def _chart(strength: Strength, table: PushTable, seen: Seen, q: int) -> Chart:
     factor, unit = shown_unit(strength.units[q])
     fit, limits = _fit(strength, table, seen.axis, q, factor)
-    aside = ASIDE if strength.effect.basis.name == "category" else 0.0
     single = factor * seen.value[:, q]
-    bars = _bars("before", "analysis pushes, in bins", seen.bins, q, factor, unit, -aside)
-    held = [_bars("held", "held-out pushes, in bins", later.bins, q, factor, unit, aside)] if later else []
+    bars = _bars(seen.bins, q, factor, unit)
     low, high = limits_of(*limits, bars.low, bars.high, np.zeros(1), margin=ROOM)
     x = limits_of(seen.axis.x, margin=0.3 if seen.axis.whole else 0.02)
     zero = Line("zero", np.array(x), np.zeros(2))
     dots = Dots("push", seen.place, single, titles(seen.names, single, unit), name="one push")
     label = parameter_label(strength, q)
-    marks = (zero, *fit, dots, bars, *held)
     return Chart(
-        f"{label}, fitted and measured.", seen.axis.label, label, x, (low, high), marks, names=seen.axis.names,
-        size=WIDE if len(strength.names) == 1 else HALF,
+        f"{label}, fitted and measured.", seen.axis.label, label, x, (low, high), (zero, *fit, dots, bars),
+        names=seen.axis.names, size=WIDE if len(strength.names) == 1 else HALF,
     )  # fmt: skip
 
 
@@ -140,10 +135,10 @@ def determined(width: Array) -> BoolArray:
     return np.asarray(width <= WIDEST * np.median(width)) if len(width) else np.zeros(0, dtype=np.bool_)
 
 
-def _bars(kind: str, name: str, bins: Bins, q: int, factor: float, unit: str, aside: float) -> Bars:
+def _bars(bins: Bins, q: int, factor: float, unit: str) -> Bars:
     kept = determined(bins.high[:, q] - bins.low[:, q])
     each = (factor * ends[kept, q] for ends in (bins.value, bins.low, bins.high))
-    return Bins(bins.place[kept] + aside, *each).bars(kind, unit, name)
+    return Bins(bins.place[kept], *each).bars("before", unit, "pushes, in bins")
 
 
 def _map_chart(trace: Trace, strength: Strength, rows: Rows, q: int) -> Chart:
@@ -180,19 +175,16 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """An effect as q parameters that depend on its covariate.
+    """An effect of a known mechanism as q parameters that depend on its covariate.
 
-    pattern (p, q): of the mechanism's p responses. coefficients (q, m) and their covariance (q, m, m). share: of the
-    fitted coefficients' sum of squares that the pattern covers, 1 unless the mechanism is unknown.
+    coefficients (q, m) and their covariance (q, m, m).
     """
 
     effect: Effect
     names: tuple[str, ...]
     units: tuple[str, ...]
-    pattern: Array
     coefficients: Array
     covariance: Array
-    share: float
 
     def curve(self, covariates: Mapping[str, Array], n: int) -> tuple[Array, Array]:
         """Fitted parameters (n, q) and half of their 95 % band (n, q)."""
@@ -207,43 +199,19 @@ def analysis_rows(trace: Trace) -> Rows:
         evidence = evidence_of(trace.extended, trace.analysis)
         return Rows(trace.analysis, evidence.z, evidence.whitener)
     evidence = evidence_of(trace.model, trace.analysis)
-    shift = sum((shift_of(trace, term, trace.analysis) for term in trace.terms), np.zeros_like(evidence.residual))
+    shift = joint_shift(mechanics_under(trace.model), trace.terms, _push(trace.analysis))
     unexplained = replace(evidence, residual=evidence.residual - shift)
     return Rows(trace.analysis, unexplained.z, unexplained.whitener)
 
 
-def held_out_rows(trace: Trace) -> Rows:
-    """Held-out pushes under the model with the effects."""
-    after = trace.held_out.after
-    whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(after.covariance)))
-    return Rows(trace.held_out.table, np.einsum("nij,nj->ni", whitener, after.observed - after.mean), whitener)
-
-
-def shift_of(trace: Trace, effect: Effect, table: PushTable) -> Array:
-    """Shift of the mean (n, 3) by an effect."""
-    return joint_shift(mechanics_under(trace.model), [effect], _push(table))
-
-
-def strength_of(effect: Effect, table: PushTable) -> Strength:
-    """The effect's physical parameters; for an unknown mechanism its strongest pattern, scaled to RMS 1."""
-    m = columns_of(effect.basis)
-    coefficients = effect.coefficients.reshape(-1, m)
-    p = len(coefficients)
+def strength_of(effect: Effect) -> Strength:
+    """The effect's physical parameters."""
+    parameters = mechanism_named(str(effect.mechanism)).parameters
+    coefficients = effect.coefficients.reshape(len(parameters), -1)
+    p, m = coefficients.shape
     blocks = effect.covariance.reshape(p, m, p, m)
-    if effect.mechanism is not None:
-        parameters = mechanism_named(effect.mechanism).parameters
-        own = np.array([blocks[j, :, j] for j in range(p)])
-        names, units = tuple(q.name for q in parameters), tuple(q.unit for q in parameters)
-        return Strength(effect, names, units, np.eye(p), coefficients, own, 1.0)
-    left, size, _ = np.linalg.svd(coefficients, full_matrices=False)
-    u = left[:, 0]
-    along = u @ coefficients
-    along_values = effect.basis.values(table.covariates, len(table)) @ along
-    rms = max(float(np.sqrt(np.mean(along_values**2))), np.finfo(float).tiny)
-    own = np.einsum("p,pmqk,q->mk", u, blocks, u)[None] / rms**2
-    share = float(size[0] ** 2 / max(float(np.sum(size**2)), np.finfo(float).tiny))
-    names = ("Strength of the fitted pattern (RMS 1)",)
-    return Strength(effect, names, ("1",), u[:, None] * rms, along[None] / rms, own, share)
+    own = np.array([blocks[j, :, j] for j in range(p)])
+    return Strength(effect, tuple(q.name for q in parameters), tuple(q.unit for q in parameters), coefficients, own)
 
 
 def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
@@ -275,9 +243,10 @@ def per_push(strength: Strength, rows: Rows, response: Array, place: Array) -> t
     """Position (k,) and parameters (k, q) of each push; NaN where the response is too small."""
     _, push = np.unique(rows.table.push_id, return_inverse=True)
     times = np.bincount(push)
-    square, score = (_sums(push, values) for values in (_squares(response), _scores(response, rows.unexplained)))
+    square = by_push(push, np.sum(response**2, axis=1))
+    score = by_push(push, np.einsum("nkq,nk->nq", response, rows.unexplained))
     fitted = strength.curve(rows.table.covariates, len(rows.table))[0]
-    mean = _sums(push, fitted) / times[:, None]
+    mean = by_push(push, fitted) / times[:, None]
     informative = square >= 0.1 * np.median(square, axis=0)
     value = np.divide(score, square, out=np.full(score.shape, np.nan), where=informative & (square > 0.0)) + mean
     return np.bincount(push, place) / times, value
@@ -285,36 +254,12 @@ def per_push(strength: Strength, rows: Rows, response: Array, place: Array) -> t
 
 def _of_bin(target: Array, response: Array, push_id: np.ndarray, place: Array, rows: BoolArray) -> Array | None:
     names, push = np.unique(push_id[rows], return_inverse=True)
-    if len(names) < LEAST_PUSHES:
+    if len(names) < LEAST_PUSHES or not np.any(response[rows]):
         return None
-    r, z = response[rows], target[rows]
-    square = _sums(push, np.einsum("nkp,nkq->npq", r, r))
-    score = _sums(push, np.einsum("nkp,nk->np", r, z))
-    if not np.all(np.einsum("npp->p", square) > 0.0):
-        return None
-    weights = push_bootstrap(names, draws=DRAWS)
-    value = _solved(square.sum(axis=0)[None], score.sum(axis=0)[None])[0]
-    draws = _solved(np.tensordot(weights, square, axes=1), weights @ score)
+    nothing = np.empty((int(rows.sum()), 0))
+    value, draws = estimate_with_draws(target[rows], response[rows], nothing, nothing, push)
     low, high = np.quantile(draws, [0.025, 0.975], axis=0)
     return np.stack([np.full(len(value), place[rows].mean()), value, low, high])
-
-
-def _solved(square: Array, score: Array) -> Array:
-    return np.asarray(np.einsum("dpq,dq->dp", np.linalg.pinv(square, rcond=1e-9, hermitian=True), score))
-
-
-def _sums(push: IntArray, values: Array) -> Array:
-    sums = np.zeros((int(push.max()) + 1, *values.shape[1:]))
-    np.add.at(sums, push, values)
-    return sums
-
-
-def _squares(response: Array) -> Array:
-    return np.asarray(np.sum(response**2, axis=1))
-
-
-def _scores(response: Array, residual: Array) -> Array:
-    return np.asarray(np.einsum("nkq,nk->nq", response, residual))
 
 
 def _push(table: PushTable) -> Push:

@@ -14,6 +14,7 @@ from push_predictor.reporting import html
 from push_predictor.reporting.chart import WIDE, Chart, Dots
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.channels import (
+    error_charts,
     force_chart,
     gap_chart,
     input_chart,
@@ -25,10 +26,8 @@ from push_predictor.residuals.reporting.figures.driver_basis import (
     Strength,
     analysis_rows,
     basis_charts,
-    held_out_rows,
     strength_of,
 )
-from push_predictor.residuals.reporting.figures.errors import coverage_charts, error_charts
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     count,
@@ -49,12 +48,14 @@ HOVER = "Hover over a mark to see its push and its value."
 
 
 def effect_figures(trace: Trace) -> list[str]:
-    """Each effect that depends on a covariate, against that."""
-    driven = [effect for effect in trace.terms if effect.basis.drivers]
-    if not driven:
+    """Each known effect that depends on a covariate against that, but for what the key picture shows."""
+    known = [term for term in trace.terms if term.basis.drivers and term.mechanism is not None]
+    every = [strength_of(term) for term in known]
+    shown = [one for one in every if one.effect is not trace.terms[0] or len(one.names) > 1]
+    if not shown:
         return []
-    analysis, held_out = analysis_rows(trace), _held_out_rows(trace)
-    return [_basis_figure(trace, strength_of(effect, trace.analysis), analysis, held_out) for effect in driven]
+    rows = analysis_rows(trace)
+    return [_basis_figure(trace, one, rows) for one in shown]
 
 
 def error_figure(trace: Trace) -> list[str]:
@@ -69,22 +70,7 @@ def error_figure(trace: Trace) -> list[str]:
     return [html.charts(error_charts(table, covariate, shown), caption)]
 
 
-def calibration_figures(trace: Trace) -> list[str]:
-    """Coverage and PIT before, after the refit and with the effects."""
-    shown = [comparison for comparison in trace.comparisons if len(comparison.observed)]
-    if not shown:
-        return []
-    caption = (
-        f"Calibration on {count(len(trace.held_out.table.pushes), 'held-out push', 'held-out pushes')}. First column: "
-        "share of outcomes inside the central predicted interval, against its nominal share; band: 95 %, bootstrap of "
-        "pushes. Others: probability integral transform (PIT), uniform for a calibrated model. A hump: the predicted "
-        "uncertainty is too large. A trough: it is too small. A slope: the mean is biased. Grey: 95 % range of the "
-        "bars of a calibrated model, where windows of a push resemble each other."
-    )
-    return [html.charts([chart for one in shown for chart in coverage_charts(one)], caption, 4)]
-
-
-def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> str:
+def _basis_figure(trace: Trace, strength: Strength, rows: Rows) -> str:
     effect = strength.effect
     name = capitalised(moved_noun(effect.mechanism))
     covariates = listed([covariate_phrase(driver) for driver in effect.basis.drivers])
@@ -94,19 +80,8 @@ def _basis_figure(trace: Trace, strength: Strength, analysis: Rows, held_out: Ro
         else "Line: fitted, with its 95 % band. Points: estimated separately in each bin, from the residuals of the "
         f"model and the other effects. {BARS} Grey dots: single pushes; those with too small a response are not shown."
     )
-    pattern = (
-        ""
-        if strength.share > 0.999
-        else " The mechanism is unknown, so the strongest pattern over contact point and push angle is shown: "
-        f"{100.0 * strength.share:.0f} % of the fitted coefficients' sum of squares."
-    )
-    caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}{pattern}"
-    return html.charts(basis_charts(trace, strength, analysis, held_out), caption)
-
-
-def _held_out_rows(trace: Trace) -> Rows | None:
-    held = trace.held_out
-    return held_out_rows(trace) if len(held.table) and len(held.after.observed) == len(held.table) else None
+    caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}"
+    return html.charts(basis_charts(trace, strength, rows), caption)
 
 
 def _data_words(trace: Trace) -> str:
@@ -144,10 +119,10 @@ def _charts(trace: Trace) -> tuple[list[Chart], str]:
 
 def _effect_chart(trace: Trace) -> Chart:
     """The chart of the first effect's parameter that changes most."""
-    strength = strength_of(trace.terms[0], trace.analysis)
+    strength = strength_of(trace.terms[0])
     values = strength.curve(trace.analysis.covariates, len(trace.analysis))[0]
     most = int(np.argmax(np.abs(values).max(axis=0)))
-    return basis_charts(trace, strength, analysis_rows(trace), None)[most]
+    return basis_charts(trace, strength, analysis_rows(trace))[most]
 
 
 def _known(*charts: Chart | None) -> list[Chart]:

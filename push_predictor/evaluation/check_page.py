@@ -5,19 +5,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from push_predictor.evaluation.check_page.answer import answer_of, contact_sentence, with_minus
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.checks.checked import CheckedData
 from push_predictor.recordings.checks.coverage import Coverage
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, motion_of
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.motion import OFF, ContactFit, Motion, motion_of
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting import html
@@ -45,6 +45,8 @@ MOST_CONTACTS = 700
 MOST_PUSHES = 600  # dots
 SQUARE = (460.0, 430.0)  # pixels
 MM = 1e3
+ORDER = ("refused", "warning", "note")
+LABELS = {"refused": "refused", "warning": "check first", "note": "sound"}
 
 
 def write_check_page(path: Path, checked: Mapping[str, CheckedData]) -> None:
@@ -96,7 +98,7 @@ def _contact_parts(checked: CheckedData) -> list[str]:
     parts = []
     if (fit := checked.contacts) is not None:
         caption = f"Median gap between tip and outline by {fit.side}. Counted counter-clockwise from the first vertex."
-        rows = [[str(k + 1), _millimetres(gap)] for k, gap in enumerate(fit.gaps)]
+        rows = [[str(k + 1), html.number(gap and 1e3 * gap, 2)] for k, gap in enumerate(fit.gaps)]
         parts.append(html.folded_table(caption, (fit.side, "gap, mm"), rows))
     if (chart := track_chart(checked)) is not None:
         parts.append(html.charts([chart], TRACKS))
@@ -106,7 +108,11 @@ def _contact_parts(checked: CheckedData) -> list[str]:
 def _numbers(checked: CheckedData) -> list[str]:
     """A folded table of the estimates."""
     rows = [
-        [f"{finding.name}, {name}", f"{html.number(value.value)} {_unit(value)}", _sd(value)]
+        [
+            f"{finding.name}, {name}",
+            f"{html.number(value.value)} {'' if value.unit == '1' else value.unit}",
+            html.number(value.sd, 2),
+        ]
         for finding in checked.findings
         for name, value in finding.values.items()
     ]
@@ -130,22 +136,10 @@ def _coverage(checked: CheckedData) -> list[str]:
     ]
 
 
-def _millimetres(gap: float | None) -> str:
-    return html.NOTHING if gap is None else html.number(1e3 * gap, 2)
-
-
 def _listed(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(html.number(each, 3) for each in value)
     return html.number(float(value), 3) if isinstance(value, int | float) else html.NOTHING
-
-
-def _unit(value: Value) -> str:
-    return "" if value.unit == "1" else value.unit
-
-
-def _sd(value: Value) -> str:
-    return html.number(value.sd, 2)
 
 
 @dataclass(frozen=True)
@@ -188,7 +182,23 @@ def contact_chart(checked: CheckedData) -> Chart | None:
 def track_chart(checked: CheckedData) -> Chart | None:
     """The tracks of slider and tip, None for a table, and where they have no common time."""
     motion = _motion(checked)
-    return None if motion is None else _tracks(motion)
+    if motion is None:
+        return None
+    slider, tip = MM * motion.slider[:, :2], MM * motion.tip
+    thin = slice(None, None, max(1, -(-len(tip) // MOST_POINTS)))
+    marks: list[Mark] = [Line("push", *tip[thin].T, name="tip")]
+    numbers = np.unique(motion.push[motion.contact])
+    every = max(1, -(-int(motion.contact.sum()) // MOST_POINTS))
+    for count, number in enumerate(numbers):
+        rows = np.flatnonzero(motion.contact & (motion.push == number))
+        rows = np.unique(np.append(rows[::every], rows[-1]))
+        marks += [
+            Line("before", *tip[rows].T, name="" if count else "tip while the slider moves"),
+            Line("fit", *slider[rows].T, name="" if count else "slider's frame, pushed"),
+        ]
+    x, y = _equal(np.concatenate([slider, tip]))
+    label = "Tracks of the tip and of the slider from above"
+    return Chart(label, "x, mm", "y, mm", x, y, tuple(marks), "Tracks from above", SQUARE)
 
 
 def _motion(checked: CheckedData) -> Motion | None:
@@ -233,24 +243,6 @@ def coverage_charts(coverage: Coverage, table: PushTable) -> list[Chart]:
     return charts
 
 
-def _tracks(motion: Motion) -> Chart:
-    slider, tip = MM * motion.slider[:, :2], MM * motion.tip
-    thin = slice(None, None, max(1, -(-len(tip) // MOST_POINTS)))
-    marks: list[Mark] = [Line("push", *tip[thin].T, name="tip")]
-    numbers = np.unique(motion.push[motion.contact])
-    every = max(1, -(-int(motion.contact.sum()) // MOST_POINTS))
-    for count, number in enumerate(numbers):
-        rows = np.flatnonzero(motion.contact & (motion.push == number))
-        rows = np.unique(np.append(rows[::every], rows[-1]))
-        marks += [
-            Line("before", *tip[rows].T, name="" if count else "tip while the slider moves"),
-            Line("fit", *slider[rows].T, name="" if count else "slider's frame, pushed"),
-        ]
-    x, y = _equal(np.concatenate([slider, tip]))
-    label = "Tracks of the tip and of the slider from above"
-    return Chart(label, "x, mm", "y, mm", x, y, tuple(marks), "Tracks from above", SQUARE)
-
-
 def _contacts(motion: Motion, rig: Rig, correction: Correction | None) -> Chart:
     rows = np.flatnonzero(motion.contact)
     rows = rows[:: max(1, -(-len(rows) // MOST_CONTACTS))]
@@ -281,3 +273,62 @@ def _equal(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
     middle = 0.5 * np.array([x_low + x_high, y_low + y_high])
     (left, bottom), (right, top) = (middle - half).tolist(), (middle + half).tolist()
     return (left, right), (bottom, top)
+
+
+def answer_of(checked: CheckedData) -> tuple[tuple[str, str, str], str]:
+    """What was found, what to do, what was pushed; and a label: refused, check first, or sound."""
+    worst = min(checked.findings, key=lambda finding: ORDER.index(finding.severity), default=None)
+    label = "sound" if worst is None else LABELS[worst.severity]
+    found, to_do, done = map(with_minus, (_found(checked, worst), _to_do(checked, worst), pushed(checked)))
+    return (found, to_do, done), label
+
+
+def with_minus(text: str) -> str:
+    """The text with minus signs in place of the hyphens before numbers."""
+    return re.sub(r"(?<![\w-])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def _found(checked: CheckedData, worst: Finding | None) -> str:
+    if worst is None or worst.severity == "note":
+        return "No mistake was found."
+    if worst.severity == "refused":
+        return f"These data cannot be used. {worst.sentence}"
+    count = sum(finding.severity == "warning" for finding in checked.findings)
+    return f"{'A mistake is' if count == 1 else f'{count} mistakes are'} probable. {worst.sentence}"
+
+
+def _to_do(checked: CheckedData, worst: Finding | None) -> str:
+    if worst is None:
+        return "The data can be used as they are."
+    if worst.severity == "note":
+        return f"The data can be used as they are. To learn more: {worst.advice[0].lower()}{worst.advice[1:]}"
+    return worst.advice
+
+
+def pushed(checked: CheckedData) -> str:
+    """What was pushed: sides, speeds and angles."""
+    covered = checked.coverage
+    return "Pushes are searched for once this is corrected." if covered is None else coverage_sentence(covered)
+
+
+def contact_sentence(fit: ContactFit) -> str:
+    """Where the contacts lie against the outline, and the share of their time that became windows."""
+    inside, off = (f"{100.0 * share:.1f} %" for share in (fit.inside, fit.off))
+    place = f"{inside} of the contacts are more than {1e3 * OFF:.0f} mm inside it, {off} as far outside."
+    if fit.lost is None:
+        return place
+    return f"{place} Windows use {100.0 * (1.0 - fit.lost):.0f} % of the time in contact."
+
+
+def coverage_sentence(coverage: Coverage) -> str:
+    """The pushes, with sides, speeds, angles and the share of sliding contacts where they are known."""
+    pushes = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
+    windows = f"{coverage.windows} window{'' if coverage.windows == 1 else 's'}"
+    counts = coverage.side_counts
+    sides = "" if counts is None else f" on {np.count_nonzero(counts)} of {len(counts)} {coverage.side}s"
+    slow, fast = (f"{1e3 * speed:.3g}" for speed in coverage.speeds)
+    low, high = (f"{np.degrees(angle):.0f}" for angle in coverage.angles)
+    sliding = coverage.sliding
+    slides = "" if sliding is None else f" The contact slides in {100.0 * sliding:.0f} % of the steps."
+    ranges = f"at {slow} to {fast} mm/s and {low} to {high} degrees"
+    return f"The data contain {pushes} ({windows}){sides}, {ranges}.{slides}"
