@@ -20,6 +20,7 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.importers.mlab import first_touch, load_shares, triangle
+from push_predictor.recordings.importers.staging import sources_in
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table_file import read_table
@@ -438,3 +439,15 @@ def test_report_has_json_and_text(tmp_path: Path) -> None:
     content = json.loads(json.dumps(report.to_json()))
     assert content["recordings"] == 1 and content["written"] == [str(report.written[0])]
     assert "assumed:" in str(report) and "dropped: nothing" in str(report)
+
+
+def test_files_of_a_folder_are_found_in_order_and_what_is_missing_is_named(tmp_path: Path) -> None:
+    for name in ("b/exp2.txt", "a/exp1.txt.gz", "a/other.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    found = sources_in([tmp_path, tmp_path / "a" / "other.txt"], "exp*.txt", "exp*.txt.gz")
+    assert [path.name for path in found] == ["exp1.txt.gz", "exp2.txt", "other.txt"]
+    with pytest.raises(ImportSourceError, match=r"/a: contains no \*\.bag"):
+        sources_in([tmp_path / "a"], "*.bag")
+    with pytest.raises(ImportSourceError, match=r"other\.txt: give a folder, or NAME_obj\.txt"):
+        import_source("mcube", [tmp_path / "a" / "other.txt"], tmp_path / "out")
