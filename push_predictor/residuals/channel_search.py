@@ -20,7 +20,7 @@ from push_predictor.residuals.channels.wrench import wrench_effects
 from push_predictor.residuals.evidence.loading import corrected_data
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.question import Question
+from push_predictor.residuals.question import Question, unseen
 from push_predictor.watch import Watch, no_watch
 
 # Share of the windows, or of the mean squared residual, from which an error of the force sensor does harm. The mean
@@ -87,7 +87,7 @@ def _corrected(question: Question, measured: ChannelFinding) -> Corrected:
     for error in measured.effects:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     again = corrected_data(question.loaded, recordings, window_options(question.model))
-    table = question.deployed.continued(again.table)
+    table = unseen(question.deployed, again.table)
     held = held_out_rows(table)
     return Corrected(measured, evidence_of(question.model, table.take(~held)), table.take(held))
 

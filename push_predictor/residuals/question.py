@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from push_predictor.errors import RequestError
+from push_predictor.evaluation.validation import trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import LOCAL
@@ -26,7 +29,8 @@ class Question:
     """Analysis pushes, their evidence, and held-out pushes.
 
     model: the deployed one, or one about mechanics where that cannot extrapolate. windows: of the analysis, as they
-    were measured. inside: those among the inputs of training.
+    were measured. inside: those among the inputs of training. trained: number of pushes that are not judged, because
+    the model was trained on them.
     """
 
     deployed: PushModel
@@ -40,6 +44,7 @@ class Question:
     inside: BoolArray
     held_out: PushTable
     shifted: tuple[ShiftedInput, ...]
+    trained: int
 
     @classmethod
     def of(
@@ -54,7 +59,8 @@ class Question:
 
         Raises as `trace`.
         """
-        loaded = replace(loaded, table=model.continued(loaded.table))
+        pushes = len(loaded.table.pushes)
+        loaded = replace(loaded, table=unseen(model, loaded.table))
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.outside.any() else model
@@ -72,11 +78,20 @@ class Question:
             inside=~own.outside,
             held_out=table.take(held),
             shifted=shift.inputs,
+            trained=pushes - len(loaded.table.pushes),
         )
 
     def share(self, channel: str) -> float:
         """The part of alpha that a channel may spend."""
         return SHARES[channel] * self.alpha
+
+
+def unseen(model: PushModel, table: PushTable) -> PushTable:
+    """The windows of pushes that the model was not trained on; covariates that only grow go on from its trace.
+
+    A model fits its training pushes better than others, which would look like a change between recordings.
+    """
+    return model.continued(table.take(~np.isin(table.push_id, trained_on(model, table))))
 
 
 def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequence[str] | None) -> None:
@@ -85,7 +100,8 @@ def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequenc
     if not len(model.training):
         raise RequestError("model", model.name, "one that was trained on pushes: retrain it on those at hand")
     if len(table.pushes) < FEWEST_PUSHES:
-        raise RequestError("pushes", len(table.pushes), f"at least {FEWEST_PUSHES}, preferably hundreds")
+        accepted = f"at least {FEWEST_PUSHES} that the model was not trained on, preferably hundreds"
+        raise RequestError("pushes", len(table.pushes), accepted)
     for name in covariates or ():
         if name not in table.covariates or name in LOCAL:
             raise RequestError("covariate", name, f"one of {', '.join(sorted({*table.covariates} - {*LOCAL}))}")

@@ -136,7 +136,7 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         remaining=None,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(question.loaded)),
+        notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(question)),
     )
 
 
@@ -177,7 +177,7 @@ def _of_motion(question: Question, found: Searched) -> Trace:
             for fault in found.harmless
             for size in fault.parameters
         ),
-        notes=(*notes_of(question.loaded, found), *notes_of_shift(question.shifted)),
+        notes=(*notes_of(question, found), *notes_of_shift(question.shifted)),
     )
 
 

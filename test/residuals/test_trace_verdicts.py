@@ -21,6 +21,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
+from push_predictor.recordings.table import concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
@@ -28,10 +29,11 @@ from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEff
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, MotionTerm
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.evidence.input_shift import about_mechanics
-from push_predictor.residuals.evidence.loading import LoadedData, cut_again
+from push_predictor.residuals.evidence.loading import LoadedData, cut_again, with_inputs
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace, trace_json
 from push_predictor.residuals.question import Question
+from push_predictor.residuals.reporting.notes import notes_of_data
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.sentences import answer, worth
 from push_predictor.residuals.selection.naming import Naming
@@ -302,3 +304,15 @@ def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() ->
     assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "session")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1
     assert found.terms[0].exact and found.gain_nlpd.value < 0.0
+
+
+def test_pushes_that_the_model_was_trained_on_are_not_judged() -> None:
+    """A model fits these better than others: next to later ones that looks like a change between the recordings."""
+    model, later = learnt(), faultless()
+    both = replace(later, table=concatenate([later.table, with_inputs(model.training)]), recordings=None)
+    question = Question.of(model, both)
+    assert question.trained == len(model.training.pushes)
+    assert not {*question.windows.pushes, *question.held_out.pushes} & {*model.training.pushes}
+    assert f"trained on {question.trained} of the pushes" in " ".join(notes_of_data(question))
+    with pytest.raises(RequestError, match=r"pushes: 0 .*that the model was not trained on"):
+        Question.of(model, replace(both, table=with_inputs(model.training)))

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from push_predictor.residuals.channel_search import Searched
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Sized
+from push_predictor.residuals.question import Question
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     covariate_phrase,
@@ -33,15 +33,17 @@ NOT_TRIED = (
 NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
-def notes_of(loaded: LoadedData, found: Searched) -> tuple[str, ...]:
+def notes_of(question: Question, found: Searched) -> tuple[str, ...]:
     """Notes on the data, and on what was found or not tried in addition to the verdict."""
-    return (*notes_of_data(loaded), *_of_motion(found.motion), *_of_other_channels(found))
+    return (*notes_of_data(question), *_of_motion(found.motion), *_of_other_channels(found))
 
 
-def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
-    """How the pushes were split, and which covariates were dropped."""
-    dropped = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in loaded.dropped.items())
-    return (f"Split: {RULE}. Windows of one push stay together.", *dropped)
+def notes_of_data(question: Question) -> tuple[str, ...]:
+    """How the pushes were split, and which pushes and covariates were dropped."""
+    dropped = question.loaded.dropped
+    covariates = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in dropped.items())
+    known = f"The model was trained on {question.trained} of the pushes: they are not judged."
+    return (f"Split: {RULE}. Windows of one push stay together.", *[known] * bool(question.trained), *covariates)
 
 
 def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:

@@ -222,7 +222,7 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
         bare = JointEffects.of([effect]).shifted(on, push)[1].transpose(0, 2, 1)
     else:
         bare = design_of(effect.mechanism, DriverBasis("constant"), on, push, effect.outcome_scale)
-    return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
+    return np.asarray(np.einsum("nij,njq->niq", rows.whitener, bare))
 
 
 def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: IntArray) -> Bins:
