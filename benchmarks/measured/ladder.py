@@ -160,6 +160,9 @@ def parameters(effect: Effect) -> list[str]:
 
 
 def _column(effect: Effect, k: int) -> str:
+    k -= effect.basis.offset
+    if k < 0:
+        return "constant"
     if effect.basis.name == "category":
         return f"{effect.covariate} {effect.basis.levels[k + 1]:g}"
     return f"column {k + 1} of {effect.basis.name}"
