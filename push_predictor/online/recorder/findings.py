@@ -9,11 +9,11 @@ from collections import deque
 
 import numpy as np
 
+from push_predictor.errors import RecordingError
 from push_predictor.online.recorder.pace import Pace
 from push_predictor.online.recorder.progress import StreamFigures
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
-from push_predictor.recordings.decoder.poses import PoseFrame
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STREAMS, sources_of
 from push_predictor.recordings.fields.sources import Source
 from push_predictor.recordings.rig import Rig
@@ -44,12 +44,15 @@ class Findings:
     def add_topic(self, topic: str, type_name: str, schema: str) -> None:
         """State the type of a topic; schema: its definition, '' if unknown. One that does not fit becomes a problem."""
         self._types[topic] = type_name
-        for name, pose in self._decoder.poses.items():
-            if isinstance(pose, PoseFrame) and key_of(pose.source.topic) == key_of(topic):
-                self._try(name, lambda pose=pose: pose.source.check_type(type_name, ""))
-        for name, each in self._decoder.inputs().items():
-            if name in STREAMS and key_of(each.source.topic) == key_of(topic):
-                self._try(name, lambda each=each: each.declare(type_name, {type_name: schema}))
+        for name, source in sources_of(self._decoder.topics):
+            if name not in STREAMS or key_of(source.topic) != key_of(topic):
+                continue
+            try:
+                source.check_type(type_name, "")
+                if not source.frame:
+                    self._decoder.inputs()[name].declare(type_name, {type_name: schema})
+            except RecordingError as error:
+                self._refused[name] = str(error)
 
     def set_rig(self, rig: Rig) -> None:
         """Find windows of this rig from now on, and in the last EARLY portions."""

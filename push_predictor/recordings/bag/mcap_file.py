@@ -285,9 +285,10 @@ class McapFile:
     def _use_metadata(self, stream: BinaryIO, place: MetadataIndex) -> bool:
         """Store the record that an index points to; returns whether it is there."""
         try:
-            offset = min(place.offset, self._size)
-            opcode, length = HEAD.unpack(read_at(stream, offset, HEAD.size))
-            if opcode != Opcode.METADATA or HEAD.size + length != place.length or offset + place.length > self._size:
+            if place.offset + place.length > self._size:
+                raise ValueError("the metadata index points outside the file")
+            opcode, length = HEAD.unpack(read_at(stream, place.offset, HEAD.size))
+            if opcode != Opcode.METADATA or HEAD.size + length != place.length:
                 raise ValueError("the metadata index points to a place without a metadata record")
             record = parse(Metadata, stream.read(length))
             if record.name != place.name:
@@ -295,7 +296,7 @@ class McapFile:
         except UNREADABLE as error:
             self._note(place.offset, f"{error or type(error).__name__}; a metadata record is expected there")
             return False
-        self._add(record, offset)
+        self._add(record, place.offset)
         return True
 
     def _check_end(self, stream: BinaryIO, end: int, chunks: list[int]) -> None:
