@@ -11,6 +11,7 @@ from likelihoods import log_marginal_likelihood
 from scipy.stats import multivariate_normal
 
 from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, log_likelihood_and_gradient
 from push_predictor.types import Array
 
@@ -140,3 +141,19 @@ def test_jumps_are_learnt_from_part_of_the_rows(n: int) -> None:
     inputs = np.column_stack([3.0 * side + along, rng.uniform(-1.0, 1.0, n)])
     inputs, outputs = ((x - x.mean(axis=0)) / x.std(axis=0) for x in (inputs, outputs))
     assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
+
+
+def test_a_rough_fit_has_the_hyperparameters_of_some_rows_and_a_whole_one_those_of_all() -> None:
+    inputs, outputs = rows(MOST_SEARCHED + 50)
+    few = some_rows(len(outputs), MOST_SEARCHED)
+    rough, of_few, whole = (
+        fit_gp(inputs, outputs, rough=True),
+        fit_gp(inputs[few], outputs[few], rough=True),
+        fit_gp(inputs, outputs),
+    )
+    assert rough.parameters.log_noise_sd == of_few.parameters.log_noise_sd
+    assert len(rough.outputs) == len(outputs)
+    of_rough, of_whole = (
+        np.abs(log_likelihood_and_gradient(inputs, outputs, fit.parameters)[1]).max() for fit in (rough, whole)
+    )
+    assert of_whole < 0.1 * of_rough

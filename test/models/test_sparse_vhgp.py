@@ -110,6 +110,7 @@ def test_held_out_prediction_does_not_depend_on_the_row_itself() -> None:
     shifted = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
     one, other = (model.held_out(np.arange(300)).mean[7] for model in (sparse, shifted))
     assert one == pytest.approx(other, abs=1e-9)
+    assert "solved" not in vars(shifted)  # (n, m) matrices
     assert shifted.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
 
 
