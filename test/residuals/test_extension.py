@@ -78,6 +78,15 @@ def test_the_uncertainty_of_a_models_own_effects_is_not_scaled(deployed: PushMod
     assert np.all(scale_of(found) < scale_of(new_windows(deployed, ANALYSIS).calibrated()))
 
 
+def test_scaled_predictions_are_those_of_the_model_with_scaled_deviations(deployed: PushModel) -> None:
+    model = with_idle_effect(overconfident(deployed, 0.5), 0.01)
+    unseen = new_windows(model, ANALYSIS)
+    expected = new_windows(unseen.calibrated(), HELD_OUT)
+    found = new_windows(model, HELD_OUT).scaled(unseen.factor())
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(found.mean, expected.mean)
+
+
 def test_uncertainty_of_an_effect_of_zero_is_no_gain(deployed: PushModel) -> None:
     """Against an overconfident refit the widened interval alone would look like a gain."""
     refit = overconfident(deployed, 0.5)

@@ -16,6 +16,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.inputs_basis import controls_for
 from push_predictor.residuals.selection.gate import Gate
 
 ALPHA = 0.01
@@ -40,6 +41,16 @@ def p_values(gate: Gate) -> dict[Label, float]:
     for candidate, p in zip(gate.candidates, screened.p_value.tolist(), strict=True):
         found[candidate.label] = min(p, found.get(candidate.label, 1.0))
     return found
+
+
+def test_what_a_candidate_is_projected_off_is_free_of_the_controls_of_its_kind() -> None:
+    found = gate(learnt(), pushes(COUNT, 500))
+    kinds = {c.kind: c for c in found.candidates if c.nuisance is not None}
+    assert "driven" in kinds
+    for kind, c in kinds.items():
+        controls, nuisance = controls_for(kind, found.inputs), np.asarray(c.nuisance)
+        columns = nuisance.reshape(len(controls), -1)  # of each output
+        assert np.abs(controls.T @ columns).max(initial=0.0) < 1e-7 * np.abs(controls).max(initial=1.0) * len(controls)
 
 
 @pytest.mark.parametrize("seed", [500, 501])

@@ -18,8 +18,10 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import screening_bases
 from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of
+from push_predictor.residuals.question import Question
 from push_predictor.types import Array
 
 
@@ -139,6 +141,18 @@ def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTa
     assert wider.z == pytest.approx(evidence.z / 3.0)
     same = evidence_of(model, slow)
     assert widened(same, model, input_shift(model, slow)) is same
+
+
+def test_the_question_has_the_analysis_pushes_alone_each_with_its_own_deviation(known: PushTable) -> None:
+    slow = with_inputs(known, 0, np.full(len(known), 0.02))
+    half = np.arange(len(known)) % 2 == 0
+    mixed = with_inputs(known, 0, np.where(half, 0.06, 0.02))
+    question = Question.of(trained(slow), LoadedData(mixed, None, square_rig()))
+    analysis = ~held_out_rows(mixed)
+    np.testing.assert_array_equal(question.inside, ~half[analysis])
+    plain = evidence_of(trained(slow), mixed.take(analysis))
+    factor = np.where(half[analysis], 3.0, 1.0)[:, None]
+    assert question.evidence.z == pytest.approx(plain.z / factor)
 
 
 @pytest.mark.parametrize("per_path", [True, False])

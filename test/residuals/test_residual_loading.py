@@ -59,6 +59,15 @@ def saved_table(folder: Path, name: str, table: PushTable) -> Path:
     return folder / f"{name}.csv"
 
 
+def test_recordings_of_different_rigs_are_refused(tmp_path: Path) -> None:
+    recording = translating_push(Push())
+    assert recording.rig is not None
+    other = replace(recording, name="other", rig=replace(recording.rig, pusher_radius=0.006))
+    write_recording(tmp_path / "other", other)
+    with pytest.raises(RigError, match="differ"):
+        load_evidence([saved(tmp_path, "one"), tmp_path / "other"])
+
+
 def test_recording_has_every_documented_covariate_and_its_scalar_topics(tmp_path: Path) -> None:
     start = int(translating_push().slider.stamp[0])
     loaded = load_evidence([saved(tmp_path, "one", scalars=warming(start))])

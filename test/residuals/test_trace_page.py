@@ -343,6 +343,10 @@ def test_held_out_errors_are_shown_for_each_push_before_and_after() -> None:
         assert len(before.x) == len(after.x) == len(trace.held_out.table.pushes)
         late = before.x > JUMP.place
         assert np.mean(before.y[late]) > 1.3 * np.mean(after.y[late])
+    error = 1e3 * (shown[0].observed - shown[0].mean)[:, :2]
+    square = [np.mean(np.sum(error[shown[0].push_id == push] ** 2, axis=1)) for push in np.unique(shown[0].push_id)]
+    dots = next(mark for mark in position.marks if isinstance(mark, Dots))
+    np.testing.assert_allclose(dots.y, np.sqrt(square))
 
 
 def test_held_out_section_shows_errors_before_and_after_and_scores_with_intervals(pages: Callable[[str], str]) -> None:

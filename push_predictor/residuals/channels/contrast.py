@@ -20,7 +20,7 @@ from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import blocks_of
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.screening import Screened, block_scores, screen
+from push_predictor.residuals.selection.screening import Controlled, Screened, screen
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000
@@ -136,8 +136,11 @@ def inliers(z: Array, columns: Array, controls: Array) -> BoolArray:
 
 def screen_contrasts(z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0) -> Screened:
     """Screen contrasts on z (n, k), with the controls and the columns shared with training regressed out."""
-    scores = [block_scores(z, each.columns, np.column_stack([controls, each.shared]), block) for each in tried]
-    return screen(scores, seed)
+    known: dict[bytes, Controlled] = {}  # many share the same columns
+    for each in tried:
+        if (key := each.shared.tobytes()) not in known:
+            known[key] = Controlled.of(z, np.column_stack([controls, each.shared]), block)
+    return screen([known[each.shared.tobytes()].unit_scores(each.columns) for each in tried], seed)
 
 
 def best_and_rivals(

@@ -103,11 +103,6 @@ class Controlled:
         return unit_scores(*self.raw_scores(columns))
 
 
-def block_scores(z: Array, columns: Array, controls: Array, block: IntArray) -> Scores:
-    """Scores of columns (n, 3, p) for residuals z (n, 3), the controls (n, m) regressed out of both."""
-    return Controlled.of(z, controls, block).unit_scores(columns)
-
-
 def unit_scores(scores: Scores, information: Array) -> Scores:
     """Scores in coordinates in which the information (p, p) is the identity."""
     values, vectors = np.linalg.eigh(information)
