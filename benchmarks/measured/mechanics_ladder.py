@@ -28,7 +28,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.ladder import Rung
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import TrainingOptions, train_with_ladder
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_mechanics import fit_rows, predictor_about
 from push_predictor.recordings.load import different_supports
 from push_predictor.recordings.table import PushTable
@@ -63,7 +63,8 @@ def report(loaded: LoadedData, supports: Mapping[int, Array], options: TrainingO
     print(f"{len(search.pushes)} pushes for the fit, {len(held.pushes)} held out, sha256 {digest_of(held)[:12]}")
     begin = time.process_time()
     options = replace(options, supports=supports)
-    model, ladder = train_with_ladder(search, loaded.rig, "analytical", name="fitted", options=options)
+    ladder: list[Rung] = []
+    model = train_model(search, loaded.rig, "analytical", name="fitted", options=options, ladder=ladder)
     rows = ladder[0].fit.rows
     print(f"search on {len(rows.push)} windows of {rows.pushes} pushes: {time.process_time() - begin:.0f} CPU s\n")
     print(HEAD)

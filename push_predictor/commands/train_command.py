@@ -162,7 +162,7 @@ def _check(options: argparse.Namespace, kind: str) -> None:
 def _trained(
     options: argparse.Namespace, kind: str, table: PushTable, rig: Rig, supports: Mapping[int, Array]
 ) -> tuple[PushModel, list[Rung]]:
-    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_with_ladder, training_rows
+    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
 
     count = len(training_rows(table, options.n_train, options.seed))
     if m := inducing_inputs(kind, count, options.inducing):
@@ -176,8 +176,10 @@ def _trained(
         mean=options.mean or "auto",
     )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
+    ladder: list[Rung] = []
     with progress(f"train {kind}") as watch:
-        return train_with_ladder(table, rig, kind, name=name, sources=sources, options=choices, watch=watch)
+        model = train_model(table, rig, kind, name=name, sources=sources, options=choices, watch=watch, ladder=ladder)
+    return model, ladder
 
 
 def _ladder_files(out: Path) -> tuple[Path, Path]:

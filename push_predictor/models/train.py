@@ -84,28 +84,16 @@ def train_model(
     sources: Sequence[str] = (),
     options: TrainingOptions = TrainingOptions(),
     watch: Watch = no_watch,
+    ladder: list[Rung] | None = None,
 ) -> PushModel:
     """Train a model of one of KINDS on rows of the table.
 
     name: the model's name in files and requests. sources: names of the recordings or tables, for its provenance.
-    watch: called with each stage and the share of the work done, 0 to 1, when the stage begins.
+    watch: called with each stage and the share of the work done, 0 to 1, when the stage begins. ladder: a list to which
+    the steps of fitted mechanics are added, none for other models.
     A prior model needs no rows. Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or
     options that the kind does not have.
     """
-    return train_with_ladder(table, rig, kind, name=name, sources=sources, options=options, watch=watch)[0]
-
-
-def train_with_ladder(
-    table: PushTable,
-    rig: Rig,
-    kind: str,
-    *,
-    name: str,
-    sources: Sequence[str] = (),
-    options: TrainingOptions = TrainingOptions(),
-    watch: Watch = no_watch,
-) -> tuple[PushModel, list[Rung]]:
-    """Like `train_model`; also returns the ladder of fitted mechanics, empty for other models."""
     if kind not in KINDS:
         raise TrainingError(f"model: {kind!r} is not accepted, give one of {', '.join(KINDS)}")
     most = MOST_FITTED_ROWS if kind == "analytical" and options.fit else DEFAULT_ROWS
@@ -113,10 +101,12 @@ def train_with_ladder(
     if len(rows) < FEWEST_ROWS and kind != "prior":
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     with one_blas_thread():
-        predictor, ladder = _predictor(rows, rig, kind, options, watch)
+        predictor, steps = _predictor(rows, rig, kind, options, watch)
+    if ladder is not None:
+        ladder += steps
     watch(f"trained {kind} on {len(rows)} windows of {len(rows.pushes)} pushes", 1.0)
     provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
-    return PushModel(name, kind, rig, predictor, rows, provenance), ladder
+    return PushModel(name, kind, rig, predictor, rows, provenance)
 
 
 def _predictor(

@@ -213,6 +213,8 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("gp", put("correlation.rows", [0, 1]), "ValueError: matmul"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": -np.ones(40)}), r"site_precisions: numbers from"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": np.ones(39)}), "ValueError: matmul"),
+    ("sparse vhgp", put("regressions.0.inducing_signal", [3, 3]), "inducing_signal does not contain distinct"),
+    ("sparse vhgp", put("regressions.0.inducing_noise", [-1]), "inducing_noise does not contain distinct"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [40]), "IndexError: index 40 is out of bounds"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [0.5]), "inducing_noise: .*give an array of int64"),
     ("gp about mechanics", put("predictor.scaling.travel", 0.0), r"predictor\.scaling\.travel: numbers from"),

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from push_predictor.models.predictors.correlation import covariances
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along_all
 from push_predictor.models.tabulated.spline import spline_values, table_moments
 from push_predictor.types import Array
 
@@ -65,9 +65,7 @@ def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refuse
 
 def through(axes: Sequence[Axis], values: Array) -> TensorSpline:
     """The spline that takes values (cells_1 + 1, ..., K) at the knots."""
-    for k, axis in enumerate(axes):
-        values = along(k, axis.coarse_to_coefficients(axis.cells), values)
-    return TensorSpline(axes, values[None])
+    return TensorSpline(axes, along_all([axis.coarse_to_coefficients(axis.cells) for axis in axes], values[None]))
 
 
 def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
@@ -96,7 +94,7 @@ def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
 def test_few_nodes_resolve_a_smooth_function() -> None:
     axis = Axis(0.2, 3.0, 10)
     for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
-        knots = along(0, axis.nodes_to_knots(count), np.exp(-(axis.nodes(count) ** 2)))
+        knots = axis.nodes_to_knots(count) @ np.exp(-(axis.nodes(count) ** 2))
         assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
 
 

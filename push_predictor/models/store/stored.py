@@ -137,6 +137,13 @@ def _table(a: SimpleNamespace) -> None:
         raise ValueError(f"a training push is longer than {LONGEST_PUSH:g} m")
 
 
+def _sparse(a: SimpleNamespace) -> None:
+    for name in ("inducing_signal", "inducing_noise"):
+        rows = getattr(a, name)
+        if rows.ndim != 1 or np.any(rows < 0) or not 0 < len(np.unique(rows)) == len(rows):
+            raise ValueError(f"{name} does not contain distinct rows")
+
+
 def _fitted(a: SimpleNamespace) -> None:
     for name, value in a.values.items():
         _check_parameter(name, value, value)
@@ -219,6 +226,7 @@ def _check_covariance(covariance: Array) -> None:
 
 CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     PushTable: _table,
+    SparseVHGP: _sparse,
     FittedMechanics: _fitted,
     PushMechanics: _mechanics,
     PriorPredictor: _prior,

@@ -66,9 +66,7 @@ class TabulatedModel:
         if self.table is None:
             return model.predict_rows(inputs, duration, covariates)
         predictor = model.predictor
-        moments = predictor.base.of_outcomes(self._learnt(inputs, duration), push)
-        if predictor.effects:
-            moments = predictor.with_effects(moments, push)
+        moments = predictor.with_effects(predictor.base.of_outcomes(self._learnt(inputs, duration), push), push)
         return Prediction(*moments, model.supported(push), predictor.tails)
 
     def free_matrices(self) -> None:
