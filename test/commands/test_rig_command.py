@@ -18,6 +18,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.rig import Rig, load_rig
 
 BAG = str(REPOSITORY / "bags" / "hexagon_delrin")
+SQUARE_BAG = str(REPOSITORY / "bags" / "square_abs_test")
 ROUND_BAG = str(REPOSITORY / "bags" / "circle_pu")
 EXCHANGED = ["--slider-topic", "pusher/pose", "--pusher-topic", "slider/pose"]
 MEASURED = ["--tip-radius", "0.00475", "--surface", "plywood", "--mass", "0.8"]

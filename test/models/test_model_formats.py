@@ -207,6 +207,8 @@ def put(place: str, value: object) -> Change:
 
 EXTENDED = "analytical, extended"
 DAMAGES: list[tuple[str, Change, str]] = [
+    ("vhgp", put("regressions.0.parameters.noise_log_lengthscales", [[0.0]]), r"log_lengthscales: shape \(1, 1\)"),
+    ("gp", put("regressions.0.parameters.log_lengthscales", []), r"0\.parameters\.log_lengthscales: shape \(0,\)"),
     ("gp", put("predictor.class", "Popen"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.class", "PushTable"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.scaling.class", "Tails"), r"predictor\.scaling: .*give an object of class Scaling"),
@@ -236,8 +238,6 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("gp", put("correlation.rows", [0, 1]), "correlation: residuals of shape"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": -np.ones(40)}), r"site_precisions: numbers from"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": np.ones(39)}), "site_precisions of shape"),
-    ("vhgp", put("regressions.0.parameters.noise_log_lengthscales", [[0.0]]), "noise_log_lengthscales of shape"),
-    ("gp", put("regressions.0.parameters.log_lengthscales", []), "log_lengthscales of shape"),
     ("sparse vhgp", put("regressions.0.inducing_signal", [3, 3]), "inducing_signal does not contain distinct"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [-1]), "inducing_noise does not contain indices below 40"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [40]), "inducing_noise does not contain indices below 40"),

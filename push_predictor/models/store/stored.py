@@ -151,14 +151,7 @@ def _correlation(a: SimpleNamespace) -> None:
         raise ValueError(f"residuals of shape {a.residuals.shape}, {(n, 3)} is needed")
 
 
-def _lengthscales(a: SimpleNamespace) -> None:
-    for name, values in vars(a.parameters).items():
-        if name.endswith("log_lengthscales") and values.shape != a.inputs.shape[1:]:
-            raise ValueError(f"{name} of shape {values.shape}, {a.inputs.shape[1:]} is needed")
-
-
 def _vhgp(a: SimpleNamespace) -> None:
-    _lengthscales(a)
     if a.site_precisions.shape != a.outputs.shape:
         raise ValueError(f"site_precisions of shape {a.site_precisions.shape}, {a.outputs.shape} is needed")
 
@@ -268,7 +261,6 @@ CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     PushTable: _table,
     Tails: _tails,
     Correlation: _correlation,
-    GaussianProcess: _lengthscales,
     VHGP: _vhgp,
     SparseVHGP: _sparse,
     FittedMechanics: _fitted,
