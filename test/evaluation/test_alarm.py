@@ -60,7 +60,7 @@ def fired_after(alarm: Alarm, pushes: Array) -> int | None:
 @pytest.mark.parametrize(("rate", "calibration"), [(0.1, 5), pytest.param(0.1, 60, marks=pytest.mark.long)])
 def test_false_alarm_probability_is_at_most_the_rate(rate: float, calibration: int):
     """With few calibration pushes just as with many; the union over two scores that depend leaves room."""
-    runs, pushes = 200, 40
+    runs, pushes = 400, 40
     fired = sum(
         fired_after(Alarm(KINDS, rows[:calibration], rate, seed), rows[calibration:]) is not None
         for seed in range(runs)
