@@ -207,7 +207,7 @@ def put(place: str, value: object) -> Change:
 
 EXTENDED = "analytical, extended"
 DAMAGES: list[tuple[str, Change, str]] = [
-    ("vhgp", put("regressions.0.parameters.noise_log_lengthscales", [[0.0]]), r"log_lengthscales: shape \(1, 1\)"),
+    ("vhgp", put("regressions.0.parameters.noise_log_lengthscales", [[0.0] * 3]), r"log_lengthscales: shape \(1, 3\)"),
     ("gp", put("predictor.class", "Popen"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.class", "PushTable"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.scaling.class", "Tails"), r"predictor\.scaling: .*give an object of class Scaling"),
