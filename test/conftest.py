@@ -32,7 +32,7 @@ sys.dont_write_bytecode = False
 threadpool_limits(limits=1, user_api="blas")  # of this process, which has loaded numpy already
 # A busy machine is no failure. In CI the examples are the same each time; at a desk they are drawn anew.
 settings.register_profile("unhurried", deadline=None, derandomize="CI" in os.environ)
-settings.register_profile("short", settings.get_profile("unhurried"), max_examples=25)
+settings.register_profile("short", settings.get_profile("unhurried"), max_examples=15)
 settings.load_profile("unhurried")
 MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
 NEEDS_ROS = re.compile(
@@ -54,7 +54,7 @@ DRAWN_AS_FOR_READERS = {"test_canvas", "test_paper_report"}
 def pytest_configure(config: pytest.Config) -> None:
     """One folder of kept tables for the whole run, empty at its start: the servers of a run share their tables.
 
-    Without the long tests, a quarter of the examples: each run at a desk draws others.
+    Without the long tests, 15 examples of 100: each run at a desk draws others.
     """
     if "not long" in config.option.markexpr:
         settings.load_profile("short")

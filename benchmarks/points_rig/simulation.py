@@ -6,7 +6,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from benchmarks.points_rig.balance import Contact, solve
 from benchmarks.points_rig.drivers import View
@@ -52,6 +51,8 @@ class Tracks:
 
 def draw_noise(random: np.random.Generator, rig: Rig, session: Session, ratio: float = 1.0) -> Noise:
     """Half the variance is fixed for a push, half wanders within it; `ratio` multiplies the amplitudes."""
+    from scipy.signal import lfilter  # its import takes half a second
+
     steps, pushes = int(np.ceil(session.length.max() / STEP)), len(session)
     keep = float(np.exp(-STEP / MEMORY))
     shocks = random.normal(0.0, 1.0, (steps, pushes, 4)) * np.sqrt(1 - keep**2)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
+from push_predictor.recordings.checks.data_checks import DataChecks
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig
@@ -24,8 +26,15 @@ from push_predictor.recordings.write import write_recording
 
 SOUND = REPOSITORY / "bags" / "circle_pu"
 SMALL = REPOSITORY / "bags" / "hexagon_delrin"
-REFUSED = ("both in mm", "no orientation")  # test_checks makes every mistake; these are of each kind
-WARNED = ("turned", "wrench of the wrong sign")
+REFUSED, WARNED = "both in mm", "wrench of the wrong sign"  # test_checks makes every mistake
+COMMANDS: dict[str, Callable[[Path, Path, str], list[str | Path]]] = {
+    "train": lambda model, out, data: ["train", data, "--kind", "analytical", "--force", "--out", out / "m.pushmodel"],
+    "evaluate": lambda model, out, data: ["evaluate", model, data],
+    "validate": lambda model, out, data: ["validate", model, data],
+    "trace": lambda model, out, data: ["trace", model, data],
+    "suggest": lambda model, out, data: ["suggest", model, "--count", "1", "--out", out / "next.csv", "--matter", data],
+    "report": lambda model, out, data: ["report", "validation", model, "--out", out, "--recording", data],
+}
 
 
 def lines_of(capsys: pytest.CaptureFixture[str]) -> list[str]:
@@ -37,7 +46,7 @@ def lines_of(capsys: pytest.CaptureFixture[str]) -> list[str]:
 def altered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Recordings with a mistake, by the mistake's name."""
     folder, sound = tmp_path_factory.mktemp("mistakes"), read_recording(SMALL)
-    paths = {name: folder / name.replace(" ", "_") for name in (*REFUSED, *WARNED)}
+    paths = {name: folder / name.replace(" ", "_") for name in (REFUSED, WARNED)}
     for name, path in paths.items():
         write_recording(path, MISTAKES[name][0](sound))
     return paths
@@ -59,27 +68,40 @@ def train(tmp_path: Path, *words: str | Path, kind: str = "analytical") -> int:
     return status
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_train_refuses(altered: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert train(tmp_path, altered[name]) == 1
-    (line,) = lines_of(capsys)
-    assert line.startswith(f"push_predictor train: {altered[name]}: ")
-
-
-@pytest.mark.parametrize("name", WARNED)
-def test_train_warns_once(
-    altered: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_that_reads_data_checks_them(
+    command: str,
+    altered: dict[str, Path],
+    model: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    train(tmp_path, altered[name])  # which may also find no push
-    assert len([line for line in lines_of(capsys) if line.startswith(f"warning: {altered[name]}: ")]) == 1
+    """Refusals end it; warnings are shown once, and end it with --strict, which `suggest` does not have."""
+    monkeypatch.setattr("push_predictor.design.batch.CANDIDATES", 16)
+
+    def run(name: str, *words: str) -> tuple[int, list[str]]:
+        status = main([*map(str, COMMANDS[command](model, tmp_path, str(altered[name]))), *words])
+        return status, lines_of(capsys)
+
+    status, (line,) = run(REFUSED)
+    assert status == 1 and line.startswith(f"push_predictor {command}: {altered[REFUSED]}: ")
+    assert "its positions are probably in mm" in line
+    if command != "report":  # whose pictures take seconds
+        warned = [line for line in run(WARNED)[1] if "change the sign" in line]
+        assert len(warned) == 1 and warned[0].startswith(f"warning: {altered[WARNED]}: ")
+    if command != "suggest":
+        status, (line,) = run(WARNED, "--strict")
+        assert status == 1 and line.startswith(f"push_predictor {command}: {altered[WARNED]}: ")
+        assert "change the sign" in line
 
 
-def test_train_fails_with_strict_and_states_the_warning(
-    altered: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert train(tmp_path, altered["turned"], "--strict") == 1
-    (line,) = lines_of(capsys)
-    assert line.startswith(f"push_predictor train: {altered['turned']}: The slider is turned by -4.0 degrees")
+def test_a_warning_is_shown_once_however_often_the_data_are_read(altered: dict[str, Path]) -> None:
+    shown: list[str] = []
+    checks, recording = DataChecks(False, shown.append), read_recording(altered[WARNED])
+    for _ in range(2):
+        checks(altered[WARNED], recording, None)
+    assert len(shown) == 1
 
 
 def test_a_sound_recording_trains_with_strict_and_without_a_word(
@@ -112,29 +134,6 @@ def test_a_learnt_model_wants_more_than_a_few_pushes(tmp_path: Path, capsys: pyt
     assert train(tmp_path, first, "--strict") == 0
 
 
-@pytest.mark.parametrize("command", ["validate", "trace"])
-def test_the_other_commands_check_as_train_does(
-    altered: dict[str, Path], model: Path, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    def run(name: str, *words: str) -> list[str]:
-        path = str(altered[name])
-        main(["validate", str(model), path, *words] if command == "validate" else ["trace", str(model), path])
-        return lines_of(capsys)
-
-    assert any("its positions are probably in mm" in line for line in run("both in mm"))
-    assert any(line.startswith("warning:") and "change the sign" in line for line in run("wrench of the wrong sign"))
-
-
-def test_validate_and_trace_fail_with_strict(
-    altered: dict[str, Path], model: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    wrong = str(altered["wrench of the wrong sign"])
-    assert main(["validate", str(model), wrong, "--strict"]) == 1
-    assert main(["trace", str(model), wrong, "--strict"]) == 1
-    lines = lines_of(capsys)
-    assert [line.split(":")[0] for line in lines] == ["push_predictor validate", "push_predictor trace"]
-
-
 MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
@@ -158,29 +157,3 @@ def test_few_pushes_limit_the_results_of_the_commands_that_judge(
     assert main([*words, "--strict"]) == 1
     (line,) = lines_of(capsys)
     assert line.startswith(f"push_predictor {command}: {few}: The data contain") and line.endswith(MEANING)
-
-
-def test_evaluate_and_suggest_check_as_train_does(
-    altered: dict[str, Path],
-    model: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("push_predictor.design.batch.CANDIDATES", 16)
-    suggest = ["suggest", str(model), "--count", "1", "--out", str(tmp_path / "next.csv"), "--matter"]
-    for words in (["evaluate", str(model)], suggest):
-        assert main([*words, str(altered["both in mm"])]) == 1
-        assert "its positions are probably in mm" in lines_of(capsys)[0]
-        main([*words, str(altered["wrench of the wrong sign"])])  # suggest: an analytical model has nothing to learn
-        assert any("change the sign" in line for line in lines_of(capsys))
-
-
-def test_a_report_checks_the_recording(
-    altered: dict[str, Path], model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["report", "validation", str(model), "--out", str(tmp_path), "--recording"]
-    assert main([*words, str(altered["both in mm"])]) == 1
-    assert "its positions are probably in mm" in lines_of(capsys)[0]
-    assert main([*words, str(altered["wrench of the wrong sign"]), "--strict"]) == 1
-    assert "change the sign" in lines_of(capsys)[0]

@@ -48,9 +48,3 @@ def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simu
     assert told["from push"] == 2
     assert places.truth.parent not in (places.recorded, places.whole)
     assert not any(told["mechanism"].encode() in path.read_bytes() for path in places.recorded.iterdir())
-
-
-@pytest.mark.slow
-def test_same_seed_same_effect(tmp_path, short):
-    first, second = (json.loads(make_hidden(tmp_path / name, 3).truth.read_text()) for name in "ab")
-    assert first == second

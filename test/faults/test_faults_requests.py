@@ -21,12 +21,10 @@ import numpy as np
 import pytest
 import ros_harness as harness
 from drifting_models import extended, pushes, slippery
-from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Vector3
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from server_bench import Server, hosted_server_of
-from std_msgs.msg import Header
 from synthetic import square_rig
 
 from msg_adapters.predictions import PushQuery, query_to_batch_request, query_to_request
@@ -42,8 +40,7 @@ from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.validator import parameters as validator_parameters
-from push_predictor_interfaces.msg import PushStep
-from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes, SuggestPushes
 
 NAN, INF = math.nan, math.inf
 TABLES = {
@@ -70,59 +67,30 @@ def server(models: dict[str, PushModel], tmp_path_factory: pytest.TempPathFactor
     for name, model in models.items():
         save_model(model, folder / f"{name}.model")
     with hosted_server_of([folder], default_model="vhgp") as running:
-        running.extra = {
-            kind.Request: running.node.create_client(kind, name)
-            for kind, name in ((PredictSliderPose, "predict_slider_pose"), (RolloutPushes, "rollout_pushes"))
-        }
         yield running
 
 
 # --- through the services -----------------------------------------------------------------------------------------
 
-BAD: list[tuple[str, dict[str, Any]]] = [
-    ("velocity: nan", {"push": (NAN, 0.1, 0.2)}),
-    ("velocity: inf", {"push": (INF, 0.1, 0.2)}),
-    ("velocity: -0.02", {"push": (-0.02, 0.1, 0.2)}),
-    ("velocity: 0.0", {"push": (0.0, 0.1, 0.2)}),
-    ("contact: 1.0", {"push": (0.02, 1.0, 0.2)}),
-    ("contact: -inf", {"push": (0.02, -INF, 0.2)}),
-    ("angle: 1.6", {"push": (0.02, 0.1, 1.6)}),
-    ("angle: nan", {"push": (0.02, 0.1, NAN)}),
-    ("duration: nan", {"duration": NAN}),
-    ("duration: 3.0", {"duration": 3.0}),
-    ("duration: -0.2", {"duration": -0.2}),
-    ("velocity: 1e+300", {"push": (1e300, 0.1, 0.2), "model": "analytical"}),
-    ("velocity: 0.02", {"duration": 1e9, "model": "analytical"}),
-    ("velocity: 1000.0", {"push": (1000.0, 0.1, 0.2), "model": "drifting", "covariates": {"elapsed_time": 1.0}}),
-    ("model: 'nobody'", {"model": "nobody"}),
-    ("covariate elapsed_time: 'missing'", {"model": "drifting"}),
-    ("covariate elapsed_time: nan", {"model": "drifting", "covariates": {"elapsed_time": NAN}}),
-    ("covariate other: inf", {"covariates": {"other": INF}}),
-]
+
+REQUESTS = {
+    "predict_push": PredictPush,
+    "predict_push_batch": PredictPushBatch,
+    "predict_slider_pose": PredictSliderPose,
+    "rollout_pushes": RolloutPushes,
+    "suggest_pushes": SuggestPushes,
+}
 
 
-def test_rejects_bad_requests_by_field_and_value_and_continues(server: Server) -> None:
-    """Median response times are printed only, because the machine's load varies."""
-    good, before = answered(server)
-    for refusal, asked in BAD:
-        asked = {"push": (0.02, 0.1, 0.2), **asked}
-        response = server.push(**asked)
-        assert not response.success and not np.any(response.mean), refusal
-        assert response.message.startswith(f"{refusal} is not accepted, give "), response
-        batch = server.batch(
-            [(0.02, 0.1, 0.2), asked["push"]], **{k: doubled(v) for k, v in asked.items() if k != "push"}
-        )
-        assert not batch.success and not len(batch.mean), refusal
-        assert " is not accepted, give " in batch.message and refusal.split(":")[0] in batch.message
-        assert list(server.push().mean) == good
-    last, after = answered(server)
-    assert last == good
-    print(f"an answer took {1e6 * before:.0f} us before, {1e6 * after:.0f} us after: {after / before:.2f}")
-
-
-def doubled(value: Any) -> Any:
-    """The covariates of one push as those of two."""
-    return {name: np.full(2, number) for name, number in value.items()} if isinstance(value, dict) else value
+@pytest.mark.parametrize("name", REQUESTS)
+def test_a_bad_request_gets_reason_and_code_and_the_next_one_its_answer(name: str, server: Server) -> None:
+    """What each service refuses: test_error_codes."""
+    kind, good = REQUESTS[name], list(server.push().mean)
+    client = server.node.create_client(kind, name)
+    response = harness.call(client, kind.Request(model="nobody"))
+    assert not response.success and response.message.startswith("model: 'nobody' is not accepted, give one of ")
+    assert response.error_code == response.UNKNOWN_MODEL
+    assert list(server.push().mean) == good
 
 
 def answered(server: Server, count: int = 20) -> tuple[list[float], float]:
@@ -133,56 +101,6 @@ def answered(server: Server, count: int = 20) -> tuple[list[float], float]:
         mean = list(server.push().mean)
         taken.append(time.perf_counter() - begun)
     return mean, statistics.median(taken)
-
-
-def pose_request(**change: Any) -> PredictSliderPose.Request:
-    fields = {
-        "header": Header(frame_id="world"),
-        "slider": Pose(orientation=Quaternion(w=1.0)),
-        "pusher": Point(x=-0.04975, y=0.01),
-        "pusher_velocity": Vector3(x=0.02, y=0.002),
-        "duration": 0.2,
-    }
-    return PredictSliderPose.Request(**{**fields, **change})
-
-
-def rollout_request(**change: Any) -> RolloutPushes.Request:
-    step = {"velocity": 0.02, "contact": 0.1, "angle": 0.2, "duration": 0.6}
-    slider = PoseWithCovariance(pose=Pose(orientation=Quaternion(w=1.0)))
-    model = change.pop("model", "")
-    return RolloutPushes.Request(
-        header=Header(frame_id="world"),
-        slider=slider,
-        particles=10,
-        model=model,
-        steps=[PushStep(**{**step, **change})],
-    )
-
-
-@pytest.mark.parametrize(
-    ("refusal", "request_"),
-    [
-        ("", pose_request()),
-        ("pusher_velocity.x: nan", pose_request(pusher_velocity=Vector3(x=NAN))),
-        ("slider.position.x: inf", pose_request(slider=Pose(position=Point(x=INF), orientation=Quaternion(w=1.0)))),
-        ("duration: inf", pose_request(duration=INF)),
-        ("velocity: 1e+200", pose_request(pusher_velocity=Vector3(x=1e200), model="analytical")),
-        ("model: 'nobody'", pose_request(model="nobody")),
-        ("", rollout_request()),
-        ("steps[0].velocity: nan", rollout_request(velocity=NAN)),
-        ("steps[0].angle: 1.6", rollout_request(angle=1.6)),
-        ("steps[0].duration: inf", rollout_request(duration=INF)),
-        ("steps[0].duration: 1e+300", rollout_request(duration=1e300)),
-        ("steps[0].velocity: 1e+300", rollout_request(velocity=1e300, model="analytical")),
-        ("steps[0].duration: nan", rollout_request(duration=NAN, model="analytical")),
-    ],
-)
-def test_rejects_bad_poses_and_rollouts(server: Server, refusal: str, request_: Any) -> None:
-    good = list(server.push().mean)
-    response = harness.call(server.extra[type(request_)], request_)
-    assert response.success == (not refusal), response.message
-    assert not refusal or response.message.startswith(f"{refusal} is not accepted, give "), response.message
-    assert list(server.push().mean) == good
 
 
 @pytest.mark.parametrize("size", [10**5, pytest.param(10**6, marks=pytest.mark.long)])

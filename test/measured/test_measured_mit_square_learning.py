@@ -6,16 +6,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from likelihoods import log_marginal_likelihood
 from mit_square_fits import fit_scaled, load_square, mean_scores, random_split
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
 from push_predictor.models.gaussian_process.prediction import gaussian_log_density
+from push_predictor.types import Array
 
 
 @pytest.mark.long
@@ -43,6 +43,15 @@ def test_gp_scores_what_the_reference_scores(
     assert gp.nlpd == pytest.approx(nlpd, abs=0.02)
 
 
+def fitted_by_scikit_learn(inputs: Array, outputs: Array) -> Any:
+    """Imported here: it would take each worker of the tests 0.8 s."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+    kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
+    return GaussianProcessRegressor(kernel, alpha=0.0).fit(inputs, outputs)
+
+
 def test_gp_equals_scikit_learn_given_its_hyperparameters(measured_data: Path) -> None:
     square = load_square(measured_data)
     training, test = random_split(100, 0)
@@ -52,8 +61,7 @@ def test_gp_equals_scikit_learn_given_its_hyperparameters(measured_data: Path) -
     for k in range(3):
         outputs = (y[:, k] - y[:, k].mean()) / y[:, k].std()
         expected = (square.outputs[test, k] - y[:, k].mean()) / y[:, k].std()
-        kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
-        theirs = GaussianProcessRegressor(kernel, alpha=0.0).fit(scaled, outputs)
+        theirs = fitted_by_scikit_learn(scaled, outputs)
         mean, sd = theirs.predict(new, return_std=True)
         log_variance, *log_lengthscales, log_noise = theirs.kernel_.theta
         parameters = GpParameters(np.array(log_lengthscales), log_variance / 2, log_noise / 2)
@@ -69,7 +77,6 @@ def test_gp_finds_as_good_a_likelihood_as_scikit_learn(measured_data: Path) -> N
     training, _ = random_split(200, 0)
     fitted = fit_scaled(square.inputs[training], square.outputs[training], "gp")
     for ours in fitted.models:
-        kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
-        theirs = GaussianProcessRegressor(kernel, alpha=0.0).fit(ours.inputs, ours.outputs)
+        theirs = fitted_by_scikit_learn(ours.inputs, ours.outputs)
         assert isinstance(ours, GaussianProcess)
         assert log_marginal_likelihood(ours) >= theirs.log_marginal_likelihood_value_ - 0.01

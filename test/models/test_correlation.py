@@ -30,7 +30,6 @@ from push_predictor.models.predictors.correlation import (
     fit_correlation,
 )
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.tabulated.table_nodes import unbounded
@@ -269,15 +268,3 @@ def test_sums_of_no_rows_give_independence() -> None:
 
 
 # --- files ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["gp", "vhgp"])
-def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> None:
-    model = trained_once(kind)
-    save_model(model, tmp_path / "m")
-    loaded = load_model(tmp_path / "m")
-    assert isinstance(loaded.predictor, GaussianProcessPredictor) and loaded.predictor.correlation is not None
-    inputs = model.training.inputs + [0.0, 0.01, 0.01]
-    push = Push(inputs, np.full(len(inputs), 0.2), {})
-    for ours, theirs in zip(model.predictor.moments(push), loaded.predictor.moments(push), strict=True):
-        assert np.array_equal(ours, theirs)

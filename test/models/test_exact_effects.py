@@ -17,7 +17,6 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, joint, joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
-from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, mechanism_named
@@ -174,10 +173,6 @@ def test_the_heading_of_the_slider_turns_effects_of_the_table() -> None:
 
 
 # --- in a model ----------------------------------------------------------------------------------------------------
-
-
-def patched(values: dict[str, float] | None = None) -> FittedMechanics:
-    return FittedMechanics(PushMechanics(square_rig().outline, square_rig().pusher_radius), values or {})
 
 
 @pytest.mark.parametrize(("name", "size"), [("contact_friction", [0.3]), ("pressure_spread", [0.2]),

@@ -28,7 +28,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
+from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.request import PushRequest, check_pushes, check_request
@@ -306,33 +306,6 @@ def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushMod
 
 
 # --- files ---------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def estimated_together(bases: dict[str, PushModel]) -> ExtendedPredictor:
-    """Two effects that were estimated together."""
-    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
-    predictor = with_effects(bases["analytical"], pushes(6, 2, slippery(0.2)), terms).predictor
-    assert isinstance(predictor, ExtendedPredictor)
-    return predictor
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_extended_model_survives_saving(
-    bases: dict[str, PushModel], estimated_together: ExtendedPredictor, kind: str, tmp_path: Path
-) -> None:
-    generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
-    found = estimated_together
-    effects = replace(found, effects=(*found.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
-    model = replace(bases[kind], predictor=effects.with_base(bases[kind].predictor))
-    save_model(model, tmp_path / "m")
-    loaded, table = load_model(tmp_path / "m"), pushes(10, 3)
-    assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
-    assert_same(predicted(loaded, table), predicted(model, table), rtol=1e-9, atol=1e-15)
-    np.testing.assert_array_equal(loaded.training.outcomes, model.training.outcomes)
-    if kind in ("gp", "vhgp"):  # which have more than the moments
-        loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
-        assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
 
 
 # --- estimation -------------------------------------------------------------------------------------------------

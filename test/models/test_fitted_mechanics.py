@@ -13,12 +13,10 @@ import pytest
 from synthetic import square_pushes
 
 from push_predictor.errors import ModelFileError, RequestError
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
+from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.model_file import load_model, save_model
@@ -111,13 +109,6 @@ def test_model_of_several_supports_takes_those_of_other_recordings(by_recording:
     assert on_supports(mechanics_model({}), replace(by_recording.rig, support_points=points), {}).needs == ()
 
 
-def test_saved_parameters_and_their_covariance_return(tmp_path: Path) -> None:
-    predictor = saved(mechanics_model({"contact_friction": 0.2, "rim_exponent": 1.0}), tmp_path).predictor
-    assert isinstance(predictor, MechanicsPredictor)
-    assert predictor.fitted.values == {"contact_friction": 0.2, "rim_exponent": 1.0}
-    np.testing.assert_array_equal(predictor.fitted.covariance, 1e-4 * np.eye(2))
-
-
 def test_rejects_a_file_whose_rows_lack_a_needed_covariate(by_recording: PushModel, tmp_path: Path) -> None:
     table = by_recording.training
     bare = PushTable(table.inputs, table.duration, table.outcomes, table.push_id)
@@ -158,16 +149,3 @@ def test_ellipsoid_has_the_friction_and_the_pressure_of_the_mechanics(by_recordi
     shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.mechanics.ellipsoid
     assert shifted.centre == pytest.approx((0.002, 0.0), abs=1e-12)
     assert shifted.length > 1.1 * mechanics_model({}).predictor.mechanics.ellipsoid.length
-
-
-def test_effects_extend_it_and_are_saved(tmp_path: Path) -> None:
-    model = mechanics_model({"grain_x": 0.1}, push_heading=np.linspace(-3.0, 3.0, 24))
-    basis = DriverBasis("constant", (), (), (), 0.0, ())
-    effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
-    base = model.predictor.base
-    extended = ExtendedPredictor(base, (effect,), np.ones(3))
-    assert extended.needs == ("push_heading",)
-    again = saved(replace(model, predictor=extended), tmp_path)
-    slipping = Pushes(0.02, 0.1, 1.0, covariates={"push_heading": 0.1})
-    assert np.abs(again.predict(slipping).mean - model.predict(slipping).mean).max() > 1e-4
-    assert isinstance(again.base.predictor, MechanicsPredictor)

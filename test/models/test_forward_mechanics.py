@@ -157,7 +157,7 @@ def test_patch_of_a_circle_does_not_turn_without_contact_friction() -> None:
 # --- whole pushes on the ellipsoid, against closed forms and fine steps ----------------------------------------------
 
 
-@pytest.mark.parametrize("outline", [TRIANGLE, OUTLINES["rect1"], OUTLINES["ellip3"]], ids=["tri", "rect1", "ellip3"])
+@pytest.mark.parametrize("outline", [OUTLINES["rect1"], OUTLINES["ellip3"]], ids=["rect1", "ellip3"])
 def test_displacements_are_as_accurate_as_asked_for(outline: Outline) -> None:
     """Steps of 4e-5 m of another method, on another solution of the contact; in them corners blur to some 1e-5."""
     inputs, duration = pushes(60, seed=3, travel=0.0145)

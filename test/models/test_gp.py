@@ -83,16 +83,6 @@ def test_more_rows_never_increase_the_variance() -> None:
     assert (many.variance <= few.variance + 1e-12).all()
 
 
-def test_one_input_is_predicted_as_in_a_batch() -> None:
-    gp = GaussianProcess(*rows(40), PARAMETERS)
-    new = rows(7, seed=1)[0]
-    batch = gp.predict(new)
-    for i in range(7):
-        single = gp.predict(new[i : i + 1])
-        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-12)
-        assert single.variance[0] == pytest.approx(batch.variance[i], rel=1e-10)
-
-
 def test_fit_recovers_noise_and_relevant_input() -> None:
     inputs, outputs = rows(300, noise=0.2)
     fitted = fit_gp(inputs, outputs)

@@ -176,17 +176,6 @@ def test_density_and_moments_are_those_of_the_same_gaussian(with_function: PushM
     np.testing.assert_allclose(density, expected, rtol=1e-9)
 
 
-def test_saved_and_loaded_it_predicts_the_same(informed: PushModel, with_function: PushModel, tmp_path: Path) -> None:
-    table = pushes(20, 7)
-    for model in (informed, with_function):
-        save_model(model, tmp_path / model.kind)
-        loaded = load_model(tmp_path / model.kind)
-        found, expected = (m.predict_rows(table.inputs, table.duration) for m in (loaded, model))
-        np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9, atol=1e-18)
-    assert exact_nlpd(load_model(tmp_path / "vhgp"), table) == pytest.approx(exact_nlpd(informed, table), rel=1e-9)
-
-
 def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_function: PushModel) -> None:
     few, many = pushes(3, 8), pushes(40, 9)
     for model in (informed, with_function):

@@ -1,12 +1,15 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model files: every kind of model predicts the same bits after saving and loading; what no model has is refused."""
+"""Every kind of model: a push alone or among others, the same bits from its file; what no model has is refused."""
 
 from __future__ import annotations
 
+import copy
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -76,8 +79,11 @@ def models() -> dict[str, PushModel]:
     of_supports = MechanicsPredictor(fitted, np.diag([1e-8, 1e-8, 1e-5]))
     trained["fitted on supports"] = replace(trained["analytical"], predictor=of_supports)
     trained |= {f"{kind}, extended": extended(trained[kind]) for kind in (*LEARNT, "analytical", "prior")}
+    needed = replace(rows, covariates={"elapsed_time": np.arange(40.0)})  # which the effects need
+    trained["prior, extended"] = replace(trained["prior, extended"], training=needed)
     trained["with constant noise"] = with_constant_noise(trained["vhgp"])
     trained["correlation of some rows"] = with_some_rows(trained["gp"])
+    trained["with tails"] = train_model(pushes(60), rig, "gp", name="tailed", options=TrainingOptions(mean="zero"))
     return trained
 
 
@@ -113,7 +119,8 @@ def with_some_rows(model: PushModel) -> PushModel:
     return replace(model, predictor=replace(predictor, correlation=some))
 
 
-NAMES = ["correlation of some rows", *LEARNT, "analytical", "prior", "fitted on supports", "with constant noise"]
+NAMES = ["correlation of some rows", "with tails", "fitted on supports", "with constant noise"]
+NAMES += [*LEARNT, "analytical", "prior"]
 NAMES += [f"{kind}, extended" for kind in (*LEARNT, "analytical", "prior")]
 
 
@@ -122,19 +129,30 @@ def test_a_model_predicts_the_same_bits_after_saving_and_loading(
     models: dict[str, PushModel], name: str, tmp_path: Path
 ) -> None:
     model = models[name]
-    if name == "prior, extended":  # whose effects need a covariate that its training rows have
-        model = replace(model, training=replace(table(), covariates={"elapsed_time": np.arange(40.0)}))
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
     assert is_model_file(tmp_path / "m") and (loaded.kind, loaded.needs) == (model.kind, model.needs)
     one, other = (m.predict_rows(INPUTS, DURATION, COVARIATES) for m in (model, loaded))
     for part in ("mean", "covariance", "process_covariance", "in_domain"):
         assert np.array_equal(getattr(one, part), getattr(other, part)), part
+    assert (loaded.name, loaded.provenance) == (model.name, model.provenance)
     assert model_digest(loaded) == model_digest(model)
     if model.predictor.learnt:
-        block = np.arange(40) % 4
+        block = np.arange(len(model.training)) % 4
         for ours, theirs in zip(model.held_out_moments(block), loaded.held_out_moments(block), strict=True):
             assert np.array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_push_alone_has_the_prediction_that_it_has_among_others(models: dict[str, PushModel], name: str) -> None:
+    together = models[name].predict_rows(INPUTS, DURATION, COVARIATES)
+    for k in range(len(INPUTS)):
+        covariates = {key: column[k : k + 1] for key, column in COVARIATES.items()}
+        alone = models[name].predict_rows(INPUTS[k : k + 1], DURATION[k : k + 1], covariates)
+        np.testing.assert_allclose(alone.mean[0], together.mean[k], rtol=1e-8, atol=1e-12)
+        for part in ("covariance", "process_covariance"):
+            np.testing.assert_allclose(getattr(alone, part)[0], getattr(together, part)[k], rtol=1e-6, atol=1e-14)
+        assert alone.in_domain[0] == together.in_domain[k]
 
 
 def test_outputs_are_stored_only_where_they_do_not_follow(models: dict[str, PushModel], tmp_path: Path) -> None:
@@ -155,6 +173,11 @@ def test_another_format_is_refused_with_what_to_do(
 ) -> None:
     with pytest.raises(ModelFileError, match=r"m: format version .* reads version 9 only: train the model again$"):
         load_changed(models["gp"], lambda record, _: record.update(format_version=version), tmp_path / "m")
+
+
+def test_another_kind_of_record_is_refused(models: dict[str, PushModel], tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match="m: format 'push table' is not accepted, give a 'push_predictor model'"):
+        load_changed(models["gp"], put("format", "push table"), tmp_path / "m")
 
 
 Change = Callable[[dict[str, Any], dict[str, np.ndarray]], object]
@@ -184,6 +207,7 @@ def put(place: str, value: object) -> Change:
 
 EXTENDED = "analytical, extended"
 DAMAGES: list[tuple[str, Change, str]] = [
+    ("vhgp", put("regressions.0.parameters.noise_log_lengthscales", [[0.0] * 3]), r"log_lengthscales: shape \(1, 3\)"),
     ("gp", put("predictor.class", "Popen"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.class", "PushTable"), "predictor: .*is not accepted, give an object of class Gaussian"),
     ("gp", put("predictor.scaling.class", "Tails"), r"predictor\.scaling: .*give an object of class Scaling"),
@@ -245,6 +269,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
         "predictor: .* is accepted",
     ),
     ("prior", lambda _, arrays: arrays.update({"predictor.draws": np.zeros((1, 16))}), "2 to 10000 of 16 are needed"),
+    ("prior", lambda _, arrays: arrays.update({"predictor.draws": np.zeros((4, 3))}), "2 to 10000 of 16 are needed"),
     (EXTENDED, put("predictor.scale", [1.0, 1.0]), r"predictor\.scale: shape \(2,\) is not accepted, give \(3,\)"),
     (EXTENDED, put("predictor.effects.1.mechanism", "os.system"), r"effects\.1: 'os.system'"),
     (EXTENDED, put("predictor.effects.1.coefficients", [0.1, 0.1]), r"effects\.1: 1 coefficients and their"),
@@ -272,6 +297,42 @@ def test_what_no_model_has_is_refused_and_named(
     assert "\n" not in str(caught.value)
 
 
+NONSENSE = ([[0]], "array", "1e9", math.nan, 10**400, {"class": "Popen"})  # null and [] may be a lack
+
+
+def places(part: Any, *path: Any) -> Iterator[tuple[Any, ...]]:
+    """The paths of keys and indices to all that a record contains."""
+    for key, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
+        yield (*path, key)
+        yield from places(value, *path, key)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nonsense_anywhere_in_a_file_is_refused_or_changes_no_prediction(
+    models: dict[str, PushModel], name: str, tmp_path: Path
+) -> None:
+    """At some places of the record, and in each array: not finite, too short, with another shape, not numbers."""
+    save_model(models[name], tmp_path / "m")
+    record, arrays = read_archive(tmp_path / "m")
+    expected, rng = models[name].predict_rows(INPUTS, DURATION, COVARIATES), np.random.default_rng(NAMES.index(name))
+    every = list(places(record))
+    changed = []
+    for place in rng.permutation(len(every))[:12]:
+        damaged = copy.deepcopy(record)
+        put(".".join(map(str, every[place])), NONSENSE[rng.integers(len(NONSENSE))])(damaged, arrays)
+        changed.append((damaged, arrays))
+    wrong = (lambda a: a * np.nan, lambda a: a[:-1], lambda a: a[None], lambda a: a.astype(str))
+    for key, array in arrays.items():
+        if array.dtype.kind == "f" and key != "predictor.draws":  # of which fewer are accepted
+            changed.append((record, {**arrays, key: wrong[rng.integers(len(wrong))](array)}))
+    for damaged, with_arrays in changed:
+        (tmp_path / "m").write_bytes(archived(damaged, with_arrays))
+        with suppress(ModelFileError):
+            found = load_model(tmp_path / "m").predict_rows(INPUTS, DURATION, COVARIATES)
+            for part in ("mean", "covariance", "process_covariance", "in_domain"):
+                assert np.array_equal(getattr(found, part), getattr(expected, part)), part
+
+
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
@@ -291,9 +352,9 @@ def test_damaged_tails_are_refused_and_named(
 
 
 @pytest.fixture(scope="module")
-def tailed() -> PushModel:
+def tailed(models: dict[str, PushModel]) -> PushModel:
     """A model of enough pushes for tails."""
-    model = train_model(pushes(60), square_rig(), "gp", name="tailed", options=TrainingOptions(mean="zero"))
+    model = models["with tails"]
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.tails is not None
     return model
 

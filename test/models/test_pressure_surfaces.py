@@ -55,11 +55,6 @@ def about_centre(support: PressureDistribution) -> PressureDistribution:
     return PressureDistribution(support.points - support.centre, support.shares, support.spread)
 
 
-def directions(n: int, seed: int = 0) -> Array:
-    draw = np.random.default_rng(seed).standard_normal((n, 3))
-    return np.asarray(draw / np.linalg.norm(draw, axis=1, keepdims=True))
-
-
 def angle_between(one: Array, other: Array) -> Array:
     one, other = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (one, other))
     return np.asarray(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0)))

@@ -14,10 +14,9 @@ from synthetic import square_rig
 
 from push_predictor import api
 from push_predictor.cli import main
-from push_predictor.errors import ModelFileError, RequestError, RigError, TrainingError
+from push_predictor.errors import RequestError, RigError, TrainingError
 from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
-from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.draws import DRAWS, normal_draws, prior_draws
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -28,8 +27,6 @@ from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push, Pushes
-from push_predictor.models.store.archive import archived, read_archive
-from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.planning.push_windows import windows_of
@@ -42,7 +39,6 @@ pytestmark = pytest.mark.slow
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)
-ON_ELLIPSE = replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))
 TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
 
 
@@ -305,34 +301,6 @@ def test_untrained_model_describes_itself(of_few_draws: PushModel, tmp_path: Pat
     registry.load(tmp_path / "before.pushmodel")
     assert "kind=prior" in registry.describe("before")
     assert "windows=0; covariates=-; defaults=-; duration=any" in registry.describe("before")
-
-
-def test_untrained_model_returns_from_its_file(untrained: PushModel, tmp_path: Path) -> None:
-    untrained.save(tmp_path / "m.pushmodel")
-    again, push = load_model(tmp_path / "m.pushmodel"), Pushes(0.02, [0.1, 0.6], 0.4, duration=0.5)
-    np.testing.assert_allclose(again.predict(push).mean, untrained.predict(push).mean, rtol=1e-12)
-    np.testing.assert_allclose(again.predict(push).covariance, untrained.predict(push).covariance, rtol=1e-12)
-    assert again.training.outcomes.shape == (0, 3)
-
-
-def test_trained_model_returns_from_its_file_with_its_noise(after_ten: PushModel, tmp_path: Path) -> None:
-    after_ten.save(tmp_path / "m.pushmodel")
-    again = load_model(tmp_path / "m.pushmodel")
-    np.testing.assert_array_equal(predictor_of(again).noise.factor, predictor_of(after_ten).noise.factor)
-    np.testing.assert_allclose(predictor_of(again).fitted.covariance, predictor_of(after_ten).fitted.covariance)
-    assert len(again.training) == 20
-
-
-@pytest.mark.parametrize(
-    "draws", [np.zeros((4, 3)), np.zeros((1, 16)), *(np.full((DRAWS, 16), value) for value in (9.0, -9.0, np.nan))]
-)
-def test_rejects_damaged_draws(untrained: PushModel, tmp_path: Path, draws: Array) -> None:
-    untrained.save(tmp_path / "m.pushmodel")
-    record, arrays = read_archive(tmp_path / "m.pushmodel")
-    assert arrays["predictor.draws"].shape == (DRAWS, 16)
-    (tmp_path / "bad.npz").write_bytes(archived(record, {**arrays, "predictor.draws": draws}))
-    with pytest.raises(ModelFileError, match="draws"):
-        load_model(tmp_path / "bad.npz")
 
 
 def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel) -> None:

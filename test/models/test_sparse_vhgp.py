@@ -84,15 +84,6 @@ def test_model_is_determined_by_rows_hyperparameters_sites_and_inducing_rows(fit
     np.testing.assert_array_equal(one.outcome_variance, other.outcome_variance)
 
 
-def test_one_input_is_predicted_as_in_a_batch(fitted: SparseVHGP) -> None:
-    new = rows(7, seed=1)[0]
-    batch = fitted.predict(new)
-    for i in range(7):
-        single = fitted.predict(new[i : i + 1])
-        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-9)
-        assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-7)
-
-
 def test_held_out_predictions_equal_those_of_a_dense_model() -> None:
     dense, sparse = dense_and_sparse(300)
     block = np.random.default_rng(0).integers(0, 40, size=300)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,14 +31,12 @@ from push_predictor.models.predictors.tails import (
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 SCALE, DEGREES = np.array([0.5, 0.9, 1.6]), np.array([3.0, 4.0, 8.0])
-COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 0.25]])
 
 
 def made_up(pushes: int = 40) -> Tails:
@@ -348,13 +345,3 @@ def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
 
 
 # On disk
-
-
-def test_saved_model_has_the_same_intervals(tmp_path: Path) -> None:
-    model, test = trained("vhgp"), shared_errors(5, 3)
-    save_model(model, tmp_path / "a.pushmodel")
-    again = load_model(tmp_path / "a.pushmodel")
-    for kind in INTERVAL_KINDS:
-        ends = [predicted(m, test).interval(0.9, kind) for m in (model, again)]
-        assert np.array(ends[1]) == pytest.approx(np.array(ends[0]), rel=1e-6)
-    assert joint_radius(tails_of(again), 0.9) == joint_radius(tails_of(model), 0.9)

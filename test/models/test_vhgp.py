@@ -180,15 +180,6 @@ def test_the_same_data_and_parameters_give_the_same_model(fitted: VHGP) -> None:
     assert again.bound == pytest.approx(fitted.bound, abs=1e-9)
 
 
-def test_one_input_is_predicted_as_in_a_batch(fitted: VHGP) -> None:
-    new = rows(7, seed=1)[0]
-    batch = fitted.predict(new)
-    for i in range(7):
-        single = fitted.predict(new[i : i + 1])
-        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-11)
-        assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-9)
-
-
 def test_order_of_rows_does_not_matter(fitted: VHGP) -> None:
     order = np.random.default_rng(5).permutation(250)
     shuffled = VHGP(fitted.inputs[order], fitted.outputs[order], fitted.parameters, fitted.site_precisions[order])

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -58,13 +59,15 @@ def never_cancelled() -> None:
 
 @pytest.fixture(scope="module")
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModelRegistry]:
-    """A GP, and one whose effect needs the elapsed time."""
+    """A GP, one whose effect needs the elapsed time, and one that learns nothing."""
     place = tmp_path_factory.mktemp("models")
     gp = train_model(*square_pushes(60), "gp", name="gp")
     save_model(gp, place / "a_gp.model")
     table = drifting_models.pushes(20, 0)
-    base = train_model(table, gp.rig, "analytical", name="drifting")
-    save_model(drifting_models.extended(base, drifting_models.slippery(0.1)), place / "drifting.model")
+    base = train_model(table, gp.rig, "analytical", name="plain")
+    extended = drifting_models.extended(base, drifting_models.slippery(0.1))
+    save_model(replace(extended, name="drifting"), place / "drifting.model")
+    save_model(base, place / "plain.model")
     loaded = ModelRegistry()
     assert loaded.load_all([str(place)]) == []
     yield loaded
@@ -89,10 +92,18 @@ def pose(frame: str = "world", **change: Any) -> PredictSliderPose.Request:
     return PredictSliderPose.Request(header=Header(frame_id=frame), **{**usual, **change})
 
 
+def slider(y: float = 0.0, w: float = 1.0, turn_variance: float = 0.0) -> PoseWithCovariance:
+    pose = Pose(position=Point(y=y), orientation=Quaternion(w=w))
+    return PoseWithCovariance(pose=pose, covariance=[*np.zeros(35), turn_variance])
+
+
 def steps(*changes: dict[str, float], frame: str = "world", **others: Any) -> RolloutPushes.Request:
-    slider = PoseWithCovariance(pose=Pose(orientation=Quaternion(w=1.0)))
     pushes = [PushStep(**{**PUSH, **change}) for change in changes]
-    return RolloutPushes.Request(header=Header(frame_id=frame), slider=slider, steps=pushes, **others)
+    return RolloutPushes.Request(header=Header(frame_id=frame), steps=pushes, **{"slider": slider(), **others})
+
+
+def suggestion(**fields: Any) -> SuggestPushes.Request:
+    return SuggestPushes.Request(count=1, **fields)
 
 
 HANDLERS: dict[type, Callable[[ModelRegistry, Any, Any], None]] = {
@@ -104,52 +115,74 @@ HANDLERS: dict[type, Callable[[ModelRegistry, Any, Any], None]] = {
     LoadModel: handle_load_model,
 }
 ELAPSED = {"covariate_names": ["elapsed_time"], "covariate_values": [NAN]}
-BAD = [
-    (PredictPush, push(angle=NAN), "INVALID_REQUEST"),
-    (PredictPush, push(duration=-0.2), "INVALID_REQUEST"),
-    (PredictPush, push(push_residual=[1.0]), "INVALID_REQUEST"),
-    (PredictPush, push(model="nobody"), "UNKNOWN_MODEL"),
-    (PredictPush, push(model="drifting"), "INVALID_COVARIATES"),
-    (PredictPush, push(model="drifting", **ELAPSED), "INVALID_COVARIATES"),
-    (PredictPush, push(covariate_names=["a", "a"], covariate_values=[1.0, 1.0]), "INVALID_COVARIATES"),
-    (PredictPushBatch, batch(angle=[0.1, 2.0]), "INVALID_REQUEST"),
-    (PredictPushBatch, batch(angle=[0.1]), "INVALID_REQUEST"),
-    (PredictPushBatch, batch(model="nobody"), "UNKNOWN_MODEL"),
-    (PredictPushBatch, batch(covariate_names=["a"]), "INVALID_COVARIATES"),
-    (PredictPushBatch, batch(velocity=np.full(MAX_PUSHES + 1, 0.02)), "TOO_LARGE"),
-    (PredictSliderPose, pose(duration=NAN), "INVALID_REQUEST"),
-    (PredictSliderPose, pose(model="nobody"), "UNKNOWN_MODEL"),
-    (PredictSliderPose, pose(frame="camera"), "INVALID_FRAME"),
-    (PredictSliderPose, pose(pusher=Point(x=-0.2)), "NO_CONTACT"),
-    (PredictSliderPose, pose(pusher_velocity=Vector3(x=-0.02)), "NO_CONTACT"),
-    (PredictSliderPose, pose(covariate_names=["slider_x"], covariate_values=[1.0]), "INVALID_COVARIATES"),
-    (RolloutPushes, steps({"contact": 1.0}), "INVALID_REQUEST"),
-    (RolloutPushes, steps({}, model="nobody"), "UNKNOWN_MODEL"),
-    (RolloutPushes, steps({}, frame=""), "INVALID_FRAME"),
-    (RolloutPushes, steps({}, model="drifting"), "INVALID_COVARIATES"),
+REQUEST, MODEL, COVARIATES = "INVALID_REQUEST", "UNKNOWN_MODEL", "INVALID_COVARIATES"
+LARGE, FRAME, CONTACT, FILE = "TOO_LARGE", "INVALID_FRAME", "NO_CONTACT", "INVALID_FILE"
+BAD: list[tuple[Any, Any, str, str]] = [
+    (PredictPush, push(angle=NAN), REQUEST, "angle: nan"),
+    (PredictPush, push(duration=-0.2), REQUEST, "duration: -0.2"),
+    (PredictPush, push(push_residual=[0.1] * 4), REQUEST, "push_residual: [0.1, 0.1, 0.1, 0.1]"),
+    (PredictPush, push(push_residual=[0.0, NAN, 0.0]), REQUEST, "push_residual: [0.0, nan, 0.0]"),
+    (PredictPush, push(push_residual=[0.1] * 33), REQUEST, "push_residual: [0.1, 0.1, "),
+    (PredictPush, push(model="nobody"), MODEL, "model: 'nobody' is not accepted, give one of gp, drifting, plain"),
+    (PredictPush, push(model="drifting"), COVARIATES, "covariate elapsed_time: 'missing'"),
+    (PredictPush, push(model="drifting", **ELAPSED), COVARIATES, "covariate elapsed_time: nan"),
+    (PredictPush, push(**{**ELAPSED, "covariate_names": ["other"]}), COVARIATES, "covariate other: nan"),
+    (PredictPush, push(covariate_names=["a"] * 2, covariate_values=[1.0, 1.0]), COVARIATES, "covariate_names"),
+    (PredictPushBatch, batch(angle=[0.1, 2.0]), REQUEST, "angle[1]: 2.0"),
+    (PredictPushBatch, batch(duration=3.0), REQUEST, "duration: 3.0"),
+    (PredictPushBatch, batch(angle=[0.1]), REQUEST, "angle length: 1"),
+    (PredictPushBatch, batch(contact=[0.1]), REQUEST, "contact length: 1"),
+    (PredictPushBatch, batch(model="nobody"), MODEL, "model: 'nobody'"),
+    (PredictPushBatch, batch(covariate_names=["a"]), COVARIATES, "covariate_values length: 0"),
+    (PredictPushBatch, batch(velocity=np.full(MAX_PUSHES + 1, 0.02)), LARGE, "velocity length: 1000001"),
+    (PredictSliderPose, pose(duration=NAN), REQUEST, "duration: nan"),
+    (PredictSliderPose, pose(model="nobody"), MODEL, "model: 'nobody'"),
+    (PredictSliderPose, pose(frame="camera"), FRAME, "header.frame_id: 'camera'"),
+    (PredictSliderPose, pose(pusher=Point(x=-0.2)), CONTACT, "pusher: (-0.2, 0.0)"),
+    (PredictSliderPose, pose(pusher_velocity=Vector3(x=-0.02)), CONTACT, "pusher_velocity: (-0.02, 0.0)"),
+    (PredictSliderPose, pose(pusher_velocity=Vector3()), REQUEST, "pusher_velocity: (0.0, 0.0)"),
+    (PredictSliderPose, pose(covariate_names=["slider_x"], covariate_values=[1.0]), COVARIATES, "covariate s"),
+    (RolloutPushes, steps({}, {"contact": 1.0}), REQUEST, "steps[1].contact: 1.0"),
+    (RolloutPushes, steps({"velocity": 1e300}, model="plain"), REQUEST, "steps[0].velocity: 1e+300"),
+    (RolloutPushes, steps({"duration": 0.5}), REQUEST, "steps[0].duration: 0.5"),
+    (RolloutPushes, steps({}, model="nobody"), MODEL, "model: 'nobody'"),
+    (RolloutPushes, steps({}, frame=""), FRAME, "header.frame_id: ''"),
+    (RolloutPushes, steps({}, slider=slider(y=NAN)), REQUEST, "slider.pose.position.y: nan"),
+    (RolloutPushes, steps({}, slider=slider(w=3.0)), REQUEST, "slider.pose.orientation norm: 3.0"),
+    (RolloutPushes, steps({}, slider=slider(turn_variance=NAN)), REQUEST, "slider.covariance[35]: nan"),
+    (RolloutPushes, steps({}, slider=slider(turn_variance=-1.0)), REQUEST, "slider.covariance: [["),
+    (RolloutPushes, steps({}, model="drifting"), COVARIATES, "steps[0].covariate elapsed_time: 'missing'"),
     (
         RolloutPushes,
         steps({}, {}, {}, model="drifting", **{**ELAPSED, "covariate_values": [1.0, 2.0]}),
-        "INVALID_COVARIATES",
+        COVARIATES,
+        "covariate_values length: 2",
     ),
-    (RolloutPushes, steps({}, covariate_names=["slider_x"], covariate_values=[1.0]), "INVALID_COVARIATES"),
-    (RolloutPushes, steps({}, particles=100_001), "TOO_LARGE"),
-    (RolloutPushes, steps({"duration": 1000.0}), "TOO_LARGE"),
-    (SuggestPushes, SuggestPushes.Request(count=0), "INVALID_REQUEST"),
-    (SuggestPushes, SuggestPushes.Request(count=1, speed=[0.1]), "INVALID_REQUEST"),
-    (SuggestPushes, SuggestPushes.Request(count=1, model="nobody"), "UNKNOWN_MODEL"),
-    (SuggestPushes, SuggestPushes.Request(count=1, covariate_names=["a"]), "INVALID_COVARIATES"),
-    (LoadModel, LoadModel.Request(), "INVALID_REQUEST"),
-    (LoadModel, LoadModel.Request(path="/no/such.model"), "INVALID_FILE"),
+    (RolloutPushes, steps({}, covariate_names=["slider_x"], covariate_values=[1.0]), COVARIATES, "covariate_n"),
+    (RolloutPushes, steps({}, particles=100_001), LARGE, "particles: 100001 is not accepted, give at most 100000"),
+    (RolloutPushes, steps({"duration": 1000.0}), LARGE, "steps: '5000 windows'"),
+    (SuggestPushes, SuggestPushes.Request(count=0), REQUEST, "count: 0"),
+    (SuggestPushes, SuggestPushes.Request(count=201), REQUEST, "count: 201"),
+    (SuggestPushes, suggestion(speed=[0.1]), REQUEST, "speed length: 1 is not accepted, give 2 values, or none"),
+    (SuggestPushes, suggestion(angle=[0.0, 0.1, 0.2, 0.3]), REQUEST, "angle length: 4"),
+    (SuggestPushes, suggestion(excluded=[0.1, 0.2, 0.3]), REQUEST, "excluded length: 3"),
+    (SuggestPushes, suggestion(transfer_speed=-0.1), REQUEST, "transfer_speed: -0.1"),
+    (SuggestPushes, suggestion(speed=[0.1, 1e308]), REQUEST, "speed: (0.1, 1e+308) is not accepted, give at most"),
+    (SuggestPushes, suggestion(model="plain"), REQUEST, "model: 'plain' is not accepted, give one with something to"),
+    (SuggestPushes, suggestion(model="nobody"), MODEL, "model: 'nobody'"),
+    (SuggestPushes, suggestion(covariate_names=["a"]), COVARIATES, "covariate_values length: 0"),
+    (LoadModel, LoadModel.Request(), REQUEST, "path: ''"),
+    (LoadModel, LoadModel.Request(path="/no/such.model"), FILE, "/no/such.model: cannot be read"),
 ]
 
 
-@pytest.mark.parametrize(("service", "request_", "name"), BAD)
-def test_bad_input_is_refused_with_a_code_that_the_response_declares(
-    registry: ModelRegistry, service: Any, request_: Any, name: str
+@pytest.mark.parametrize(("service", "request_", "name", "begins"), BAD)
+def test_bad_input_is_refused_by_field_and_value_with_a_code_that_the_response_declares(
+    registry: ModelRegistry, service: Any, request_: Any, name: str, begins: str
 ) -> None:
     with pytest.raises(PushPredictorError) as caught:
         HANDLERS[service](registry, request_, service.Response())
+    assert str(caught.value).startswith(begins)
     code = error_code(caught.value)
     assert code.name == name, caught.value
     assert getattr(service.Response, name) == code

@@ -10,6 +10,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from checks_in_process import checking_in_this_process
 from diagnostic_msgs.msg import DiagnosticStatus
 from hosted_nodes import hosted_node
 from mistakes import force_turned
@@ -35,7 +36,12 @@ def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> 
     domain = free_domain()
     params = {"model": tmp_path / "analytical.pushmodel", "diagnostics_period": 0.2, "strict": True}
     without_alarm = patch.object(AlarmProcess, "prepare")
-    with without_alarm, ros_context(domain) as node, hosted_node("push_validator", domain=domain, params=params):
+    with (
+        without_alarm,
+        checking_in_this_process(),
+        ros_context(domain) as node,
+        hosted_node("push_validator", domain=domain, params=params),
+    ):
         received, played = Status(node), Status(node, "push_replay")
         received.wait_for_first()
         played_wrong = {"recording": tmp_path / "wrong", "play.rate": 10.0, "wait_for_subscribers": 60.0}

@@ -34,7 +34,7 @@ from push_predictor.online.recorder.live_recording import LiveRecording
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 
 pytestmark = pytest.mark.slow
@@ -109,16 +109,6 @@ def test_qos_and_definitions_are_those_of_the_publishers(recorded: Recorded) -> 
     assert abs(times[-1] - time.time_ns()) < 600e9
 
 
-def test_rosbags_reads_it(recorded: Recorded) -> None:
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    with rosbag2.Reader(recorded.bag) as reader:
-        assert reader.message_count == sum(1 for _ in reader.messages()) > 2000
-
-
-def test_the_topics_are_saved(recorded: Recorded) -> None:
-    assert load_topics(recorded.bag) == Topics("/slider/pose", "/pusher/pose", "/pusher/wrench", (TEMPERATURE, LOSSY))
-
-
 def test_diagnostics_have_the_state_and_the_figures(recorded: Recorded) -> None:
     assert recorded.waiting["state"] == "waiting for messages" and recorded.waiting["windows"] == "-"
     assert recorded.last["state"] == "recording" and recorded.last["pushes"] == "4"
@@ -126,12 +116,6 @@ def test_diagnostics_have_the_state_and_the_figures(recorded: Recorded) -> None:
     assert float(recorded.last["slider rate"]) == pytest.approx(100.0, rel=0.01)
     assert 0.5 < float(recorded.last["share of contact"]) < 0.8
     assert recorded.identity == ("/push_recorder: recording", "hex")
-
-
-def test_push_replay_plays_it(recorded: Recorded) -> None:
-    count = sum(1 for _ in open_bag(recorded.bag).messages())
-    with hosting_replay(free_domain(), recording=recorded.bag, rate=20.0, wait_for_subscribers=0.0) as replay:
-        assert f"finished: published {count} messages" in replay.wait_for_text("finished: published")
 
 
 # --- the command, and ends of a recording ----------------------------------------------------------------------------

@@ -130,33 +130,6 @@ def test_duration_zero_of_a_step_means_the_models_own_window(ask: Ask) -> None:
     assert zero.success and zero.poses == own.poses
 
 
-@pytest.mark.parametrize(
-    "change, message",
-    [
-        ({"steps": [STEPS[0], STEPS[0], [0.02, 0.1, 2.0, 1.0]]}, "steps[2].angle: 2.0 is not accepted, give an angle"),
-        ({"steps": [[0.02, 0.1, 0.1, 0.5]]}, "steps[0].duration: 0.5 is not accepted, give 0.18 to 0.22 s"),
-        ({"slider": np.array([0.0, np.nan, 0.0])}, "slider.pose.position.y: nan"),
-        ({"covariance": np.diag([1.0, 1.0, np.nan])}, "slider.covariance[35]: nan"),
-        ({"covariance": np.diag([1.0, -1.0, 1.0])}, "slider.covariance: "),
-        ({"particles": 100_001}, "particles: 100001 is not accepted, give at most 100000"),
-        ({"model": "other"}, "model: 'other' is not accepted, give one of gp"),
-        ({"frame": ""}, "header.frame_id: ''"),
-        ({"frame": "camera"}, "header.frame_id: 'camera'"),
-    ],
-)
-def test_rejects_bad_request_by_field_and_value(ask: Ask, change: dict[str, Any], message: str) -> None:
-    response = ask(**change)
-    assert not response.success and message in response.message and response.error_code != response.NONE
-    assert response.poses == [] and len(response.samples) == 0
-
-
-def test_rejects_quaternion_without_unit_norm(ask: Ask) -> None:
-    wrong = request()
-    wrong.slider.pose.orientation.w = 3.0
-    with pytest.raises(RequestError, match=r"slider\.pose\.orientation norm"):
-        query_from_rollout_request(wrong)
-
-
 @pytest.mark.parametrize("quaternion", [vertical_turn(0.7), np.array([0.6, 0.8, 0.0, 0.0])], ids=["turned", "below"])
 def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quaternion: Array) -> None:
     """A request in another frame, such as that of a camera below the table, gets the same outcome in that frame."""

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import ros_harness as harness
 import yaml
-from geometry_msgs.msg import PoseWithCovarianceStamped
 from hosted_nodes import hosted_node
 from synthetic import square_pushes
 
@@ -98,32 +97,6 @@ def test_response_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
     header = {"frame_id": "world", "stamp": {"sec": 7, "nanosec": 900_000_000}}
     stamp = ask(header=header).slider_after.header.stamp
     assert (stamp.sec, stamp.nanosec) == (8, 100_000_000)
-
-
-@pytest.mark.parametrize(
-    ("change", "names"),
-    [
-        ({"pusher": {"x": 0.23025, "y": 0.11}}, ("pusher: (0.23025, 0.11)", "the gap to the outline is 0.02 m")),
-        ({"pusher": {"x": 0.27, "y": 0.11}}, ("pusher", "0.015 m inside the outline")),
-        ({"pusher_velocity": {"x": -0.02}}, ("pusher_velocity: (-0.02, 0.0)", "180.0 degrees from it")),
-        ({"pusher_velocity": {}}, ("pusher_velocity: (0.0, 0.0)", "above 0")),
-        ({"pusher_velocity": {"x": float("nan")}}, ("pusher_velocity.x: nan", "a finite number")),
-        ({"slider": {"position": {"x": 0.3, "y": 0.1}, "orientation": {"w": 0.0}}}, ("slider.orientation norm: 0.0",)),
-        ({"duration": 2.0}, ("duration: 2.0", "close to the training durations of gp")),
-        ({"model": "nobody"}, ("model: 'nobody'", "one of analytical, gp")),
-        ({"covariate_names": ["slider_heading"], "covariate_values": [1.0]}, ("covariate slider_heading: 1.0",)),
-        ({"header": {}}, ("header.frame_id: ''", "'world'")),
-        ({"header": {"frame_id": "map"}}, ("header.frame_id: 'map' is not accepted, give 'world'",)),
-    ],
-)
-def test_rejects_bad_request_with_a_reason(ask: Any, change: dict[str, Any], names: tuple[str, ...]) -> None:
-    response = ask(**change)
-    assert not response.success
-    for name in names:
-        assert name in response.message
-    assert response.slider_after == PoseWithCovarianceStamped()
-    assert not response.in_domain
-    assert ask().success  # the server continues
 
 
 @pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2_ros is installed here")

@@ -73,33 +73,6 @@ def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> Non
     assert list(response.contact) != list(ask(model="other", seed=2**63, **LIMITS).contact)
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"count": 0}, "count: 0 is not accepted, give an integer from 1 to 200"),
-        ({"count": 201}, "count: 201"),
-        ({"speed": [1e-310, 1e-310]}, "speed: (1e-310, 1e-310)"),
-        ({"speed": [0.1, 1e308]}, "speed: (0.1, 1e+308) is not accepted, give at most"),
-        ({"speed": [0.02]}, "speed length: 1 is not accepted, give 2 values, or none"),
-        ({"angle": [0.0, 0.1, 0.2, 0.3]}, "angle length: 4"),
-        ({"speed": [0.05, 0.02]}, "speed: (0.05, 0.02)"),
-        ({"angle": [0.0, np.nan]}, "angle: (0.0, nan)"),
-        ({"travel": 0.0}, "travel: 0.0"),
-        ({"excluded": [0.1, 0.2, 0.3]}, "excluded length: 3 is not accepted, give an even number of values"),
-        ({"excluded": [0.0, 1.0]}, "excluded: ((0.0, 1.0),)"),
-        ({"transfer_speed": -0.1}, "transfer_speed: -0.1"),
-        ({"transfer_speed": np.nan}, "transfer_speed: nan"),
-        ({"covariate_names": ["elapsed_time"]}, "covariate_values length: 0"),
-        ({"model": "analytical"}, "model: 'analytical' is not accepted, give one with something to learn"),
-        ({"model": "none"}, "model: 'none' is not accepted, give one of analytical, gp, other"),
-    ],
-)
-def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any], message: str) -> None:
-    response = ask(**fields)
-    assert not response.success and response.message.startswith(message)
-    assert not len(response.velocity)
-
-
 def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

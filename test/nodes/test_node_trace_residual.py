@@ -62,14 +62,14 @@ def names(folder: Path) -> list[str]:
 def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
     place: Path, server: Server, drifting: Path
 ) -> None:
-    goal, answered = server.trace(drifting), 0
+    goal, answered = server.trace(drifting), set[str]()
     while not goal.ended:
         assert server.push().success
-        answered += 1
+        answered.update(stage for stage, _ in goal.stages[-1:])
         time.sleep(0.05)
     status, result = goal.end()
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True), result.message
-    assert answered > 20  # after the trace, only one or two would be answered
+    assert len(answered - {"done"}) > 1, answered  # those that waited for the trace would be answered at its end
     # Feedback and result can arrive in either order.
     assert harness.wait_until(lambda: goal.stages[-1:] == [("done", 1.0)]), goal.stages
     shares = [share for _, share in goal.stages]

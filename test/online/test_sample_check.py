@@ -5,19 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from time import monotonic, sleep
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from checks_in_process import checking_in_this_process
 from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
 from repository import REPOSITORY
 
-from push_predictor.online import check_process
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.online.sample_check import FIRST, MOST, SampleCheck
 from push_predictor.online.stream_sync import Samples
@@ -65,15 +64,9 @@ def checked(recording: Recording) -> CheckProcess:
 
 
 @pytest.fixture
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Check at once, in this process: the start of another takes most of the time."""
-
-    def start(target: Callable[..., None], arguments: Sequence[object], name: str) -> object:
-        target(*arguments)
-        return SimpleNamespace(terminate=lambda: None, join=lambda: None)
-
-    monkeypatch.setattr(check_process, "start_child", start)
-    monkeypatch.setattr(check_process.os, "nice", lambda more: None)
+def in_this_process() -> Iterator[None]:
+    with checking_in_this_process():
+        yield
 
 
 def test_sound_samples_are_sound(hexagon: Recording) -> None:

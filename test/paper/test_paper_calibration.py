@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -345,19 +344,6 @@ def study(tmp_path: Path, simulated: Corpus, *measured: Corpus) -> Study:
     return Study(
         replace(QUICK, sizes=(20,), seeds=1), Work(tmp_path / "work", cores=1), tmp_path, simulated, measured, {}
     )
-
-
-@pytest.mark.long
-def test_a_section_has_its_tables_and_pictures_for_every_corpus(tmp_path: Path) -> None:
-    made = section(study(tmp_path, corpus(), corpus("measured")))
-    assert len(made.tables) == 4 + 3 and len(made.findings) == 5 + 4  # speeds: of the simulated set only
-    assert [picture.path.name for picture in made.pictures] == [
-        "calibration_0.png", "coverage_by_speed.png", "calibration_1.png",
-    ]  # fmt: skip
-    assert all(picture.path.is_file() for picture in made.pictures)
-    assert not any("simulated" in table.caption and "measured" in table.caption for table in made.tables)
-    assert all(len(row) == len(table.head) for table in made.tables for row in table.rows)
-    json.dumps(made.data, allow_nan=False)
 
 
 def test_a_set_too_small_for_the_plan_gets_a_note(tmp_path: Path) -> None:

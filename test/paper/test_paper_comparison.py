@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_study
-from push_predictor_paper.claims.comparison import mean_gain
 from push_predictor_paper.claims.comparison.findings import (
     better_density,
     crossings_of,
@@ -267,11 +266,3 @@ def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
         return float(cell.split("\n")[0].replace("−", "-"))
 
     assert first(paper[6]) - first(si[3]) == pytest.approx(13.8155, abs=0.011)  # two decimals in both cells
-
-
-@pytest.mark.long
-def test_mean_gain_section_has_every_size_and_speed(study):
-    made = mean_gain.section(study)
-    assert {row[0] for row in made.tables[0].rows} >= {"20, by push", "20, random"}
-    assert len(made.findings) == 2 and made.pictures[0].path.exists()
-    json.dumps(made.data, allow_nan=False)

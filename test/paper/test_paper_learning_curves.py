@@ -5,12 +5,9 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_study, rig_of
+from paper_studies import made_up_corpus, made_up_study, rig_of
 from push_predictor_paper.claims.learning import learning_curves
 from push_predictor_paper.claims.learning.findings import circle, saturation, surface
 from push_predictor_paper.claims.learning.learning_curves import band_or_range
@@ -172,14 +169,6 @@ def test_two_folds_show_their_range_and_three_an_interval():
     two, three = band_or_range([0.2, 0.4]), band_or_range([0.2, 0.3, 0.4])
     assert (two.value, two.low, two.high) == pytest.approx((0.3, 0.2, 0.4))
     assert three.high == pytest.approx(0.3 + 4.303 * 0.1 / np.sqrt(3), abs=1e-3)
-
-
-@pytest.mark.long
-def test_the_section_has_a_figure_per_surface_and_per_shape_and_every_pair_in_its_table(tmp_path):
-    made = learning_curves.section(made_up_study(tmp_path, replace(PLAN, sizes=(20,))))
-    assert [picture.path.exists() for picture in made.pictures] == [True, True]
-    assert len(made.tables[0].rows) == 4 and len(made.findings) == 3
-    json.dumps(made.data, allow_nan=False)
 
 
 @pytest.mark.long

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -230,19 +229,6 @@ def test_skips_draws_without_any_such_push() -> None:
     draws: Array = np.array([0.3, 0.2, np.nan, 0.4])
     assert estimated(draws).high < 0.41
     assert np.isnan(estimated(np.full(4, np.nan)).low)
-
-
-@pytest.mark.long
-def test_the_section_of_a_small_study(tmp_path: Path) -> None:
-    """Four findings, tables of every bracket and speed, a picture, numbers that JSON can hold."""
-    study = replace(paper_studies.made_up_study(tmp_path), plan=FEW)
-    made = section(study)
-    assert len(made.findings) == 4
-    assert [len(table.rows) for table in made.tables] == [3, 3, 3]
-    assert made.pictures[0].path.stat().st_size > 10_000
-    content = json.loads(json.dumps(dict(made.data), allow_nan=False))
-    assert len(content["departure"]) == 3
-    assert content["departure"][0]["value"] == 0.0
 
 
 @pytest.mark.slow

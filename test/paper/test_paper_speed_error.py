@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -157,14 +156,6 @@ def test_a_push_has_one_speed():
     assert push_speeds(np.array(["a", "a", "a", "b"]), np.array([0.1, 0.2, 0.4, 0.3])) == pytest.approx(
         [0.2] * 3 + [0.3]
     )
-
-
-@pytest.mark.long
-def test_the_section_shows_every_speed(tmp_path):
-    made = speed_error.section(made_up_study(tmp_path))
-    assert len(made.findings) == 2 and made.pictures[0].path.exists()
-    assert sum(int(row[1]) for row in made.tables[0].rows) == 16  # two folds of five, of 40 pushes
-    json.dumps(made.data, allow_nan=False)
 
 
 def test_a_set_of_one_speed_gets_a_note(tmp_path):

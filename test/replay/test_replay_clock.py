@@ -59,14 +59,6 @@ def test_deadlines_are_absolute_so_lateness_does_not_accumulate() -> None:
         wall.time += 300_000  # publishing takes time
 
 
-class TickingClock(FakeClock):
-    """A clock that also advances by 100 ns whenever it is read."""
-
-    def now(self) -> int:
-        self.time += 100
-        return self.time
-
-
 def test_paused_clock_stops_and_resumes_at_the_same_time() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -33,7 +34,7 @@ from push_predictor_interfaces.srv import LoadModel, PredictPush
 
 STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
 PATIENCE = 240.0  # s until a trace counts as stuck; alone it takes 3, beside eight busy processes it took over 60
-DRIVERS = ["elapsed_time", "slider_x"]
+DRIVERS = ["elapsed_time"]
 RIG = "pushes.rig.yaml"
 
 
@@ -81,11 +82,17 @@ class Server:
     def held(self, goal: Goal, stage: str = "") -> int:
         """The process of a trace at work, stopped: it does not end by itself, however long the test takes.
 
-        stage: that it has reached; by default it has only started, which takes little processor time.
+        stage: that it has reached, a little at a time; by default it has only started, which takes little processor
+        time.
         """
-        assert goal.reached(stage) if stage else harness.wait_until(lambda: bool(self.workers()))
+        assert harness.wait_until(lambda: bool(self.workers()))
         (worker,) = self.workers()
         os.kill(worker, signal.SIGSTOP)
+        while stage and not goal.reached(stage, 0.1):
+            assert not goal.ended, goal.stages
+            os.kill(worker, signal.SIGCONT)
+            time.sleep(0.5)
+            os.kill(worker, signal.SIGSTOP)
         return worker
 
 
@@ -109,8 +116,8 @@ class Goal:
     def ended(self) -> bool:
         return bool(self._result.done())
 
-    def reached(self, stage: str) -> bool:
-        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), PATIENCE)
+    def reached(self, stage: str, patience: float) -> bool:
+        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), patience)
 
     def end(self) -> tuple[int, TraceResidual.Result]:
         assert harness.wait_until(self._result.done, PATIENCE), self.stages
