@@ -55,7 +55,7 @@ class Slider:
             tables.known += 1
             exponent += QUANTITIES
 
-    def __reduce__(self) -> object:
+    def __reduce__(self) -> tuple[object, ...]:
         """Of another process: built again from the same arrays."""
         return Slider, self._given
 
