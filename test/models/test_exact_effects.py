@@ -53,7 +53,7 @@ def square(friction: float = 0.25, centre: tuple[float, float] = (0.0, 0.0), len
     return analytical_mechanics(square_rig().outline, square_rig().pusher_radius, friction, surface)
 
 
-def effect(mechanism: str, *size: float, basis: DriverBasis = ALWAYS) -> Effect:
+def effect(mechanism: str | None, *size: float, basis: DriverBasis = ALWAYS) -> Effect:
     covariance = 1e-4 * np.eye(len(size))
     return Effect(mechanism, "model_inputs", basis, np.array(size), covariance, np.ones(3))
 
@@ -87,6 +87,14 @@ def test_two_effects_on_one_parameter_add_up() -> None:
     two = [effect("contact_friction", 0.1), effect("contact_friction", 0.25)]
     expected = joint_shift(on, [effect("contact_friction", 0.35)], push)
     np.testing.assert_allclose(joint_shift(on, two, push), expected, atol=1e-12)
+
+
+def test_an_effect_without_a_mechanism_adds_to_the_others() -> None:
+    push, on = made(30), square()
+    exact, generic = effect("contact_friction", 0.2), effect(None, *np.linspace(-0.1, 0.1, 18))
+    expected = joint_shift(on, [exact], push) + joint_shift(on, [generic], push)
+    for together in (joint_shift(on, [exact, generic], push), joint(on, [exact, generic], push).shift):
+        np.testing.assert_allclose(together, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_an_effect_follows_its_covariate() -> None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from supports import FOUR_POINTS, THREE_POINTS
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics import kernel, load_map
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
 from push_predictor.models.mechanics.kernel import push as compiled
 from push_predictor.models.mechanics.parameters import PARAMETERS, MechanicsParameter
@@ -191,6 +193,14 @@ def test_read_only_and_strided_arrays_are_accepted() -> None:
     assert np.array_equal(displaced(model, *frozen), expected)
     assert np.array_equal(displaced(model, *strided), expected)
     assert np.array_equal(displaced(model, single, frozen[1])[0], expected[0])
+
+
+def test_a_slider_sent_to_another_process_moves_alike() -> None:
+    pushes, fitted = kept("rect1, patch")["pushes"][:9], FittedMechanics(mechanics(), {"contact_friction": 0.2})
+    expected = fitted.displacement(pushes[:, :3], pushes[:, 3])
+    sent = pickle.loads(pickle.dumps(fitted))
+    assert sent._shape is not fitted._shape
+    assert np.array_equal(sent.displacement(pushes[:, :3], pushes[:, 3]), expected)
 
 
 def test_no_pushes_have_no_displacements() -> None:

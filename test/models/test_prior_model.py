@@ -326,7 +326,7 @@ def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:
 def test_retraining_starts_from_the_priors(after_ten: PushModel) -> None:
     again = retrain_model(after_ten, pushed(20, 3))
     np.testing.assert_allclose(predictor_of(again).draws, predictor_of(after_ten).draws)
-    assert again.kind == "prior"
+    assert again.kind == "prior" and again.predictor.absorbs
 
 
 # --- interfaces --------------------------------------------------------------------------------------------
