@@ -70,14 +70,10 @@ def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPr
     if not len(rows):
         return before
     mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
-    found = updated(mechanics, names, _values(before.fitted.values), fit_rows(rows), before.fitted.ellipsoid.length)
-    values = dict(zip(names, found.values.tolist(), strict=True))
-    fitted = FittedMechanics(mechanics, values, found.covariance)
+    values = np.array(list(before.fitted.values.values()))
+    found = updated(mechanics, names, values, fit_rows(rows), before.fitted.ellipsoid.length)
+    fitted = FittedMechanics(mechanics, dict(zip(names, found.values.tolist(), strict=True)), found.covariance)
     return PriorPredictor(fitted, normal_draws(fitted, seed), found.noise)
-
-
-def _values(values: Mapping[str, float]) -> Array:
-    return np.array(list(values.values()))
 
 
 def on_supports(model: PushModel, rig: Rig | None, supports: Mapping[int, Array]) -> PushModel:

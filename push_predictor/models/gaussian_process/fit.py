@@ -4,8 +4,7 @@
 """Maximise the VHGP's bound over its hyperparameters, with q(g) solved for at every step.
 
 Variable projection: L-BFGS sees the 2 D + 4 hyperparameters only. A joint search over them and Lambda ends in much
-worse optima, towards the homoscedastic solution. No n x n matrix is kept from one evaluation to
-the next.
+worse optima, towards the homoscedastic solution. No n x n matrix is kept from one evaluation to the next.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ _NUGGET_SD = (np.log(1e-3), np.log(3.0))
 _REFUSED = 1e10
 _SEARCH_TOLERANCE, _FINAL_TOLERANCE = 5e-2, 2e-2  # nats
 _FAR = 10.0  # by this factor the first evaluation, far from the maximum, is less accurate
-_STOP = 3e-4  # relative decrease: a third of a nat for a thousand rows
+_STOP = 3e-4  # relative decrease: a tenth of a nat for MOST_SEARCHED rows
 
 # Gaussian priors on the logarithms. Without them the bound of 100 rows often peaks at far too confident a noise model,
 # or at a homoscedastic one. The signal stays near the homoscedastic fit, the noise varies by a factor of exp(0.67) over
@@ -115,18 +114,11 @@ class Found:
 class Search:
     """The cost for L-BFGS: minus the bound and the log prior. q(g) is solved for from that of `best`, the lowest point.
 
-    problem_of: the rows' problem for hyperparameters. tolerance: of the bound, nats. noise: g at the rows as a fit of
-    fewer rows predicts it, where q(g) begins.
+    problem_of: the rows' problem for hyperparameters. tolerance: of the bound, nats.
     """
 
-    def __init__(
-        self,
-        problem_of: Callable[[VhgpParameters], VhgpProblem],
-        prior: Prior,
-        tolerance: float,
-        noise: LatentPrediction | None = None,
-    ) -> None:
-        self.problem_of, self.prior, self.tolerance, self.noise = problem_of, prior, tolerance, noise
+    def __init__(self, problem_of: Callable[[VhgpParameters], VhgpProblem], prior: Prior, tolerance: float) -> None:
+        self.problem_of, self.prior, self.tolerance = problem_of, prior, tolerance
         self.best: Found | None = None
 
     def cost(self, vector: Array) -> tuple[float, Array]:
@@ -137,7 +129,7 @@ class Search:
             problem = self.problem_of(parameters)
             goal = penalty - self.best.cost if self.best else None
             tolerance = self.tolerance if self.best else _FAR * self.tolerance
-            bound = maximise_over_noise(problem, self._start(problem), tolerance, goal=goal)
+            bound = maximise_over_noise(problem, self.best.sites if self.best else None, tolerance, goal=goal)
         except (np.linalg.LinAlgError, FloatingPointError):
             return _REFUSED, np.zeros_like(vector)
         cost = penalty - bound.value
@@ -151,8 +143,3 @@ class Search:
             raise TrainingError("the variational bound is not finite at any hyperparameters")
         parameters, sites = self.best.parameters, self.best.sites
         return parameters, maximise_over_noise(self.problem_of(parameters), sites, tolerance).tied_precisions
-
-    def _start(self, problem: VhgpProblem) -> Sites | None:
-        if self.best is not None:
-            return self.best.sites
-        return None if self.noise is None else _sites(problem, self.noise)

@@ -98,7 +98,7 @@ def _refined(rough: VHGP, inputs: Array, outputs: Array, most_inducing: int) -> 
     chosen = [inducing_rows(k, inputs, most_inducing) for k in (rough.parameters.signal, rough.parameters.noise)]
     places = [inputs[rows] for rows in chosen]
     prior, tolerance = noise_prior(inputs.shape[1], n), _SEARCH_TOLERANCE * n
-    search = Search(lambda p: problem_about(inputs, outputs, p, *places), prior, tolerance, rough.predict(inputs))
+    search = Search(lambda p: problem_about(inputs, outputs, p, *places), prior, tolerance)
     box = np.column_stack([first - _REACH, first + _REACH])
     box[-2, 1] = np.inf  # one open side, see gp.py
     Descent(box, _MOST_ITERATIONS, _STOP).run(search.cost, first, _UNIT)
