@@ -127,13 +127,14 @@ def _predictor(
     return sharpened(prior_predictor(mechanics, rig, options.seed), rows, options.seed), []
 
 
-def retrain_model(model: PushModel, table: PushTable) -> PushModel:
+def retrain_model(model: PushModel, table: PushTable, *, nearby: bool = False) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted, per path length or not as before, on at most 1000 rows drawn evenly over the pushes; the
-    search of a VHGP begins at its hyperparameters. Mechanics keep their parameters, alone and as the mean of a learnt
-    model: a change of these is what a trace looks for. The covariance of an analytical model is estimated again. The
-    priors of a prior model are updated by the table. Raises TrainingError for too few rows.
+    A learnt one is refitted, per path length or not as before, on at most 1000 rows drawn evenly over the pushes.
+    Mechanics keep their parameters, alone and as the mean of a learnt model: a change of these is what a trace looks
+    for. The covariance of an analytical model is estimated again. The priors of a prior model are updated by the table.
+    nearby: whether the search of a VHGP begins at the model's hyperparameters. From those of other outcomes it can end
+    in a poorer optimum. Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
@@ -143,7 +144,7 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
             about=predictor.mean,
             per_path=predictor.scaling.travel is not None,
             tails=predictor.tails is not None,
-            near=predictor,
+            near=predictor if nearby else None,
         )
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)

@@ -217,7 +217,7 @@ def test_train_fit_prints_the_ladder_and_saves_it_next_to_the_model(place: Place
     saved = json.loads(Path(place.path("analytical.ladder.json")).read_text())
     assert isinstance(model.predictor, MechanicsPredictor)
     assert [parameter["name"] for parameter in saved["parameters"]] == list(model.predictor.fitted.values)
-    assert "<img" in Path(place.path("analytical.ladder.html")).read_text()
+    assert "<svg" in Path(place.path("analytical.ladder.html")).read_text()
 
 
 def test_shorter_stride_gives_more_training_windows(place: Place, run):

@@ -28,6 +28,7 @@ from push_predictor.recordings.checks.checked import CheckedData, checked_data, 
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table_file import write_table
+from push_predictor.reporting import html
 from push_predictor.reporting.chart import Dots, Line
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
@@ -144,6 +145,14 @@ def test_the_caption_and_the_json_state_where_the_contacts_are(
         "Windows use 94 % of the time in contact."
     )
     assert contact_sentence(refused.contacts).endswith("as far outside.")
+
+
+def test_gaps_are_listed_in_millimetres(turned: CheckedData, tmp_path: Path) -> None:
+    write_check_page(tmp_path / "check.html", {"turned": turned})
+    page = (tmp_path / "check.html").read_text()
+    assert turned.contacts is not None
+    for gap in turned.contacts.gaps:
+        assert f">{html.number(gap and 1e3 * gap, 2)}<" in page
 
 
 def test_a_table_has_a_page_without_tracks(tmp_path: Path) -> None:

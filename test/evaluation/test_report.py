@@ -300,7 +300,7 @@ def test_page_opens_with_three_sentences_and_one_figure(page: Path) -> None:
 @pytest.mark.slow
 def test_every_table_is_folded(page: Path) -> None:
     text = page.read_text()
-    assert text.count("<table") == text.count('<details class="tabular">') == 5 and "<details open" not in text
+    assert text.count("<table") == text.count('<details class="tabular">') == 4 and "<details open" not in text
     assert "<summary>Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than" in text
 
 

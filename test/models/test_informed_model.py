@@ -256,14 +256,16 @@ def test_retrained_without_mechanics_it_learns_what_it_did(per_path: bool) -> No
     assert np.allclose(targets(again), table.outcomes, rtol=1e-9, atol=0.0) == (not per_path)
 
 
-def test_a_vhgp_is_retrained_from_its_own_hyperparameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not from those of a GP that is fitted first; that takes half of the time."""
+def test_a_vhgp_is_retrained_from_its_own_hyperparameters_where_it_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else from those of a GP that is fitted first, which takes half of the time."""
     plain = trained(pushes(40, 10, (0.02, 0.05)), "vhgp", mean="zero")
     begun: list[GpParameters] = []
     monkeypatch.setattr(vhgp, "fit_gp", None)
     search = vhgp.maximise_bound
     monkeypatch.setattr(vhgp, "maximise_bound", lambda *given: begun.append(given[2]) or search(*given))
-    retrain_model(plain, pushes(40, 11, (0.02, 0.05)))
+    with pytest.raises(TypeError):  # without a GP it does not know where to begin
+        retrain_model(plain, pushes(40, 11, (0.02, 0.05)))
+    retrain_model(plain, pushes(40, 11, (0.02, 0.05)), nearby=True)
     assert len(begun) == 3
     for start, regression in zip(begun, learnt(plain).regressions, strict=True):
         found = regression.parameters

@@ -50,7 +50,7 @@ def extend(
     table = spread_rows(base, evidence.table)
     if learnt or absorbs:
         shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
-        trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
+        trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift), nearby=True)
         of_trained = predictor.with_base(trained.predictor.base)
         return held_out_windows(with_predictor(trained, table, of_trained)).calibrated()
     return held_out_windows(with_predictor(base, table, predictor)).calibrated()
