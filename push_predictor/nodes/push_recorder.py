@@ -25,9 +25,8 @@ from push_predictor.nodes.recorder.status import recorder_status
 from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.validator.rig_source import RigSource
-from push_predictor.online.recorder.live_line import LiveLine
 from push_predictor.online.recorder.live_recording import LiveRecording
-from push_predictor.online.recorder.progress import Progress
+from push_predictor.online.recorder.progress import LiveLine, Progress
 
 PERIOD = 0.02  # s between two looks at what has arrived
 SHOWN = 1.0  # s between two updates of the line

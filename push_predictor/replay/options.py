@@ -14,7 +14,7 @@ from typing import Any
 from push_predictor.errors import RequestError
 from push_predictor.recordings.topics import STREAMS, Topics
 from push_predictor.replay.clock import SECOND
-from push_predictor.replay.play_range import PlayRange
+from push_predictor.replay.player import PlayRange
 
 
 @dataclass(frozen=True)

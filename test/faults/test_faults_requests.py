@@ -40,7 +40,7 @@ from push_predictor.nodes.parameters import Param, declare
 from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
-from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
+from push_predictor.nodes.server.services import handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes

@@ -24,11 +24,16 @@ from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server.model_services import handle_load_model
-from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push, handle_predict_push_batch
-from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
-from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
-from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
+from push_predictor.nodes.server.services import (
+    MAX_PUSHES,
+    handle_load_model,
+    handle_predict_push,
+    handle_predict_push_batch,
+    handle_predict_slider_pose,
+    handle_rollout_pushes,
+    handle_suggest_pushes,
+)
+from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import (
     LoadModel,
@@ -36,7 +41,6 @@ from push_predictor_interfaces.srv import (
     PredictPushBatch,
     PredictSliderPose,
     RolloutPushes,
-    SuggestPushes,
 )
 
 NAN = float("nan")
@@ -135,10 +139,10 @@ BAD = [
     (RolloutPushes, steps({}, covariate_names=["slider_x"], covariate_values=[1.0]), "INVALID_COVARIATES"),
     (RolloutPushes, steps({}, particles=100_001), "TOO_LARGE"),
     (RolloutPushes, steps({"duration": 1000.0}), "TOO_LARGE"),
-    (SuggestPushes, SuggestPushes.Request(count=0), "INVALID_REQUEST"),
-    (SuggestPushes, SuggestPushes.Request(count=1, speed=[0.1]), "INVALID_REQUEST"),
-    (SuggestPushes, SuggestPushes.Request(count=1, model="nobody"), "UNKNOWN_MODEL"),
-    (SuggestPushes, SuggestPushes.Request(count=1, covariate_names=["a"]), "INVALID_COVARIATES"),
+    (SuggestPushes, SuggestPushes.Goal(count=0), "INVALID_REQUEST"),
+    (SuggestPushes, SuggestPushes.Goal(count=1, speed=[0.1]), "INVALID_REQUEST"),
+    (SuggestPushes, SuggestPushes.Goal(count=1, model="nobody"), "UNKNOWN_MODEL"),
+    (SuggestPushes, SuggestPushes.Goal(count=1, covariate_names=["a"]), "INVALID_COVARIATES"),
     (LoadModel, LoadModel.Request(), "INVALID_REQUEST"),
     (LoadModel, LoadModel.Request(path="/no/such.model"), "INVALID_FILE"),
 ]
@@ -148,11 +152,12 @@ BAD = [
 def test_bad_input_is_refused_with_a_code_that_the_response_declares(
     registry: ModelRegistry, service: Any, request_: Any, name: str
 ) -> None:
+    answer = service.Result if service is SuggestPushes else service.Response
     with pytest.raises(PushPredictorError) as caught:
-        HANDLERS[service](registry, request_, service.Response())
+        HANDLERS[service](registry, request_, answer())
     code = error_code(caught.value)
     assert code.name == name, caught.value
-    assert getattr(service.Response, name) == code
+    assert getattr(answer, name) == code
 
 
 def test_good_input_has_no_error(registry: ModelRegistry) -> None:

@@ -169,7 +169,7 @@ def test_rviz_is_optional_and_uses_the_installed_configuration(
     assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
     flag, config = rviz["arguments"]
     assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()
-    own = nodes(launch_file, rviz="1", rviz_config="own.rviz")["rviz2"]
+    own = nodes(launch_file, rviz="True", rviz_config="own.rviz")["rviz2"]
     assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
 
 

@@ -56,10 +56,10 @@ SERVICES = (
     "predict_push_batch",
     "predict_slider_pose",
     "rollout_pushes",
-    "suggest_pushes",
     "list_models",
     "load_model",
 )
+ACTIONS = ("suggest_pushes", "trace_residual")
 
 
 def config(node: str) -> dict[str, Any]:
@@ -123,9 +123,10 @@ def test_the_table_of_the_validators_topics_names_what_it_uses():
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row[0])} == used
 
 
-@pytest.mark.parametrize("service", SERVICES)
-def test_every_service_of_the_server_has_a_chapter(service: str):
-    assert re.search(rf"^## `{service}` \(\w+\)$", (REFERENCE / "predict_server.md").read_text(), re.MULTILINE)
+@pytest.mark.parametrize("service", (*SERVICES, *ACTIONS))
+def test_every_service_and_action_of_the_server_has_a_chapter(service: str):
+    kind = r"action \w+" if service in ACTIONS else r"\w+"
+    assert re.search(rf"^## `{service}` \({kind}\)$", (REFERENCE / "predict_server.md").read_text(), re.MULTILINE)
 
 
 # --- commands and links ----------------------------------------------------------------------------------------------

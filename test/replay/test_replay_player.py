@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from push_predictor.recordings.bag.reader import RawMessage
 from push_predictor.replay.clock import SECOND, PlayerClock
-from push_predictor.replay.play_range import PlayRange
-from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
 from push_predictor.replay.source import ReadAhead
 
 START = 1000 * SECOND

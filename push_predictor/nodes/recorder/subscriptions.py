@@ -14,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.nodes.following import FollowingSubscription
+from push_predictor.nodes.polling import FollowingSubscription
 from push_predictor.nodes.qos import common_profile
 from push_predictor.online.recorder.live_recording import LiveRecording
 from push_predictor.recordings.bag.metadata import TopicInfo

@@ -18,8 +18,7 @@ from rclpy.node import Node
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
 from push_predictor.replay.clock import SECOND
-from push_predictor.replay.play_range import PlayRange
-from push_predictor.replay.player import ReplayPlayer
+from push_predictor.replay.player import PlayRange, ReplayPlayer
 from push_predictor_interfaces import srv as own_types
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.alarms import alarm_to_message
+from msg_adapters.residuals import alarm_to_message
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json, alarm_sentence
 from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.qos import LATCHED

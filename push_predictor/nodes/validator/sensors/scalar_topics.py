@@ -13,8 +13,7 @@ from time import time_ns
 import numpy as np
 from rclpy.node import Node
 
-from push_predictor.nodes.following import FollowingSubscription
-from push_predictor.nodes.polling import Taken
+from push_predictor.nodes.polling import FollowingSubscription, Taken
 from push_predictor.nodes.validator.sensors.topic_stream import TopicStream, as_messages
 from push_predictor.online.clock_history import ClockHistory
 from push_predictor.recordings.decoder.topic_input import LIMIT, TopicInput

@@ -14,9 +14,8 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from push_predictor.errors import PushPredictorError, RecordingError
-from push_predictor.nodes.following import FollowingSubscription
-from push_predictor.nodes.polling import Taken
-from push_predictor.online.sensors.topic_report import TopicReport, stamp_figures
+from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.online.topic_report import TopicReport, stamp_figures
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.fields.installed_definitions import definition_text

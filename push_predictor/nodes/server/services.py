@@ -1,15 +1,17 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The services predict_push and predict_push_batch: from a request and the loaded models to a response.
+"""The services of predict_server, and suggest_pushes: from a request and the loaded models to a response.
 
-A handler fills the response, or raises a PushPredictorError that states what is wrong with the request.
+A handler fills the response, or raises a PushPredictorError that states what is wrong with the request. Long ones call
+check_cancelled between their parts; it raises when nobody waits any more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,12 @@ from msg_adapters.predictions import (
     query_from_batch_request,
     residual_from_request,
 )
-from push_predictor.errors import PredictionError, TooLargeError
+from msg_adapters.rigs import model_to_info
+from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
+from msg_adapters.slider_poses import fill_slider_response, query_from_slider_request, world_push
+from msg_adapters.suggestions import fill_suggest_response, query_from_suggest_request
+from push_predictor.design.batch import suggest_pushes
+from push_predictor.errors import PredictionError, RequestError, TooLargeError
 from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
@@ -36,8 +43,11 @@ from push_predictor.models.request import (
 )
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
+from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import persistence_of
+from push_predictor.planning.rollout import PARTICLES, rollout
+from push_predictor.planning.slider_pose import slider_after
 from push_predictor.types import Array
 
 MAX_PUSHES = 1_000_000  # per batch: the server needs up to 0.6 kB for each while it answers
@@ -66,7 +76,7 @@ def handle_predict_push_batch(
 ) -> None:
     """Fill the response to PredictPushBatch; one bad push refuses the whole batch.
 
-    check_cancelled: called before each chunk; it raises when the node ends. Raises RequestError or PredictionError.
+    check_cancelled: called before each chunk. Raises RequestError or PredictionError.
     """
     if (count := len(request.velocity)) > MAX_PUSHES:
         raise TooLargeError("velocity length", count, f"at most {MAX_PUSHES} pushes a call")
@@ -86,6 +96,79 @@ def handle_predict_push_batch(
     pushes = Push(query.inputs, np.full(count, query.duration), query.covariates)
     response.message = domain_remark(tabulated.model, pushes, np.concatenate(inside))
     response.success = True
+
+
+def handle_predict_slider_pose(frames: RequestFrames, registry: ModelRegistry, request: Any, response: Any) -> None:
+    """Fill the response to PredictSliderPose, in the frame of the request. Raises RequestError."""
+    asked = query_from_slider_request(request)
+    tabulated = registry.get(asked.model)
+    query = replace(asked, duration=own_window(tabulated.model, asked.duration))
+    frame = frames.pose_in_world(request.header)
+    push = world_push(query, frame)
+    fill_slider_response(response, request.header, query, frame, push, slider_after(tabulated, push))
+
+
+def handle_rollout_pushes(
+    check_cancelled: Callable[[], None], frames: RequestFrames, registry: ModelRegistry, request: Any, response: Any
+) -> None:
+    """Fill the response to RolloutPushes, in the frame of the request.
+
+    At least PARTICLES particles are used, so that the poses do not depend on the number of samples requested.
+    check_cancelled: called before each window. Raises RequestError.
+    """
+    query = query_from_rollout_request(request)
+    tabulated = registry.get(query.model)
+    steps = query.steps.copy()
+    steps[steps[:, 3] == 0.0, 3] = own_window(tabulated.model, 0.0)
+    frame = frames.pose_in_world(request.header)
+    slider = world_slider(query, frame)
+    rolled = rollout(
+        tabulated,
+        slider.planar,
+        slider.covariance,
+        steps,
+        max(PARTICLES, query.samples),
+        query.seed,
+        covariates=query.covariates,
+        check_cancelled=check_cancelled,
+    )
+    fill_rollout_response(response, frame, slider, rolled, query.samples)
+
+
+def handle_suggest_pushes(
+    check_cancelled: Callable[[], None], registry: ModelRegistry, request: Any, response: Any
+) -> None:
+    """Fill the result of SuggestPushes. check_cancelled: called before each push. Raises RequestError."""
+    query = query_from_suggest_request(request)
+    suggested = suggest_pushes(
+        registry.get(query.model).model,
+        query.count,
+        query.limits,
+        covariates=query.covariates,
+        seed=query.seed,
+        check_cancelled=check_cancelled,
+    )
+    fill_suggest_response(response, suggested)
+
+
+def handle_list_models(registry: ModelRegistry, request: Any, response: Any) -> None:
+    """Fill the response to ListModels."""
+    names, default = registry.names, registry.default
+    response.names, response.default_model = names, default
+    response.descriptions = [registry.describe(name) for name in names]
+    response.models = [
+        model_to_info(name, registry.file(name), registry.get(name).model, name == default) for name in names
+    ]
+    response.success = True
+
+
+def handle_load_model(registry: ModelRegistry, request: Any, response: Any) -> None:
+    """Load the file and fill the response to LoadModel. Raises ModelFileError or RequestError; nothing changes then."""
+    if not request.path:
+        raise RequestError("path", request.path, "the path of a model file on the server's machine")
+    response.name = registry.load(Path(request.path), request.name)
+    how = registry.get(response.name).how
+    response.success, response.message = True, f"{request.path} is loaded as {response.name!r}; {how}"
 
 
 def _given_residual(model: PushModel, push: PushRequest, prediction: Prediction, residual: Array) -> Prediction:

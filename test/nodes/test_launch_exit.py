@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Launch files refuse what they cannot obey before anything is started, and end when a node that is needed ends."""
+"""The choices of the launch files' arguments, and that a launch ends when a node that is needed ends."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from fake_launch import FakeAction, install_fake_launch, install_fake_rviz, load_launch_file, started
+from fake_launch import FakeAction, actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from repository import REPOSITORY
 
-from push_predictor.nodes.launch_checks import end_launch, started_directly
+from push_predictor.nodes.launch_exit import end_launch
 from push_predictor.nodes.validator.parameters import PARAMETERS
 
 MAIN = REPOSITORY / "launch" / "push_predictor.launch.py"
@@ -36,94 +36,15 @@ def run(
     return started(load_launch_file(file), arguments, words)
 
 
-def refusal(actions: list[FakeAction]) -> str:
-    """The message with which the actions end the launch; they start nothing."""
-    (timer,) = actions
-    assert type(timer).__name__ == "TimerAction" and timer.kwargs["period"] == 0.0
-    (failure,) = timer.kwargs["actions"]
-    with pytest.raises(RuntimeError) as error:
-        failure.kwargs["function"](SimpleNamespace(), *failure.kwargs["args"])
-    return str(error.value)
-
-
-def executables(actions: list[FakeAction]) -> list[str]:
-    return [action.kwargs["executable"] for action in actions]
-
-
-# --- arguments -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("file", "word", "near"),
-    [
-        (MAIN, "recrding:=bags/x", "'recording'"),
-        (MAIN, "slider-topic:=/vicon", "'slider_topic'"),
-        (RECORD, "bags:=monday", "'bag'"),
-        (RECORD, "rviz:=true", "one of namespace, params_file,"),
-    ],
-)
-def test_a_misspelt_argument_is_refused_with_the_nearest_accepted_one(
-    file: Path, word: str, near: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    name = word.partition(":=")[0]
-    assert f"launch argument {name!r} is not accepted, give {near}" in refusal(run(file, monkeypatch, word))
-
-
-def test_every_unknown_argument_is_named_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = refusal(run(MAIN, monkeypatch, "modell:=m", "modell:=n", "bagg:=b", "rig:=r"))
-    assert found.count("'modell'") == 1 and "'bagg'" in found and "'rig'" not in found
-
-
-def test_arguments_of_launch_itself_are_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
-    words = ("emulate_tty:=true", "sigterm_timeout:=9", "launch-prefix:=nice", "model:=m")
-    assert executables(run(MAIN, monkeypatch, *words)) == ["predict_server", "push_validator"]
-
-
-def test_arguments_of_a_file_that_includes_this_one_are_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    command = [ROS2, "launch", "cell", "cell.launch.py", "robot:=ur5e"]
-    monkeypatch.setattr(sys, "argv", command)
-    given = {"robot": "ur5e", "model": "m"}
-    assert executables(started(load_launch_file(MAIN), given, command[4:])) == ["predict_server", "push_validator"]
-
-
-@pytest.mark.parametrize(
-    ("command", "direct"),
-    [
-        (["ros2", "launch", "push_predictor", "record.launch.py"], True),
-        (["ros2", "launch", "-d", "push_predictor", "record.launch.py", "bag:=x"], True),
-        (["ros2", "launch", str(RECORD)], True),
-        (["ros2", "launch", "other", "record.launch.py"], False),
-        (["ros2", "launch", "/other/record.launch.py"], False),
-        (["ros2", "launch", "push_predictor", "push_predictor.launch.py"], False),
-        (["record.launch.py"], False),
-    ],
-)
-def test_a_file_knows_whether_the_command_line_names_it(command: list[str], direct: bool) -> None:
-    assert started_directly(str(RECORD), command) is direct
-
-
-@pytest.mark.parametrize(
-    ("file", "name"), [(MAIN, "rviz"), (MAIN, "autostart"), (MAIN, "use_sim_time"), (RECORD, "force")]
-)
-def test_a_switch_is_true_or_false(file: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert f"{name}: 'ture' is not accepted, give true or false" in refusal(run(file, monkeypatch, f"{name}:=ture"))
-    assert "Node" in {type(action).__name__ for action in run(file, monkeypatch, f"{name}:=False")}
-
-
-# --- RViz ------------------------------------------------------------------------------------------------------------
-
-
-def test_without_rviz_nothing_is_started_and_the_message_states_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
-    found = refusal(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
-    assert "sudo apt install ros-jazzy-rviz2" in found and "rviz:=true" in found
-    assert "rviz2" not in executables(run(MAIN, monkeypatch, "rviz:=false", "recording:=b"))
-    install_fake_rviz(tmp_path, monkeypatch)
-    assert "rviz2" in executables(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
-    (tmp_path / "lib/rviz2/rviz2").unlink()  # its files without its program
-    assert "ros-jazzy-rviz2" in refusal(run(MAIN, monkeypatch, "rviz:=true", "recording:=b"))
+@pytest.mark.parametrize(("file", "count"), [(MAIN, 3), (RECORD, 2)], ids=lambda value: getattr(value, "name", ""))
+def test_a_switch_is_true_or_false(file: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    declared = {a.args[0]: a.kwargs for a in actions(load_launch_file(file)) if "choices" in a.kwargs}
+    switches = [name for name, kwargs in declared.items() if kwargs["default_value"] in ("true", "false")]
+    assert len(switches) == count
+    assert {declared[name]["choices"] for name in switches} == {("true", "false", "True", "False")}
+    assert all(each["default_value"] in each["choices"] for each in declared.values() if each["choices"])
+    words = [f"{name}:={value}" for name in switches for value in ("True", "False")]
+    assert all("Node" in {type(action).__name__ for action in run(file, monkeypatch, word)} for word in words)
 
 
 def test_rviz_is_a_dependency_of_the_package() -> None:
@@ -208,4 +129,4 @@ def test_the_reliability_is_that_of_every_sensor_topic_by_its_full_name(monkeypa
     }
     default = validator(monkeypatch, "reliability:=reliable")
     assert default["qos_overrides./slider/pose.subscription.reliability"] == "reliable"
-    assert "reliability: 'sensor_data' is not accepted" in refusal(run(MAIN, monkeypatch, "reliability:=sensor_data"))
+    assert load_launch_file(MAIN)["CHOICES"]["reliability"] == ("", "reliable", "best_effort")

@@ -1,9 +1,10 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The table of windows that a validator keeps on disk: what a residual trace starts from.
+"""What a validator keeps on disk while a run is open, so that an interrupted one loses nothing.
 
-Every window is appended with its covariates as soon as it is found, so an interrupted validation loses nothing.
+Every window is appended with its covariates to the table that a residual trace starts from as soon as it is found, and
+every prediction to the journal of the residuals.
 """
 
 from __future__ import annotations
@@ -15,14 +16,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.online.files.residual_journal import JOURNAL, ResidualJournal
 from push_predictor.recordings.atomic_append import append_lines
 from push_predictor.recordings.rig import Rig, save_rig
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import COLUMNS, OUTPUTS, PushTable
 from push_predictor.recordings.table_file import rig_path, write_table
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.types import Array
 
 TABLE = "pushes.csv"
+JOURNAL = "residuals.csv"  # exists while a validation is open, and after one that was interrupted
+_PREDICTED = tuple(f"predicted_{name}" for name in OUTPUTS)
+_COVARIANCE = tuple(f"covariance_{first}_{second}" for first in OUTPUTS for second in OUTPUTS)
+HEADER = (*COLUMNS, "model", "window", "end", *_PREDICTED, *_COVARIANCE)
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
@@ -65,6 +70,38 @@ class WindowTable:
         append_lines(self.path, (",".join(_cells(window, self._names, first)) for window in windows))
 
 
+class ResidualJournal:
+    """FOLDER/residuals.csv: a push table of the predicted windows, with the model and its prediction.
+
+    Every prediction is appended as soon as it arrives, as a whole line.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / JOURNAL
+        self.failure = ""  # why no more residuals are saved, in words
+
+    def begin(self) -> None:
+        """Write the empty table, which marks an open validation. Raises OSError that names the path."""
+        self.path.unlink(missing_ok=True)
+        append_lines(self.path, [",".join(HEADER)])
+
+    def add(self, model: str, window: PushWindow, mean: Array, covariance: Array) -> None:
+        """Append a prediction (3,), (3, 3). A full disk does not end the measurement: see `failure`."""
+        if self.failure:
+            return
+        inputs = (window.velocity, window.contact, window.angle, window.duration)
+        cells = [
+            *map(repr, map(float, (*inputs, *window.displacement))),
+            window.push_id,
+            *(_quoted(model), str(window.index), str(window.end)),
+            *map(repr, (*mean.tolist(), *covariance.ravel().tolist())),
+        ]
+        try:
+            append_lines(self.path, [",".join(cells)])
+        except OSError as error:
+            self.failure = f"Residuals are no longer saved: {error}"
+
+
 def put_aside(folder: Path) -> Path | None:
     """Move the windows and residuals of an interrupted validation to FOLDER/cut_off_DATE, so that they are kept.
 
@@ -101,3 +138,8 @@ def _cells(w: PushWindow, names: Sequence[str], first: Mapping[str, float]) -> l
 
 def _value(window: PushWindow, name: str, first: Mapping[str, float]) -> float:
     return float(window.covariates.get(name, first.get(name, np.nan)))
+
+
+def _quoted(text: str) -> str:
+    """A cell of a CSV file: a server may give its models any name."""
+    return '"' + text.replace('"', '""') + '"'
