@@ -44,7 +44,7 @@ def require_security() -> None:
         raise SecurityError(
             f"{ENABLE}={requested} does not enable security: ROS accepts only true. Set that, or unset it"
         )
-    os.environ.setdefault(STRATEGY, "Enforce")
+    os.environ[STRATEGY] = "Enforce"
 
 
 def security_hint() -> str:

@@ -16,9 +16,8 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from push_predictor.nodes.message_types import message_class
 from push_predictor.nodes.parameters import given_value
-from push_predictor.nodes.qos import DEPTH, common_profile
+from push_predictor.nodes.qos import DEPTH, common_profile, message_class
 
 
 class NoExecutor(CallbackGroup):

@@ -41,8 +41,8 @@ from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.server.guarded_action import GuardedAction
 from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
-from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.nodes.server.services import (
+    RequestFrames,
     handle_list_models,
     handle_load_model,
     handle_predict_push,

@@ -32,7 +32,7 @@ from msg_adapters.rigs import rig_to_message
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
 from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.parameters import read_options
+from push_predictor.nodes.replay.parameters import ReplayOptions, read_options
 from push_predictor.nodes.replay.topics import ReplayTopics
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
@@ -41,7 +41,6 @@ from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
-from push_predictor.replay.options import ReplayOptions
 from push_predictor.replay.player import PlayerOutput, ReplayPlayer
 from push_predictor.replay.report import ReplayReport
 from push_predictor.replay.source import BagSource, missing_poses, push_topics
@@ -53,7 +52,12 @@ LARGEST_CHECKED = 300_000_000  # bytes: a check reads the whole recording into m
 
 
 class PushReplay(Node):
-    """Plays one recording. Raises PushPredictorError for a parameter or a recording that is not accepted."""
+    """Plays one recording. Raises PushPredictorError for a parameter or a recording that is not accepted.
+
+    threads: of its executor: ~/burst waits for subscribers while the other controls work.
+    """
+
+    threads = 3
 
     def __init__(self, stop: Stop) -> None:
         super().__init__("push_replay")

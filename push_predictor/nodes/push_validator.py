@@ -22,6 +22,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
 from push_predictor.nodes.parameters import declare, topics_of, values_of
 from push_predictor.nodes.qos import LATCHED
+from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.nodes.validator.model_source import ModelSource
@@ -29,7 +30,6 @@ from push_predictor.nodes.validator.parameters import PARAMETERS
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.publishers import ResultPublishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
-from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun

@@ -65,7 +65,9 @@ def test_a_call_that_arrives_within_a_turn_waits_for_the_end_of_its_run() -> Non
     assert not service.responses, "the run is draining"
     session.written()
     finish.answer()
+    assert not finish.sent, "the executor has had no turn since"
     service.turn()
+    assert finish.sent
     ((caller, response),) = service.responses
     assert (caller, response.success, response.message) == ("caller", True, "result")
     assert not finish.requested

@@ -16,8 +16,7 @@ import pytest
 from fake_launch import actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from ros_harness import REPOSITORY
 
-from push_predictor.nodes import predict_server
-from push_predictor.nodes.recorder import parameters as recorder_parameters
+from push_predictor.nodes import predict_server, recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path

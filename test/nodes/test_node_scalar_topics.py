@@ -33,8 +33,8 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
+from push_predictor.nodes.validator.scalar_topics import ScalarTopics
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
-from push_predictor.nodes.validator.sensors.scalar_topics import ScalarTopics
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder

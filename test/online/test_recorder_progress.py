@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_predictor.online.recorder.findings import Pace
-from push_predictor.online.recorder.progress import LOG_PERIOD, LiveLine, Progress, StreamFigures
+from push_predictor.online.recorder_findings import Pace
+from push_predictor.online.recorder_progress import LOG_PERIOD, LiveLine, Progress, StreamFigures
 
 
 def stamps(*seconds: float) -> np.ndarray:

@@ -21,12 +21,12 @@ from ros_harness import REPOSITORY
 import push_predictor
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.geometry.shapes import SHAPES, shape_outline
+from push_predictor.nodes import recorder_parameters
 from push_predictor.nodes.parameters import Param
-from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
-from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
+from push_predictor.nodes.validator.scalar_topics import CLOCK
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.topics import DEFAULT_TOPICS
@@ -115,7 +115,7 @@ def test_the_reference_page_lists_every_parameter_with_its_default(node: str):
 
 def test_the_table_of_the_validators_topics_names_what_it_uses():
     nodes = REPOSITORY / "push_predictor" / "nodes"
-    modules = [nodes / "push_validator.py", *sorted((nodes / "validator").rglob("*.py"))]
+    modules = [nodes / "push_validator.py", nodes / "rig_source.py", *sorted((nodes / "validator").rglob("*.py"))]
     code = "".join(path.read_text() for path in modules)
     calls = r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\""
     used = {*re.findall(calls, code), DEFAULT_TOPICS.slider, DEFAULT_TOPICS.pusher, DEFAULT_TOPICS.wrench, CLOCK}

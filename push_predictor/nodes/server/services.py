@@ -9,12 +9,15 @@ check_cancelled between their parts; it raises when nobody waits any more.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rclpy.node import Node
+from rclpy.time import Time
 
 from msg_adapters.predictions import (
     PushQuery,
@@ -26,10 +29,11 @@ from msg_adapters.predictions import (
 )
 from msg_adapters.rigs import model_to_info
 from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
-from msg_adapters.slider_poses import fill_slider_response, query_from_slider_request, world_push
+from msg_adapters.slider_poses import fill_slider_response, pose_of_transform, query_from_slider_request, world_push
 from msg_adapters.suggestions import fill_suggest_response, query_from_suggest_request
 from push_predictor.design.batch import suggest_pushes
-from push_predictor.errors import PredictionError, RequestError, TooLargeError
+from push_predictor.errors import FrameError, PredictionError, RequestError, TooLargeError
+from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
 from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
@@ -43,7 +47,6 @@ from push_predictor.models.request import (
 )
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import persistence_of
 from push_predictor.planning.rollout import PARTICLES, rollout
@@ -53,6 +56,47 @@ from push_predictor.types import Array
 MAX_PUSHES = 1_000_000  # per batch: the server needs up to 0.6 kB for each while it answers
 MAX_EXACT = 50_000  # of these outside a table: up to a millisecond each
 CHUNK = 4096  # rows predicted at once: the length of a batch must not determine the memory of a prediction
+
+
+class RequestFrames:
+    """Looks frames up in tf; a lookup never waits. world: name of the frame in which sliders lie flat."""
+
+    def __init__(self, node: Node, world: str) -> None:
+        self.world = world
+        self._tf = _imported_tf()
+        if self._tf is not None:
+            self._buffer = self._tf.Buffer()
+            self._listener = self._tf.TransformListener(self._buffer, node)
+
+    def pose_in_world(self, header: Any) -> SpatialPose:
+        """The pose in the world of a header's frame at the header's stamp; a zero stamp means the latest.
+
+        Raises FrameError for an empty frame and for one that tf does not connect to the world.
+        """
+        if header.frame_id == self.world:
+            return SAME_FRAME
+        if not header.frame_id:
+            raise FrameError("header.frame_id", "", f"the frame of the poses, such as {self.world!r}")
+        if header.frame_id.lstrip("/") == self.world:
+            raise FrameError("header.frame_id", header.frame_id, f"{self.world!r}, without a slash")
+        if self._tf is None:
+            raise FrameError("header.frame_id", header.frame_id, f"{self.world!r}; tf2_ros is not installed")
+        return self._looked_up(self._tf, header)
+
+    def _looked_up(self, tf: Any, header: Any) -> SpatialPose:
+        try:
+            found = self._buffer.lookup_transform(self.world, header.frame_id, Time.from_msg(header.stamp))
+        except tf.TransformException as error:
+            accepted = f"{self.world!r}, or a frame that tf connects to it: {error}"
+            raise FrameError("header.frame_id", header.frame_id, accepted) from None
+        return pose_of_transform(found.transform)
+
+
+def _imported_tf() -> Any:
+    try:
+        return importlib.import_module("tf2_ros")
+    except ImportError:
+        return None
 
 
 def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) -> None:

@@ -102,7 +102,7 @@ def _watched(goal: Any, check: Callable[[], None], process: BaseProcess, pipe: C
             if not pipe.poll(POLL_PERIOD):
                 continue
             try:
-                received = pipe.recv()
+                received: Stage | Traced | Failed = pipe.recv()
             except (EOFError, OSError):
                 return Failed(_exit_reason(process), ErrorCode.INTERNAL_ERROR)
             if not isinstance(received, Stage):

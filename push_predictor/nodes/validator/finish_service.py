@@ -10,9 +10,9 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.result_writer import ResultWriter
-from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.online.session import Session, State
 
 

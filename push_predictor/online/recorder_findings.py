@@ -10,7 +10,7 @@ from collections import deque
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.online.recorder.progress import StreamFigures
+from push_predictor.online.recorder_progress import StreamFigures
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
 from push_predictor.recordings.decoder.poses import PoseFrame

@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.polling import FollowingSubscription
-from push_predictor.nodes.validator.sensors.topic_stream import DEPTH, SILENT, as_messages, reliability_text
+from push_predictor.nodes.validator.topic_stream import DEPTH, SILENT, as_messages, reliability_text
 from push_predictor.online.topic_report import TopicReport, stamp_figures
 from push_predictor.recordings.decoder.sources import STATIC
 from push_predictor.recordings.decoder.topic_input import RECENT

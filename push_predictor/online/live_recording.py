@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from push_predictor.online.recorder.findings import NANOSECOND, Findings
-from push_predictor.online.recorder.live_bag import LiveBag
-from push_predictor.online.recorder.progress import Progress
+from push_predictor.online.live_bag import LiveBag
+from push_predictor.online.recorder_findings import NANOSECOND, Findings
+from push_predictor.online.recorder_progress import Progress
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.decoder.sources import sources_of, topics_to_record
 from push_predictor.recordings.rig import Rig

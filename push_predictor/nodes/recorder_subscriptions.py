@@ -16,7 +16,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.polling import FollowingSubscription
 from push_predictor.nodes.qos import common_profile
-from push_predictor.online.recorder.live_recording import LiveRecording
+from push_predictor.online.live_recording import LiveRecording
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.decoder.sources import RecordedTopic
 
