@@ -160,6 +160,21 @@ def test_all_callers_get_the_reason_why_no_run_can_begin() -> None:
     assert {(response.success, response.message) for _, response in service.responses} == {(False, "no model")}
 
 
+def test_callers_of_two_turns_wait_for_the_same_run() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=False)
+    finish = finish_service(service, session)
+    session.open(0.0)
+    for caller in ("first", "second"):
+        service.call(caller)
+        finish.work()
+    assert session.drain_if_due(0.1, finish.requested, rig_changed=False)
+    finish.ending()
+    session.written()
+    finish.answer()
+    service.turn()
+    assert sorted(caller for caller, _ in service.responses) == ["first", "second"]
+
+
 def test_without_samples_there_is_nothing_to_write() -> None:
     service = Service()
     finish = finish_service(service, Session(last_answers=30.0, report=False))

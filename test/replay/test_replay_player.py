@@ -258,7 +258,7 @@ def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None
         sleep(0.01)
     player.close()
     assert free == [True, True], "the burst held the player's lock"
-    assert published == TEN and answers[0] >= 2
+    assert published == TEN and answers == [2], "the burst ends where the replay is resumed"
 
 
 def test_seek_goes_forward_and_back_without_waiting() -> None:
