@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
@@ -32,7 +31,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.reporting.canvas import draw
-from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.msg import PushResidual, ReplayStatus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +68,7 @@ class Listener:
         self.finished = False
         subscriber_node.create_subscription(MarkerArray, "push_markers", self._on_markers, 1000)
         subscriber_node.create_subscription(PushResidual, "push_residual", self._on_residual, 1000)
-        subscriber_node.create_subscription(String, "replay_status", self._on_status, LATCHED)
+        subscriber_node.create_subscription(ReplayStatus, "replay_status", self._on_status, LATCHED)
 
     def _on_markers(self, message: MarkerArray) -> None:
         self.markers[_stamp(message.markers[0])] = message
@@ -77,8 +76,8 @@ class Listener:
     def _on_residual(self, message: PushResidual) -> None:
         self.residuals[_stamp(message)] = message
 
-    def _on_status(self, message: String) -> None:
-        self.finished = message.data == "finished"
+    def _on_status(self, message: ReplayStatus) -> None:
+        self.finished = message.state == ReplayStatus.FINISHED
 
 
 Heard = TypeVar("Heard", bound=Listener)

@@ -19,19 +19,14 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from push_predictor.nodes.launch_checks import (
-    argument_problem,
-    end_launch,
-    executable_problem,
-    is_true,
-    start_or_refuse,
-)
+from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
 FRAMES = ("wrench_frame", "world_frame")
 TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
-SWITCHES = ("use_sim_time", "autostart", "rviz")
-RELIABILITIES = ("", "reliable", "best_effort")
+CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
+    "reliability": ("", "reliable", "best_effort")
+}
 
 ARGUMENTS = (
     ("namespace", "", "Namespace of all nodes."),
@@ -59,7 +54,10 @@ ARGUMENTS = (
 
 
 def generate_launch_description() -> LaunchDescription:
-    declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    declared = [
+        DeclareLaunchArgument(name, default_value=value, description=text, choices=CHOICES.get(name))
+        for name, value, text in ARGUMENTS
+    ]
     discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     return LaunchDescription(
         [
@@ -70,21 +68,8 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def _nodes(context: LaunchContext) -> list[Any]:
+def _nodes(context: LaunchContext) -> list[Node]:
     given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
-    return start_or_refuse(_problem(context, given), lambda: _started(given))
-
-
-def _problem(context: LaunchContext, given: dict[str, str]) -> str:
-    """Why nothing is started, empty if there is no reason."""
-    if problem := argument_problem(__file__, context.argv, given, SWITCHES):
-        return problem
-    if given["reliability"] not in RELIABILITIES:
-        return f"reliability: {given['reliability']!r} is not accepted, give reliable or best_effort"
-    return executable_problem("rviz2", "rviz:=true") if is_true(given["rviz"]) else ""
-
-
-def _started(given: dict[str, str]) -> list[Node]:
     recording = given["recording"]
     nodes = [
         _node("predict_server", "push_predictor", given, _server(given), end_launch()),

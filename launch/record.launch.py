@@ -17,7 +17,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from push_predictor.nodes.launch_checks import argument_problem, end_launch, is_true, start_or_refuse
+from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 
 TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame")
 PATHS = ("bag", "rig")
@@ -47,7 +47,10 @@ ARGUMENTS = (
 
 
 def generate_launch_description() -> LaunchDescription:
-    declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    declared = [
+        DeclareLaunchArgument(name, default_value=value, description=text, choices=SWITCH if name in SWITCHES else None)
+        for name, value, text in ARGUMENTS
+    ]
     discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     return LaunchDescription(
         [
@@ -58,16 +61,11 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def _nodes(context: LaunchContext) -> list[Any]:
+def _nodes(context: LaunchContext) -> list[Node]:
     given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
-    problem = argument_problem(__file__, context.argv, given, SWITCHES)
-    return start_or_refuse(problem, lambda: [_recorder(given)])
-
-
-def _recorder(given: dict[str, str]) -> Node:
     enclave = ["--enclave", given["enclave"]] if given["enclave"] else []
     files = [given["params_file"]] if given["params_file"] else []
-    return Node(
+    recorder = Node(
         package="push_predictor",
         executable="push_recorder",
         name="push_recorder",
@@ -78,6 +76,7 @@ def _recorder(given: dict[str, str]) -> Node:
         sigterm_timeout="30",  # a large bag needs time to be completed
         on_exit=end_launch(),
     )
+    return [recorder]
 
 
 def _parameters(given: dict[str, str]) -> dict[str, Any]:

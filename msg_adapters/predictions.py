@@ -53,16 +53,16 @@ def query_to_request(
     request.velocity, request.contact, request.angle = (float(value) for value in push)
     request.covariate_names = list(covariates or {})
     request.covariate_values = [float(value) for value in (covariates or {}).values()]
-    request.push_residual = [] if residual is None else _doubles(residual)
+    request.push_residual = [] if residual is None else doubles(residual)
     return request
 
 
 def query_to_batch_request(query: PushQuery) -> PredictPushBatch.Request:
     """The request for n pushes."""
     request = PredictPushBatch.Request(model=query.model, duration=float(query.duration))
-    request.velocity, request.contact, request.angle = map(_doubles, query.inputs.T)
+    request.velocity, request.contact, request.angle = map(doubles, query.inputs.T)
     request.covariate_names = list(query.covariates)
-    request.covariate_values = _doubles(_push_by_push(query.covariates))
+    request.covariate_values = doubles(_push_by_push(query.covariates))
     return request
 
 
@@ -155,7 +155,7 @@ def _check_covariates(names: Sequence[str], values: Sequence[float], count: int)
         raise CovariateError("covariate_names", sorted(repeated), "each name once")
 
 
-def _doubles(values: Array) -> array[float]:
+def doubles(values: Array) -> array[float]:
     """The values, row-major, as messages store them: a list would be converted one by one."""
     return array("d", np.asarray(values, dtype=np.float64).tobytes())
 

@@ -1,61 +1,53 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A validated window -> push_predictor_interfaces/PushResidual."""
+"""What a validator publishes: a window and its prediction -> PushResidual, an alarm that has fired -> PushAlarm."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from msg_adapters import MessageError
 from msg_adapters.stamps import ns_to_stamp
+from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
-from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.msg import PushAlarm, PushResidual
 
 
-@dataclass(frozen=True, eq=False)
-class ValidatedWindow:
-    """One window, predicted and observed.
+def residual_to_message(
+    model: str, window: PushWindow, mean: Array, covariance: Array, in_domain: bool, frame_id: str = "world"
+) -> PushResidual:
+    """The message of a window and a model's prediction (3,), (3, 3) of it, made in or out of the model's domain.
 
-    stamp_ns: end of the window, ns. window: number within the push. inputs (3,): velocity m/s, contact, angle rad;
-    duration s. predicted and observed (3,): dx m, dy m, dtheta rad in the push frame; covariance (3, 3) of an
-    observed outcome. in_domain: whether the push is in the domain of the model's training data.
+    standardised: L^-1 (observed - predicted), with L L' = covariance. Raises MessageError if there is no such L.
     """
-
-    stamp_ns: int
-    push_id: str
-    window: int
-    model: str
-    inputs: Array
-    duration: float
-    predicted: Array
-    covariance: Array
-    observed: Array
-    in_domain: bool
-
-    @property
-    def standardised(self) -> Array:
-        """L^-1 (observed - predicted), (3,), with L L' = covariance. Raises MessageError if there is no such L."""
-        try:
-            factor = np.linalg.cholesky(self.covariance)
-        except np.linalg.LinAlgError:
-            raise MessageError("covariance", self.covariance.tolist(), "a positive definite matrix") from None
-        return np.asarray(np.linalg.solve(factor, self.observed - self.predicted))
-
-
-def residual_to_message(window: ValidatedWindow, frame_id: str = "world") -> PushResidual:
-    """The message of a window. Raises MessageError for a covariance that is not positive definite."""
-    message = PushResidual(push_id=window.push_id, window=int(window.window), model=window.model)
-    message.header.stamp, message.header.frame_id = ns_to_stamp(window.stamp_ns), frame_id
-    message.velocity, message.contact, message.angle = (float(value) for value in window.inputs)
+    try:
+        factor = np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        raise MessageError("covariance", covariance.tolist(), "a positive definite matrix") from None
+    message = PushResidual(push_id=window.push_id, window=int(window.index), model=model, in_domain=bool(in_domain))
+    message.header.stamp, message.header.frame_id = ns_to_stamp(window.end), frame_id
+    message.velocity, message.contact, message.angle = map(float, (window.velocity, window.contact, window.angle))
     message.duration = float(window.duration)
-    message.predicted, message.observed = _flat(window.predicted), _flat(window.observed)
-    message.covariance, message.standardised = _flat(window.covariance), _flat(window.standardised)
-    message.in_domain = window.in_domain
+    message.predicted, message.observed = _flat(mean), _flat(window.displacement)
+    message.covariance = _flat(covariance)
+    message.standardised = _flat(np.linalg.solve(factor, window.displacement - mean))
     return message
 
 
 def _flat(values: Array) -> Array:
     return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)
+
+
+def alarm_to_message(state: AlarmState, model: str, stamp_ns: int, frame_id: str = "world") -> PushAlarm:
+    """The message of an alarm about a model. stamp_ns: end of the push at which it fired.
+
+    Raises MessageError if it has not fired.
+    """
+    if state.fired_at is None or state.fired_after is None or state.fired_evidence is None or state.fired_by is None:
+        raise MessageError("alarm", state, "an alarm that has fired")
+    message = PushAlarm(push_id=state.fired_at, pushes=state.fired_after, model=model, score=state.fired_by)
+    message.header.stamp, message.header.frame_id = ns_to_stamp(stamp_ns), frame_id
+    message.log10_evidence, message.false_alarm_rate = state.fired_evidence, state.false_alarm_rate
+    return message

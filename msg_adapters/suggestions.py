@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from msg_adapters.predictions import covariates_of_push
+from msg_adapters.predictions import covariates_of_push, doubles
 from push_predictor.design.batch import Suggested
 from push_predictor.design.limits import Interval, Limits
 from push_predictor.errors import RequestError
@@ -45,7 +44,7 @@ def fill_suggest_response(response: Any, suggested: Suggested) -> None:
     """Write the suggested pushes into a response."""
     columns = (*suggested.inputs.T, suggested.duration, suggested.variance_left)
     for name, column in zip(("velocity", "contact", "angle", "duration", "variance_left"), columns, strict=True):
-        setattr(response, name, array("d", column.tobytes()))
+        setattr(response, name, doubles(column))
     response.success = True
 
 

@@ -62,7 +62,7 @@ def _publisher(messages: list[RawMessage]) -> Callable[[RawMessage], object]:
     """A function that publishes a message, once each push topic has a subscriber."""
     import rclpy
 
-    from push_predictor.nodes.message_types import message_class
+    from push_predictor.nodes.qos import message_class
 
     rclpy.init()
     node = rclpy.create_node("bare_loop")

@@ -27,7 +27,7 @@ from benchmarks.nodes.server_under_test import Caller, caller, graph, load, mode
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.nodes.server.prediction_services import MAX_EXACT
+from push_predictor.nodes.server.services import MAX_EXACT
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 SIZES = (1, 10, 100, 1000, 5000, 20_000, 100_000, 1_000_000)

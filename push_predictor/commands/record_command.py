@@ -16,7 +16,7 @@ from push_predictor.commands.common.output import check_output, write_json
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
-    from push_predictor.online.recorder.progress import Progress
+    from push_predictor.online.recorder_progress import Progress
 
 NOTHING = "No message arrived. No bag was written."
 

@@ -1,39 +1,38 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Polled topics and services: the node takes messages itself, instead of one executor turn for each of them."""
+"""Polled topics: a node takes their messages itself, at a tenth of the cost of one executor turn for each of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from time import monotonic
+from collections.abc import Iterator, Sequence
+from time import time_ns
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.service import Service
+from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-EVENTS_PERIOD = 1.0  # s between two looks at the QoS events
-EVENTS_TURN = 0.03  # s that a look lasts: longer than the period of the timers that keep the executor turning
+from push_predictor.nodes.parameters import given_value
+from push_predictor.nodes.qos import DEPTH, common_profile, message_class
 
 
-class PolledGroup(CallbackGroup):
-    """Keeps an executor from waiting for subscriptions and services; it handles their QoS events once a second.
-
-    While an executor waits for the events of a subscription, each message that is not yet taken ends its wait: it would
-    turn without a pause for as long as messages arrive.
-    """
+class NoExecutor(CallbackGroup):
+    """Entities that no executor waits for."""
 
     def can_execute(self, entity: Any) -> bool:
         """See CallbackGroup."""
-        return not isinstance(entity, (Subscription, Service)) and monotonic() % EVENTS_PERIOD < EVENTS_TURN
+        return False
 
     def beginning_execution(self, entity: Any) -> bool:
         """See CallbackGroup."""
-        return self.can_execute(entity)
+        return False
 
     def ending_execution(self, entity: Any) -> None:
-        """See CallbackGroup."""
+        """Do nothing: execution never begins."""
 
 
 class Taken(NamedTuple):
@@ -46,9 +45,103 @@ class Taken(NamedTuple):
 
 
 def take_all(subscription: Subscription) -> Iterator[Taken]:
-    """The messages that the middleware holds for a subscription, at a tenth of the cost of an executor's turn."""
-    with subscription.handle:
+    """The messages that the middleware holds for a subscription."""
+    with subscription.handle:  # as rclpy.wait_for_message does it; an executor's turn a message costs ten times as much
         while (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)) is not None:
             message, info = taken
             number, sent = info["publication_sequence_number"], info["source_timestamp"]
             yield Taken(message, number, sent, info["received_timestamp"])
+
+
+class FollowingSubscription:
+    """A subscription that is made again when the type or QoS of its publishers changes.
+
+    It takes serialized messages, with the reliability that all publishers of the topic offer.
+    depth: of its queue. earlier: also take what was sent before, if all publishers keep it. overridable: parameters
+    qos_overrides.TOPIC.subscription.* apply, and a reliability given there is kept. Call `publishers` and `follow` in
+    the executor's thread, one method at a time, and `taken` before `follow`. lost: messages that were overwritten
+    before they were taken, or sent while the subscription was made again.
+    """
+
+    def __init__(
+        self, node: Node, topic: str, depth: int = DEPTH, *, earlier: bool = True, overridable: bool = False
+    ) -> None:
+        self._node, self._topic, self._group = node, topic, NoExecutor()
+        self._depth, self._earlier = depth, earlier
+        self.name = node.resolve_topic_name(topic)  # after remapping
+        self.lost = 0
+        self._overriding = _overriding(node, self.name) if overridable else None
+        self._subscription: Subscription | None = None
+        self._profile: tuple[Any, ...] | None = None
+        self._last: int | None = None  # number of the last message
+        self._alone = True  # whether there was at most one publisher at the last look
+        self._since = 0  # when their number changed, ns
+
+    @property
+    def reliability(self) -> ReliabilityPolicy | None:
+        """That of the subscription, None without one."""
+        return self._subscription.qos_profile.reliability if self._subscription is not None else None
+
+    def publishers(self) -> list[TopicEndpointInfo]:
+        """The present publishers of the topic, of any type."""
+        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
+        if (alone := len(found) <= 1) != self._alone:
+            self._alone, self._last, self._since = alone, None, time_ns()
+        return found
+
+    def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        """Subscribe to this type as these publishers offer it, reliable without any.
+
+        Raises PushPredictorError if the type is not installed.
+        """
+        offered = [publisher.qos_profile for publisher in publishers]
+        profile = common_profile(offered, self._depth, self._earlier)
+        wanted = kind, profile.durability, profile.reliability
+        if wanted == self._profile:
+            return
+        found = message_class(kind)
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription, self._profile = None, None
+        try:
+            self._subscription = self._node.create_subscription(
+                found,
+                self._topic,
+                _not_called,
+                profile,
+                callback_group=self._group,
+                qos_overriding_options=self._overriding,
+                raw=True,
+            )
+        except RuntimeError:
+            return  # of rcl: another stream still has one of another type. Try again at the next call
+        self._profile = wanted
+
+    def taken(self) -> Iterator[Taken]:
+        """The arrived messages."""
+        if self._subscription is None:
+            return
+        for message in take_all(self._subscription):
+            self._note_loss(message)
+            yield message
+
+    def _note_loss(self, message: Taken) -> None:
+        """Count the messages that are missing between two; several publishers number theirs independently."""
+        if 0 < message.received <= self._since:  # perhaps of one that has left
+            return
+        number = message.number
+        last, self._last = self._last, number
+        if last is not None and number > last + 1 and self._alone and self._node.count_publishers(self.name) == 1:
+            self.lost += number - last - 1
+
+
+def _overriding(node: Node, name: str) -> QoSOverridingOptions:
+    """History and depth may be overridden; reliability is fixed only if a parameter gives it."""
+    policies = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH]
+    if given_value(node, f"qos_overrides.{name}.subscription.reliability") is not None:
+        policies.append(QoSPolicyKind.RELIABILITY)
+    return QoSOverridingOptions(policies)
+
+
+def _not_called(message: object) -> None:
+    """The callback that a subscription must have: `taken` takes the messages instead."""

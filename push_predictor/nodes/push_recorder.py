@@ -15,19 +15,18 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 from collections.abc import Sequence
 from time import monotonic
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_adapters.diagnostics import diagnostic_array
-from push_predictor.nodes.recorder.parameters import read_options
-from push_predictor.nodes.recorder.status import recorder_status
-from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
+from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from push_predictor.nodes.recorder_parameters import read_options
+from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
+from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.nodes.validator.rig_source import RigSource
-from push_predictor.online.recorder.live_line import LiveLine
-from push_predictor.online.recorder.live_recording import LiveRecording
-from push_predictor.online.recorder.progress import Progress
+from push_predictor.online.live_recording import LiveRecording
+from push_predictor.online.recorder_progress import LiveLine, Progress
+from push_predictor.recordings.rig import Rig
 
 PERIOD = 0.02  # s between two looks at what has arrived
 SHOWN = 1.0  # s between two updates of the line
@@ -103,3 +102,16 @@ def main(args: Sequence[str] | None = None) -> int:
     if summary is not None:
         print(summary.to_text())
     return status
+
+
+def recorder_status(node_name: str, progress: Progress, rig: Rig | None) -> DiagnosticStatus:
+    """WARN while something is missing. The message has the problems, the values the figures of every stream."""
+    values: dict[str, object] = {"state": "recording" if progress.started else "waiting for messages"}
+    values |= {"bag": progress.path, "seconds": progress.seconds, "messages": sum(progress.messages.values())}
+    values |= {"windows": progress.windows, "pushes": progress.pushes, "share of contact": progress.contact}
+    for each in progress.streams:
+        values |= {f"{each.name} samples": each.samples, f"{each.name} rate": each.rate}
+        values[f"{each.name} largest gap"] = each.largest_gap
+    level = Level.WARN if progress.problems else Level.OK
+    message = " ".join(progress.problems.values()) or str(values["state"])
+    return diagnostic_status(node_name, "recording", level, message, values, rig.shape if rig else "")

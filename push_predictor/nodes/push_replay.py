@@ -12,7 +12,6 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
     sys.exit(entry.push_replay())
 
-import json
 import os
 import struct
 import threading
@@ -27,13 +26,13 @@ from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.rigs import rig_to_message
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
 from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.parameters import read_options
+from push_predictor.nodes.replay.parameters import ReplayOptions, read_options
 from push_predictor.nodes.replay.topics import ReplayTopics
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
@@ -42,18 +41,23 @@ from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
-from push_predictor.replay.options import ReplayOptions
 from push_predictor.replay.player import PlayerOutput, ReplayPlayer
-from push_predictor.replay.push_topics import missing_poses, push_topics
 from push_predictor.replay.report import ReplayReport
-from push_predictor.replay.source import BagSource
+from push_predictor.replay.source import BagSource, missing_poses, push_topics
 from push_predictor.resources import share_path
+from push_predictor_interfaces.msg import PushRig, ReplayStatus
 
+STATES = {"playing": ReplayStatus.PLAYING, "paused": ReplayStatus.PAUSED, "finished": ReplayStatus.FINISHED}
 LARGEST_CHECKED = 300_000_000  # bytes: a check reads the whole recording into memory
 
 
 class PushReplay(Node):
-    """Plays one recording. Raises PushPredictorError for a parameter or a recording that is not accepted."""
+    """Plays one recording. Raises PushPredictorError for a parameter or a recording that is not accepted.
+
+    threads: of its executor: ~/burst waits for subscribers while the other controls work.
+    """
+
+    threads = 3
 
     def __init__(self, stop: Stop) -> None:
         super().__init__("push_replay")
@@ -63,9 +67,9 @@ class PushReplay(Node):
         bag = open_bag(options.recording)
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
-        self._status = self.create_publisher(String, "replay_status", LATCHED)
+        self._status = self.create_publisher(ReplayStatus, "replay_status", LATCHED)
         self._clock_publisher = self.create_publisher(Clock, "/clock", KEPT if self._topics.untimed else CLOCK)
-        self._rig = self.create_publisher(String, "rig", LATCHED)
+        self._rig = self.create_publisher(PushRig, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
         self._checks = CheckProcess(options.strict)
@@ -99,16 +103,15 @@ class PushReplay(Node):
 
     def _publish_rig(self, bag: Bag) -> str:
         """Publish the push_rig record; returns what is wrong with it, empty if nothing."""
-        if self._options.rig is not None:
-            record = load_rig(self._options.rig).to_record()
-        else:
-            record = {key: _text(value) for key, value in bag.metadata.get(RECORD_NAME, {}).items()}
-            try:
-                rig_from_record(record, str(bag.path))
-            except RigError as error:
-                self.get_logger().warning(f"the topic rig is not published: {error}")
-                return str(error)
-        self._rig.publish(String(data=json.dumps(record)))
+        try:
+            given, record = self._options.rig, bag.metadata.get(RECORD_NAME, {})
+            rig = load_rig(given) if given is not None else rig_from_record(record, str(bag.path))
+        except RigError as error:
+            if self._options.rig is not None:
+                raise
+            self.get_logger().warning(f"the topic rig is not published: {error}")
+            return str(error)
+        self._rig.publish(rig_to_message(rig))
         return ""
 
     def _stream_topics(self) -> Topics:
@@ -171,7 +174,7 @@ class PushReplay(Node):
         self._acknowledged = self._topics.acknowledged()
 
     def _announce(self, state: str) -> None:
-        self._status.publish(String(data=state))
+        self._status.publish(ReplayStatus(state=STATES[state]))
         if state == "finished":
             report = self._report()
             self._publish_report(report)
@@ -256,7 +259,3 @@ def main() -> int:
 def _size(path: Path) -> int:
     """Bytes of a recording."""
     return sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]))
-
-
-def _text(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value)

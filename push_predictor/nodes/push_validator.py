@@ -17,12 +17,12 @@ from time import monotonic
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
+from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.nodes.validator.model_source import ModelSource
@@ -30,14 +30,15 @@ from push_predictor.nodes.validator.parameters import PARAMETERS
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.publishers import ResultPublishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
-from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
 from push_predictor.recordings.topics import topics_of
+from push_predictor_interfaces.msg import ReplayStatus
 
+REPLAY_STATES = {ReplayStatus.PLAYING: "playing", ReplayStatus.PAUSED: "paused", ReplayStatus.FINISHED: "finished"}
 PERIOD = 0.02  # s between two looks at what has arrived
 
 
@@ -65,7 +66,7 @@ class PushValidator(Node):
         )
         self._strict: bool = values["strict"]
         self._run: ValidationRun | None = None  # the present one, or the last
-        self.create_subscription(String, "replay_status", self._on_replay_status, LATCHED)
+        self.create_subscription(ReplayStatus, "replay_status", self._on_replay_status, LATCHED)
         self._finish = FinishService(self, self._session, self._models, self._rigs, self._writer)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(PERIOD, self._work, clock=steady)
@@ -74,7 +75,7 @@ class PushValidator(Node):
     def finish(self) -> bool:
         """Write the results; whether that is done."""
         self._closing = True
-        return self._closed
+        return self._closed and self._finish.sent
 
     def close(self) -> None:
         """End what runs. Raises PushPredictorError if the results could not be written."""
@@ -88,9 +89,9 @@ class PushValidator(Node):
         if self._session.failure:
             raise PushPredictorError(self._session.failure)
 
-    def _on_replay_status(self, message: String) -> None:
+    def _on_replay_status(self, message: ReplayStatus) -> None:
         self._sensors.drain()
-        self._session.replay(message.data, samples_waiting=len(self._sensors) > 0)
+        self._session.replay(REPLAY_STATES.get(message.state, ""), samples_waiting=len(self._sensors) > 0)
 
     def _on_alarm(self, state: AlarmState, end: int) -> None:
         """Publish an alarm about the main model of the present run."""

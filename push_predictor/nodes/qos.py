@@ -1,19 +1,24 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""QoS of replayed topics and of subscriptions that follow their publishers."""
+"""QoS and classes of the topics of a replay and of subscriptions that follow their publishers."""
 
 from __future__ import annotations
 
+import importlib
+import re
 from collections.abc import Sequence
 
 import yaml
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from push_predictor.errors import PushPredictorError
+
 DEPTH = 1000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for late subscribers
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # as rosbag2 and Gazebo publish it
+_TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
 
 
 def replay_profile(recorded: str, kept: bool = False) -> QoSProfile:
@@ -48,3 +53,14 @@ def _was_latched(recorded: str) -> bool:
     if not isinstance(profiles, list) or not profiles:
         return False
     return all(isinstance(p, dict) and p.get("durability") in (1, "transient_local") for p in profiles)
+
+
+def message_class(kind: str) -> type:
+    """The Python class of a message type such as std_msgs/msg/String. Raises PushPredictorError if there is none."""
+    if not (match := _TYPE.fullmatch(kind)):
+        raise PushPredictorError(f"type {kind!r} is not of the form package/msg/Name")
+    try:
+        found: type = getattr(importlib.import_module(f"{match[1]}.msg"), match[2])
+    except (ImportError, AttributeError) as error:
+        raise PushPredictorError(f"type {kind} is not installed ({error})") from None
+    return found

@@ -10,13 +10,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Protocol, TypeAlias
 
 import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
@@ -28,19 +28,14 @@ from push_predictor.online.child_process import kill_children
 TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
 LONGEST = 3.0  # s in which a callback may: less than a launch waits for
-_GRAPH_ERRORS = (
-    rclpy_implementation.RCLError,
-    rclpy_implementation.RCLInvalidROSArgsError,
-    rclpy_implementation.UnknownROSArgsError,
-    InvalidNamespaceException,
-    InvalidNodeNameException,
-)
+_GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
 
 
 class Closable(Protocol):
     """A node with a method close(), which is called when it no longer spins, while the graph is still available.
 
-    A method finish(), if it has one, is called before, in turns with the executor, until it returns True.
+    If it has them: a method finish() is called before, in turns with the executor, until it returns True; `threads` is
+    the number of threads of the executor; abandons_callbacks is whether one runs for which the process will not wait.
     """
 
     def close(self) -> None:
@@ -87,7 +82,7 @@ def run(
     life.spin()
     signal.signal(signal.SIGALRM, signal.SIG_IGN)  # the end is not interrupted
     status = life.end()
-    if life.half_made:  # it may have threads that only a whole node could end
+    if life.leaves_threads:
         kill_children()
         sys.stdout.flush()
         os._exit(status)
@@ -95,7 +90,7 @@ def run(
 
 
 class Life:
-    """A node, from its creation to its end. spinning: whether it spins; half_made: a signal interrupted its making."""
+    """A node, from its creation to its end. spinning: whether it spins; leaves_threads: that it will not wait for."""
 
     def __init__(
         self,
@@ -110,7 +105,7 @@ class Life:
         self._context = context
         self._node: Any = None
         self._executor: Executor | None = None
-        self.spinning = self.half_made = False
+        self.spinning = self.leaves_threads = False
 
     def spin(self) -> None:
         """Create the node, start it, and spin it until the end is requested."""
@@ -118,15 +113,17 @@ class Life:
             self._node = self._made()
             if self._start is not None:
                 self._start(self._node)
-            self._executor = SingleThreadedExecutor(context=self._context)
+            threads = getattr(self._node, "threads", 1)
+            several = partial(MultiThreadedExecutor, threads)
+            self._executor = (several if threads > 1 else SingleThreadedExecutor)(context=self._context)
             self._executor.add_node(self._node)
             self.spinning = True
-            while not self._stop.requested:
+            while not self._stop.requested and self._executor.context.ok():
                 self._executor.spin_once(timeout_sec=TURN)
         except ExternalShutdownException:
             self._stop.request()
         except KeyboardInterrupt:
-            self.half_made = self._executor is None
+            self.leaves_threads = self._executor is None  # half made
             self._stop.request()
         except BaseException as error:
             self._stop.fail(error)
@@ -158,6 +155,7 @@ class Life:
             self._node.close()
         except Exception as error:
             self._stop.fail(error)
+        self.leaves_threads |= getattr(self._node, "abandons_callbacks", False)
 
     def _made(self) -> Closable:
         limited = limit_discovery()

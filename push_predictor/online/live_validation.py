@@ -1,34 +1,35 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The windows and predictions of a validation run, and the files written about them."""
+"""The windows and predictions of a validation run, their running scores, and the files written about them."""
 
 from __future__ import annotations
 
 import json
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import blake2b
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors.tails import Tails, half_widths
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.files.row_file import RowFile
-from push_predictor.online.files.window_log import Refusal, write_window_log
-from push_predictor.online.files.window_rows import WindowRows
-from push_predictor.online.running_score import RunningScore
+from push_predictor.online.window_log import Refusal, write_window_log
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.table import OUTPUTS
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array, BoolArray, IntArray
 
 MAIN_RESULT = "validation.json"
-_ANSWER = struct.Struct("<q12d?")  # number of the window, mean, covariance, whether in the domain
-_ROW = np.dtype([("number", "<i8"), ("values", "<f8", 12), ("in_domain", "?")])  # the same
-_NUMBER = struct.Struct("<q")
+_FIXED = struct.Struct("<3q14d2H")  # the last two: number of the covariates' names, length of the push's id
 
 
 class Residual(NamedTuple):
@@ -44,8 +45,7 @@ class Residual(NamedTuple):
 class LiveValidation:
     """Windows in the order they were found, and the predictions of each model in any order.
 
-    models: by the name to request; the first is the main one, and a model's number is its position. All windows and
-    predictions are stored in temporary files: a window takes some twenty bytes of memory until the result is written.
+    models: by the name to request; the first is the main one, and a model's number is its position.
     """
 
     def __init__(self, models: Mapping[str, PushModel]) -> None:
@@ -53,7 +53,7 @@ class LiveValidation:
         self.windows = WindowRows()
         self.scores = tuple(RunningScore(model.training_mean, model.predictor.tails) for model in self.models)
         self._answers = tuple(_Answers() for _ in self.models)
-        self._refused = tuple(RowFile() for _ in self.models)
+        self._refused: tuple[list[tuple[int, str]], ...] = tuple([] for _ in self.models)
 
     def add(self, window: PushWindow) -> int:
         """Add a window; returns its number."""
@@ -68,7 +68,7 @@ class LiveValidation:
 
     def refuse(self, model: int, number: int, reason: str) -> None:
         """Record that a model was refused a window, and why."""
-        self._refused[model].append(_NUMBER.pack(number) + reason.encode())
+        self._refused[model].append((number, reason))
 
     def predicted(self, model: int = 0) -> WindowRows:
         """The windows that a model has predicted, in order."""
@@ -76,7 +76,7 @@ class LiveValidation:
 
     def refused(self, model: int = 0) -> list[Refusal]:
         """The windows that a model was refused, in order."""
-        pairs = sorted((*_NUMBER.unpack_from(row), row[_NUMBER.size :].decode()) for row in self._refused[model])
+        pairs = sorted(self._refused[model])
         return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
 
     def unanswered(self, model: int = 0) -> int:
@@ -113,27 +113,135 @@ class LiveValidation:
         return path
 
 
-class _Answers:
-    """Means, covariances and whether in the domain, by number of window, packed."""
+class WindowRows(Sequence[PushWindow]):
+    """Windows packed into some 200 bytes each, so that those of a day fit into memory; indexing creates them again."""
 
     def __init__(self) -> None:
-        self._rows = RowFile()
+        self._rows: list[bytes] = []
+        self._names: list[tuple[str, ...]] = []  # of the covariates, as sets of them occurred
+
+    def append(self, window: PushWindow) -> None:
+        """Append a window."""
+        names = tuple(window.covariates)
+        if names not in self._names:
+            self._names.append(names)
+        self._rows.append(_packed(window, self._names.index(names)))
+
+    def take(self, numbers: Iterable[int]) -> WindowRows:
+        """Some of the windows, in the order of the numbers."""
+        chosen = WindowRows()
+        chosen._rows, chosen._names = [self._rows[number] for number in numbers], self._names.copy()
+        return chosen
 
     def __len__(self) -> int:
         return len(self._rows)
 
+    @overload
+    def __getitem__(self, number: int) -> PushWindow: ...
+    @overload
+    def __getitem__(self, number: slice) -> WindowRows: ...
+    def __getitem__(self, number: int | slice) -> PushWindow | WindowRows:
+        if isinstance(number, slice):
+            return self.take(range(*number.indices(len(self))))
+        return _unpacked(self._rows[number], self._names)
+
+
+class _Answers:
+    """Means, covariances and whether in the domain, by number of window."""
+
+    def __init__(self) -> None:
+        self._numbers, self._values = array("q"), array("d")
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
     def add(self, number: int, mean: Array, covariance: Array, in_domain: bool) -> None:
-        self._rows.append(_ANSWER.pack(number, *mean.tolist(), *covariance.ravel().tolist(), in_domain))
+        self._numbers.append(number)
+        self._values.extend([*mean.tolist(), *covariance.ravel().tolist(), float(in_domain)])
 
     def sorted(self) -> tuple[IntArray, Array, Array, BoolArray]:
         """Numbers (n,), means (n, 3), covariances (n, 3, 3), whether in the domain (n,), by number."""
-        data = np.frombuffer(b"".join(self._rows), dtype=_ROW)
-        data = data[np.argsort(data["number"])]
-        values = data["values"]
-        mean, covariance = values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
-        return data["number"].copy(), mean, covariance, data["in_domain"].copy()
+        numbers, values = np.array(self._numbers, np.int64), np.array(self._values).reshape(-1, 13)
+        order = np.argsort(numbers)
+        values = values[order]
+        return numbers[order], values[:, :3], values[:, 3:12].reshape(-1, 3, 3), values[:, 12] > 0.0
+
+
+def _packed(w: PushWindow, names: int) -> bytes:
+    poses, push = (*w.displacement, *w.slider_start, *w.slider_end), w.push_id.encode()
+    numbers = (w.velocity, w.contact, w.angle, w.duration, *poses, w.push_heading)
+    fixed = _FIXED.pack(w.index, w.start, w.end, *numbers, names, len(push))
+    return fixed + push + struct.pack(f"<{len(w.covariates)}d", *w.covariates.values())
+
+
+def _unpacked(data: bytes, known: Sequence[tuple[str, ...]]) -> PushWindow:
+    index, start, end, velocity, contact, angle, duration, *poses, heading, number, length = _FIXED.unpack_from(data)
+    displacement, slider_start, slider_end = np.array(poses).reshape(3, 3)
+    names, rest = known[number], _FIXED.size + length
+    return PushWindow(
+        data[_FIXED.size : rest].decode(),
+        index,
+        start,
+        end,
+        velocity,
+        contact,
+        angle,
+        duration,
+        displacement,
+        slider_start,
+        slider_end,
+        heading,
+        dict(zip(names, struct.unpack_from(f"<{len(names)}d", data, rest), strict=True)),
+    )
 
 
 def _file_name(name: str) -> str:
     """A model's name as part of a file name: a server may give its models any name."""
     return re.sub(r"[^\w.-]", "_", name)
+
+
+class RunningScore:
+    """Running sums over the windows of one model.
+
+    training_mean (3,): the reference of the NMSE. tails: of the model's predictive distribution.
+    """
+
+    def __init__(self, training_mean: Array, tails: Tails | None = None) -> None:
+        self.windows = 0
+        self._training_mean = training_mean
+        self._half_widths = [half_widths(tails, level) for level in COVERAGE_LEVELS]
+        self._pushes = array("q")  # digests of their names, in order: a set would take ten times as much
+        self._error, self._spread, self._nlpd = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._covered = np.zeros((len(COVERAGE_LEVELS), 3))
+
+    @property
+    def pushes(self) -> int:
+        """The number of pushes that the windows belong to."""
+        return len(self._pushes)
+
+    def add(self, push_id: str, mean: Array, covariance: Array, observed: Array) -> None:
+        """Add a window: predicted mean (3,) and covariance (3, 3), observed outcome (3,)."""
+        predicted, variance, outcome = mean[None], np.diagonal(covariance)[None], observed[None]
+        self.windows += 1
+        self._count_push(push_id)
+        self._error += (observed - mean) ** 2
+        self._spread += (observed - self._training_mean) ** 2
+        self._nlpd += gaussian_nlpd(predicted, variance, outcome)[0]
+        self._covered += [coverage(predicted, variance, outcome, half) for half in self._half_widths]
+
+    def _count_push(self, push_id: str) -> None:
+        digest = int.from_bytes(blake2b(push_id.encode(), digest_size=8).digest(), "little", signed=True)
+        place = bisect_left(self._pushes, digest)
+        if place == len(self._pushes) or self._pushes[place] != digest:
+            self._pushes.insert(place, digest)
+
+    def values(self) -> dict[str, int | float | None]:
+        """The totals of `metrics_json` and the coverage of each output, by name; None where undefined."""
+        found: dict[str, int | float | None] = {"windows": self.windows, "pushes": self.pushes}
+        known = self.windows > 0 and bool(np.all(self._spread > 0.0))
+        found["nmse"] = float(np.sum(self._error / self._spread)) if known else None
+        found["nlpd"] = float(np.sum(self._nlpd) / self.windows) if self.windows else None
+        for level, covered in zip(COVERAGE_LEVELS, self._covered, strict=True):
+            shares = (float(c) / self.windows if self.windows else None for c in covered)
+            found |= {f"coverage {level} {name}": share for name, share in zip(OUTPUTS, shares, strict=True)}
+        return found

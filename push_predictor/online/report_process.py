@@ -18,8 +18,7 @@ from push_predictor.evaluation.offline import report_windows
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.push_model import PushModel
 from push_predictor.online.child_process import start_child
-from push_predictor.online.files.window_rows import WindowRows
-from push_predictor.online.live_validation import LiveValidation
+from push_predictor.online.live_validation import LiveValidation, WindowRows
 
 
 class ReportWriter:

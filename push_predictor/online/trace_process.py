@@ -82,16 +82,16 @@ def start_trace(task: TraceTask) -> tuple[BaseProcess, Connection]:
 
 
 def evidence_in(folder: Path) -> tuple[Path, ...]:
-    """The data in a folder that can be traced; empty if there is none or no such folder.
+    """A file that was given, or the data in a folder that can be traced; empty if there is none or no such folder.
 
     A validator's table comes first, then the folder itself as a recording, then all push tables and recordings in it.
     """
-    from push_predictor.online.files.window_table import TABLE
+    from push_predictor.online.window_table import TABLE
     from push_predictor.recordings.table_file import ENDINGS
 
     if (folder / TABLE).is_file():
         return (folder / TABLE,)
-    if _is_bag(folder):
+    if folder.is_file() or _is_bag(folder):
         return (folder,)
     inside = sorted(folder.iterdir()) if folder.is_dir() else []
     return tuple(path for path in inside if path.name.endswith((*ENDINGS, ".mcap")) or _is_bag(path))
@@ -158,7 +158,7 @@ def _report(path: Path, trace: Trace) -> Sequence[str]:
 
 def _settled(path: Path, folder: Path) -> Path:
     """A copy of a table that a validator may be appending to, without an incomplete last line; else the path itself."""
-    from push_predictor.online.files.window_table import TABLE
+    from push_predictor.online.window_table import TABLE
     from push_predictor.recordings.table_file import rig_path
 
     if path.name != TABLE:

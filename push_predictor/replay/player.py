@@ -13,11 +13,32 @@ from dataclasses import dataclass
 
 from push_predictor.recordings.bag.reader import RawMessage
 from push_predictor.replay.clock import PlayerClock, SteadyClock
-from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.report import Lateness
-from push_predictor.replay.source import ReadAhead, Source
+from push_predictor.replay.source import MessageSource, ReadAhead
 
 _READING = 300_000  # ns: nothing is read ahead in less time than this before a deadline
+
+
+@dataclass(frozen=True)
+class PlayRange:
+    """The part to play, in ns: offset from the first message, duration from there, until (a log time).
+
+    A limit of None is no limit. Of two limits the later one applies, as in rosbag2.
+    """
+
+    offset: int = 0
+    duration: int | None = None
+    until: int | None = None
+
+    def first(self, start: int) -> int:
+        """Log time of the beginning, for a source that starts at `start`."""
+        return start + self.offset
+
+    def last(self, start: int) -> int | None:
+        """Log time of the end, inclusive; None for no limit."""
+        ends = [self.until] if self.until is not None else []
+        ends += [self.first(start) + self.duration] if self.duration is not None else []
+        return max(ends, default=None)
 
 
 @dataclass(frozen=True)
@@ -44,7 +65,7 @@ class ReplayPlayer:
 
     def __init__(
         self,
-        source: Source,
+        source: MessageSource,
         clock: PlayerClock,
         wall: SteadyClock,
         output: PlayerOutput,
@@ -123,13 +144,23 @@ class ReplayPlayer:
     def burst(self, count: int) -> int:
         """Publish the next `count` messages now (0: all); returns how many there were, 0 if not paused."""
         done = 0
-        with self._control():
-            while self._clock.paused and (count == 0 or done < count) and (head := self._head()) is not None:
-                self._send(head, self._output.prepare(head))
-                done += 1
-            if done and self._time is not None:
-                self._clock.jump(self._time)
+        while (count == 0 or done < count) and self._publish_paused():
+            done += 1
         return done
+
+    def _publish_paused(self) -> bool:
+        """Publish the next message if paused; False if not. Other controls work while subscribers are waited for."""
+        with self._control():
+            head = self._head() if self._clock.paused else None
+        if head is None:
+            return False
+        publish = self._output.prepare(head)
+        with self._control():
+            if not self._clock.paused or self._head() is not head:
+                return False  # a control has come meanwhile
+            self._send(head, publish)
+            self._clock.jump(head.log_time)
+        return True
 
     def seek(self, time: int) -> None:
         """Continue from a log time, ns, no earlier than the first message. After the end, play again."""

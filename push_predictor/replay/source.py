@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages of a bag from any log time on, sorted within a read-ahead window."""
+"""Messages of a bag from any log time on, sorted within a read-ahead window, and the topics of the streams in it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import Protocol
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import Bag, RawMessage
+from push_predictor.recordings.decoder.sources import POSES, STATIC, STREAMS, sources_of
+from push_predictor.recordings.topics import Topics
 
 
-class Source(Protocol):
+class MessageSource(Protocol):
     """Messages to play."""
 
     @property
@@ -96,3 +98,21 @@ class ReadAhead:
         self._read += 1
         heapq.heappush(self._window, (message.log_time, self._read, message))
         return True
+
+
+def push_topics(present: Collection[str], topics: Topics) -> frozenset[str]:
+    """The topics of a bag that slider, pusher and wrench are read from, with the static transforms of a frame."""
+    return frozenset(topic for stream in STREAMS for topic in _of_stream(stream, present, topics))
+
+
+def missing_poses(present: Collection[str], topics: Topics) -> list[str]:
+    """The topics of slider and pusher, as named, that a bag does not contain."""
+    named = dict(sources_of(topics))
+    return [named[stream].text for stream in POSES if not _of_stream(stream, present, topics)]
+
+
+def _of_stream(stream: str, present: Collection[str], topics: Topics) -> list[str]:
+    source = dict(sources_of(topics))[stream]
+    name = source.topic.strip("/")
+    names = {name, name + STATIC} if source.frame else {name}
+    return [topic for topic in present if topic.strip("/") in names]

@@ -19,7 +19,6 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from ros_harness import START_TIMEOUT, acquaint, call, free_domain, node_process, ros_context, wait_until
-from std_msgs.msg import String
 from validator_bench import CIRCLE, HEXAGON, WRITTEN, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import load_model, save_model
@@ -27,7 +26,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
-from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.msg import PushResidual, PushRig
 from push_predictor_interfaces.srv import ListModels, PredictPush, Resume
 
 pytestmark = pytest.mark.long
@@ -41,7 +40,7 @@ class Received:
 
     residuals: list[PushResidual] = field(default_factory=list)
     sliders: list[bytes] = field(default_factory=list)
-    rigs: list[String] = field(default_factory=list)
+    rigs: list[PushRig] = field(default_factory=list)
 
 
 @dataclass
@@ -124,7 +123,7 @@ def _listen(node: Any, cell: str, received: Received) -> None:
     deep = QoSProfile(depth=10_000)
     node.create_subscription(PushResidual, f"{cell}/push_residual", received.residuals.append, deep)
     node.create_subscription(PoseStamped, f"{cell}/slider/pose", received.sliders.append, deep, raw=True)
-    node.create_subscription(String, f"{cell}/rig", received.rigs.append, LATCHED)
+    node.create_subscription(PushRig, f"{cell}/rig", received.rigs.append, LATCHED)
 
 
 def _note(diagnostics: dict[str, dict[str, str]], message: DiagnosticArray) -> None:
@@ -163,7 +162,7 @@ def test_each_topic_carries_the_data_of_its_namespace(both: Both):
     for cell, recording in CELLS.items():
         recorded = {bytes(m.data) for m in open_bag(recording).messages() if m.topic.endswith("slider/pose")}
         assert both.received[cell].sliders and recorded >= set(map(bytes, both.received[cell].sliders))
-        assert {json.loads(rig.data)["shape"] for rig in both.received[cell].rigs} == {load_rig_for([recording]).shape}
+        assert {rig.shape for rig in both.received[cell].rigs} == {load_rig_for([recording]).shape}
         windows = json.loads((both.outputs[cell] / "windows.json").read_text())["windows"]
         published = {(m.push_id, m.window) for m in both.received[cell].residuals}
         assert published == {(w["push_id"], w["window"]) for w in windows}

@@ -73,14 +73,14 @@ MAIN = {"predict_server": predict_server.main, "push_validator": push_validator.
 
 def test_a_node_refuses_to_start_without_the_requested_security():
     text = refused("push_replay", ROS_SECURITY_ENABLE="true", **ENFORCED)
-    assert "built without DDS security" in text and "ROS_SECURITY_ENABLE=true" in text
+    assert "built with DDS security" in text and "ROS_SECURITY_ENABLE=true" in text
 
 
 @pytest.mark.parametrize(
     ("executable", "value", "words"),
     [
-        ("predict_server", "true", ["built without DDS security", "ROS_SECURITY_ENABLE=true"]),
-        ("push_validator", "true", ["built without DDS security", "ROS_SECURITY_ENABLE=true"]),
+        ("predict_server", "true", ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
+        ("push_validator", "true", ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
         ("push_validator", "True", ["ROS_SECURITY_ENABLE=True does not enable security"]),
     ],
 )

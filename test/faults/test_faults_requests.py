@@ -34,13 +34,13 @@ from push_predictor.models.request import FARTHEST, PushRequest, check_request, 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.nodes import recorder_parameters
 from push_predictor.nodes.parameters import Param, declare
-from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
-from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
+from push_predictor.nodes.server.services import handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.validator import parameters as validator_parameters
-from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes, SuggestPushes
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes
 
 NAN, INF = math.nan, math.inf
 TABLES = {
@@ -78,7 +78,6 @@ REQUESTS = {
     "predict_push_batch": PredictPushBatch,
     "predict_slider_pose": PredictSliderPose,
     "rollout_pushes": RolloutPushes,
-    "suggest_pushes": SuggestPushes,
 }
 
 

@@ -378,8 +378,8 @@ def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> N
         query_to_request,
     )
     from push_predictor.models.store.model_registry import ModelRegistry
-    from push_predictor.nodes.server.model_services import handle_load_model
-    from push_predictor.nodes.server.prediction_services import (
+    from push_predictor.nodes.server.services import (
+        handle_load_model,
         handle_predict_push,
         handle_predict_push_batch,
     )

@@ -25,11 +25,16 @@ from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server.model_services import handle_load_model
-from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push, handle_predict_push_batch
-from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
-from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
-from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
+from push_predictor.nodes.server.services import (
+    MAX_PUSHES,
+    handle_load_model,
+    handle_predict_push,
+    handle_predict_push_batch,
+    handle_predict_slider_pose,
+    handle_rollout_pushes,
+    handle_suggest_pushes,
+)
+from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import (
     LoadModel,
@@ -37,7 +42,6 @@ from push_predictor_interfaces.srv import (
     PredictPushBatch,
     PredictSliderPose,
     RolloutPushes,
-    SuggestPushes,
 )
 
 NAN = float("nan")
@@ -102,8 +106,8 @@ def steps(*changes: dict[str, float], frame: str = "world", **others: Any) -> Ro
     return RolloutPushes.Request(header=Header(frame_id=frame), steps=pushes, **{"slider": slider(), **others})
 
 
-def suggestion(**fields: Any) -> SuggestPushes.Request:
-    return SuggestPushes.Request(count=1, **fields)
+def suggestion(**fields: Any) -> SuggestPushes.Goal:
+    return SuggestPushes.Goal(count=1, **fields)
 
 
 HANDLERS: dict[type, Callable[[ModelRegistry, Any, Any], None]] = {
@@ -161,8 +165,8 @@ BAD: list[tuple[Any, Any, str, str]] = [
     (RolloutPushes, steps({}, covariate_names=["slider_x"], covariate_values=[1.0]), COVARIATES, "covariate_n"),
     (RolloutPushes, steps({}, particles=100_001), LARGE, "particles: 100001 is not accepted, give at most 100000"),
     (RolloutPushes, steps({"duration": 1000.0}), LARGE, "steps: '5000 windows'"),
-    (SuggestPushes, SuggestPushes.Request(count=0), REQUEST, "count: 0"),
-    (SuggestPushes, SuggestPushes.Request(count=201), REQUEST, "count: 201"),
+    (SuggestPushes, SuggestPushes.Goal(count=0), REQUEST, "count: 0"),
+    (SuggestPushes, SuggestPushes.Goal(count=201), REQUEST, "count: 201"),
     (SuggestPushes, suggestion(speed=[0.1]), REQUEST, "speed length: 1 is not accepted, give 2 values, or none"),
     (SuggestPushes, suggestion(angle=[0.0, 0.1, 0.2, 0.3]), REQUEST, "angle length: 4"),
     (SuggestPushes, suggestion(excluded=[0.1, 0.2, 0.3]), REQUEST, "excluded length: 3"),
@@ -180,12 +184,13 @@ BAD: list[tuple[Any, Any, str, str]] = [
 def test_bad_input_is_refused_by_field_and_value_with_a_code_that_the_response_declares(
     registry: ModelRegistry, service: Any, request_: Any, name: str, begins: str
 ) -> None:
+    answer = service.Result if service is SuggestPushes else service.Response
     with pytest.raises(PushPredictorError) as caught:
-        HANDLERS[service](registry, request_, service.Response())
+        HANDLERS[service](registry, request_, answer())
     assert str(caught.value).startswith(begins)
     code = error_code(caught.value)
     assert code.name == name, caught.value
-    assert getattr(service.Response, name) == code
+    assert getattr(answer, name) == code
 
 
 def test_good_input_has_no_error(registry: ModelRegistry) -> None:

@@ -21,7 +21,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.tails import STEPS, Tails
-from push_predictor.nodes.validator.window_markers import error_in_sd, window_markers
+from push_predictor.nodes.validator.publishers import error_in_sd, window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 

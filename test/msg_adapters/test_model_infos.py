@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from synthetic import square_pushes, square_rig
 
-from msg_adapters.model_infos import model_to_info
+from msg_adapters.rigs import model_to_info
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes.server.model_services import handle_list_models
+from push_predictor.nodes.server.services import handle_list_models
 from push_predictor_interfaces.srv import ListModels
 
 

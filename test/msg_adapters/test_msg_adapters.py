@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up_windows import made_up_windows
 from rclpy.serialization import deserialize_message, serialize_message
 
 from msg_adapters import MessageError
@@ -28,13 +29,18 @@ from msg_adapters.predictions import (
     query_to_request,
     refuse,
 )
-from msg_adapters.residuals import ValidatedWindow, residual_to_message
+from msg_adapters.residuals import residual_to_message
+from msg_adapters.rigs import rig_from_message, rig_to_message
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.error_codes import ErrorCode
-from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.errors import PushPredictorError, RequestError, RigError
+from push_predictor.geometry.frames import to_world
+from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
+from push_predictor.recordings.rig import Rig
+from push_predictor_interfaces.msg import PushResidual
 
 CORRELATIONS = st.floats(-0.95, 0.95)
 SPREADS = st.floats(1e-5, 1e-1)
@@ -157,20 +163,14 @@ def test_covariates_must_match_their_names():
 # --- residuals --------------------------------------------------------------------------------------------------
 
 
-def window_of(covariance: np.ndarray, difference: np.ndarray) -> ValidatedWindow:
-    predicted = np.array([0.01, 0.002, 0.1])
-    return ValidatedWindow(
-        10**18 + 7,
-        "run1/3",
-        4,
-        "vhgp",
-        np.array([0.05, 0.3, 0.2]),
-        0.2,
-        predicted,
-        covariance,
-        predicted + difference,
-        in_domain=False,
+PREDICTED = np.array([0.01, 0.002, 0.1])
+
+
+def residual_of(covariance: np.ndarray, difference: np.ndarray, in_domain: bool = False) -> PushResidual:
+    window = replace(
+        made_up_windows(1)[0], push_id="run1/3", index=4, end=10**18 + 7, displacement=PREDICTED + difference
     )
+    return over_the_wire(residual_to_message("vhgp", window, PREDICTED, covariance, in_domain))
 
 
 @given(st.lists(SPREADS, min_size=3, max_size=3), CORRELATIONS, st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
@@ -178,31 +178,74 @@ def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlati
     correlations = np.eye(3)
     correlations[0, 1] = correlations[1, 0] = correlation
     covariance = correlations * np.outer(spreads, spreads)
-    difference = np.array(units) * spreads
-    window = window_of(covariance, difference)
-    gap = window.observed - window.predicted
-    assert window.standardised @ window.standardised == pytest.approx(
-        gap @ np.linalg.solve(covariance, gap), rel=1e-6, abs=1e-9
-    )
-    assert window.standardised[0] == pytest.approx(gap[0] / spreads[0], rel=1e-9)
+    message = residual_of(covariance, np.array(units) * spreads)
+    gap, standardised = np.array(message.observed) - message.predicted, np.array(message.standardised)
+    assert standardised @ standardised == pytest.approx(gap @ np.linalg.solve(covariance, gap), rel=1e-6, abs=1e-9)
+    assert standardised[0] == pytest.approx(gap[0] / spreads[0], rel=1e-9)
 
 
 def test_a_residual_survives():
-    window = window_of(np.diag([1e-6, 4e-6, 1e-2]), np.array([1e-3, -4e-3, 0.2]))
-    message = over_the_wire(residual_to_message(window))
+    covariance, window = np.diag([1e-6, 4e-6, 1e-2]), made_up_windows(1)[0]
+    message = residual_of(covariance, np.array([1e-3, -4e-3, 0.2]))
     assert message.header.frame_id == "world"
     np.testing.assert_allclose(message.standardised, [1.0, -2.0, 2.0])
-    assert stamp_to_ns(message.header.stamp) == window.stamp_ns
-    assert message.in_domain is False and residual_to_message(replace(window, in_domain=True)).in_domain
-    for name in ("push_id", "window", "model", "duration", "predicted", "observed"):
-        np.testing.assert_array_equal(getattr(message, name), getattr(window, name))
-    np.testing.assert_array_equal([message.velocity, message.contact, message.angle], window.inputs)
-    np.testing.assert_array_equal(message.covariance, window.covariance.ravel())
+    assert stamp_to_ns(message.header.stamp) == 10**18 + 7
+    assert message.in_domain is False and residual_of(covariance, np.zeros(3), in_domain=True).in_domain
+    assert (message.push_id, message.window, message.model) == ("run1/3", 4, "vhgp")
+    for name in ("velocity", "contact", "angle", "duration"):
+        assert getattr(message, name) == getattr(window, name)
+    np.testing.assert_array_equal(message.predicted, PREDICTED)
+    np.testing.assert_array_equal(message.observed, PREDICTED + [1e-3, -4e-3, 0.2])
+    np.testing.assert_array_equal(message.covariance, covariance.ravel())
 
 
 def test_rejects_a_covariance_that_is_not_positive_definite():
     with pytest.raises(MessageError, match=r"covariance.*positive definite"):
-        residual_to_message(window_of(np.diag([1.0, 1.0, -1.0]), np.ones(3)))
+        residual_of(np.diag([1.0, 1.0, -1.0]), np.ones(3))
+
+
+# --- the rig ----------------------------------------------------------------------------------------------------
+
+
+SUPPORT = np.array([[0.02, 0.0, 0.5], [-0.02, 0.01, 0.5]])
+RIGS = {
+    "square": Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837, SUPPORT, 0.3, 0.15),
+    "unknown": Rig("hex", shape_outline("hex"), 0.005, "pu"),
+    "circle": Rig("ellip1", shape_outline("ellip1"), 0.005, "pu", contact_friction=0.2),
+    "ellipse": Rig("ellip3", shape_outline("ellip3"), 0.005, "pu", surface_friction=0.2),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_a_rig_survives(name):
+    rig = RIGS[name]
+    assert rig_from_message(over_the_wire(rig_to_message(rig)), "topic rig").to_record() == rig.to_record()
+
+
+def test_an_ellipse_with_axes_elsewhere_survives():
+    outline = shape_outline("ellip2")
+    moved = Outline(to_world(outline.vertices, np.array([0.001, 0.002, 0.5])), outline.semi_axes, (0.001, 0.002, 0.5))
+    rig = replace(RIGS["ellipse"], outline=moved)
+    assert rig_from_message(rig_to_message(rig), "topic rig").to_record() == rig.to_record()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("outline", [0.0, 1.0, 2.0]),
+        ("outline", []),
+        ("pusher_radius", 0.0),
+        ("object_mass", -1.0),
+        ("contact_friction", float("nan")),
+        ("support_points", [0.1, 0.2]),
+        ("semi_axes", [float("nan"), 0.1]),
+    ],
+)
+def test_a_bad_rig_is_refused_with_the_source(field, value):
+    message = rig_to_message(RIGS["square"])
+    setattr(message, field, value)
+    with pytest.raises(RigError, match="topic rig"):
+        rig_from_message(message, "topic rig")
 
 
 # --- diagnostics ------------------------------------------------------------------------------------------------

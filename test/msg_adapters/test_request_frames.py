@@ -32,8 +32,7 @@ from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_tu
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server.request_frames import RequestFrames
-from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
+from push_predictor.nodes.server.services import RequestFrames, handle_predict_slider_pose
 from push_predictor.planning.slider_pose import SliderAfter, slider_after
 from push_predictor_interfaces.srv import PredictSliderPose
 

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 pytest.importorskip("rclpy")
-from push_predictor.nodes import following
-from push_predictor.nodes.following import FollowingSubscription
-from push_predictor.nodes.polling import Taken
+from push_predictor.nodes import polling
+from push_predictor.nodes.polling import FollowingSubscription, Taken
 
 
 class Topic:
@@ -27,8 +26,8 @@ class Topic:
             get_publishers_info_by_topic=lambda _: [None] * self.publishers,
             count_publishers=lambda _: self.publishers,
         )
-        monkeypatch.setattr(following, "take_all", self._take_all)
-        monkeypatch.setattr(following, "time_ns", lambda: self._now)
+        monkeypatch.setattr(polling, "take_all", self._take_all)
+        monkeypatch.setattr(polling, "time_ns", lambda: self._now)
         self.subscription = FollowingSubscription(node, "/slider/pose")
         self.subscription._subscription = node
 

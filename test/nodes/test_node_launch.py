@@ -16,8 +16,7 @@ import pytest
 from fake_launch import actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from ros_harness import REPOSITORY
 
-from push_predictor.nodes import predict_server
-from push_predictor.nodes.recorder import parameters as recorder_parameters
+from push_predictor.nodes import predict_server, recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
@@ -169,7 +168,7 @@ def test_rviz_is_optional_and_uses_the_installed_configuration(
     assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
     flag, config = rviz["arguments"]
     assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()
-    own = nodes(launch_file, rviz="1", rviz_config="own.rviz")["rviz2"]
+    own = nodes(launch_file, rviz="True", rviz_config="own.rviz")["rviz2"]
     assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
 
 

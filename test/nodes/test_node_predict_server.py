@@ -32,7 +32,7 @@ from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server
-from push_predictor.nodes.server import prediction_services
+from push_predictor.nodes.server import services
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.recordings.table import empty_table
@@ -118,7 +118,7 @@ def test_empty_name_means_the_default_model(server):
 def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch):
     """By the correlation at the length of one window. Both covariances shrink with it."""
     persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
-    monkeypatch.setattr(prediction_services, "persistence_of", lambda model: persistence)
+    monkeypatch.setattr(services, "persistence_of", lambda model: persistence)
     registry = ModelRegistry()
     registry.load(folder / "gp.model")
     residual = np.array([2e-5, -1e-5, 3e-4])
@@ -135,7 +135,7 @@ def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch)
 def test_residuals_of_several_windows_count_by_their_distance(folder, monkeypatch):
     """As EarlierWindows counts them, the oldest first and farthest away."""
     persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
-    monkeypatch.setattr(prediction_services, "persistence_of", lambda model: persistence)
+    monkeypatch.setattr(services, "persistence_of", lambda model: persistence)
     registry = ModelRegistry()
     registry.load(folder / "gp.model")
     plain, residuals = answered(registry, None), np.array([[4e-5, 0.0, 1e-3], [-1e-5, 2e-5, 0.0]])
@@ -150,7 +150,7 @@ def test_residuals_of_several_windows_count_by_their_distance(folder, monkeypatc
 def answered(registry, residual):
     """The prediction of the usual push, given the residual of the window before."""
     response = PredictPush.Response()
-    prediction_services.handle_predict_push(registry, query_to_request("gp", GOOD, 0.2, None, residual), response)
+    services.handle_predict_push(registry, query_to_request("gp", GOOD, 0.2, None, residual), response)
     return prediction_from_response(response)
 
 
@@ -189,7 +189,7 @@ def test_unexpected_exception_becomes_a_logged_refusal(folder, monkeypatch, capf
     rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = predict_server.PredictServer()
-        predict_server.start_server(node)
+        node.start()
         response = node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response())
         assert not response.success
         assert not np.any(response.mean)
@@ -223,7 +223,7 @@ def test_first_request_after_start_gets_a_prediction_and_a_signal_ends_the_node(
 def test_long_batch_stops_when_the_node_ends(folder):
     registry = ModelRegistry()
     registry.load(folder / "analytical.model")
-    inputs = np.tile(GOOD, (3 * prediction_services.CHUNK, 1))
+    inputs = np.tile(GOOD, (3 * services.CHUNK, 1))
     asked = []
 
     def go_on():
@@ -233,16 +233,16 @@ def test_long_batch_stops_when_the_node_ends(folder):
 
     request = query_to_batch_request(PushQuery("", inputs, 0.2, {}))
     with pytest.raises(KeyboardInterrupt):
-        prediction_services.handle_predict_push_batch(go_on, registry, request, PredictPushBatch.Response())
+        services.handle_predict_push_batch(go_on, registry, request, PredictPushBatch.Response())
     assert len(asked) == 2
 
 
 def test_rejects_too_many_pushes_without_a_table(folder):
     registry = ModelRegistry()
     registry.load(folder / "analytical.model")
-    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (prediction_services.MAX_EXACT + 1, 1)), 0.2, {}))
+    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (services.MAX_EXACT + 1, 1)), 0.2, {}))
     with pytest.raises(RequestError, match="50001 pushes without a table"):
-        prediction_services.handle_predict_push_batch(lambda: None, registry, request, PredictPushBatch.Response())
+        services.handle_predict_push_batch(lambda: None, registry, request, PredictPushBatch.Response())
 
 
 # --- models -----------------------------------------------------------------------------------------------------
@@ -395,7 +395,7 @@ def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder,
     rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = predict_server.PredictServer()
-        predict_server.start_server(node)
+        node.start()
         wanted = LoadModel.Request(path=str(folder / "analytical.model"), make_default=True)
         assert node._on_load(wanted, LoadModel.Response()).success
         assert node.value("default_model") == "analytical"

@@ -28,9 +28,9 @@ from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
 from push_predictor.nodes.qos import DEPTH
-from push_predictor.nodes.recorder.parameters import PARAMETERS, RecorderOptions, read_options
-from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
-from push_predictor.online.recorder.live_recording import LiveRecording
+from push_predictor.nodes.recorder_parameters import PARAMETERS, RecorderOptions, read_options
+from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
+from push_predictor.online.live_recording import LiveRecording
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.recordings.read import read_recording

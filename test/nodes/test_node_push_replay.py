@@ -31,10 +31,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
 from ros_harness import REPOSITORY, call, free_domain, node_environment, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
 
+from msg_adapters.rigs import rig_from_message
 from push_predictor.nodes import push_replay
 from push_predictor.nodes.qos import CLOCK
+from push_predictor.recordings.rig import Rig, rig_from_record
+from push_predictor_interfaces.msg import PushRig, ReplayStatus
 from push_predictor_interfaces.srv import (
     Burst,
     GetRate,
@@ -72,7 +74,7 @@ class ReplayClient:
     def __init__(self, node: Node) -> None:
         self.node = node
         self.raw: dict[str, list[bytes]] = {topic: [] for topic in KINDS}
-        self.rig: list[str] = []
+        self.rig: list[Rig] = []
         self.states: list[str] = []
         self.clock: list[int] = []
         self.reports: list[dict[str, str]] = []
@@ -80,10 +82,13 @@ class ReplayClient:
         self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in CONTROLS.items()}
         for topic, kind in KINDS.items():
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
-        node.create_subscription(String, "rig", lambda m: self.rig.append(m.data), LATCHED)
-        node.create_subscription(String, "replay_status", lambda m: self.states.append(m.data), LATCHED)
+        node.create_subscription(PushRig, "rig", lambda m: self.rig.append(rig_from_message(m, "topic")), LATCHED)
+        node.create_subscription(ReplayStatus, "replay_status", self._note, LATCHED)
         node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), CLOCK)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._report, 100)
+
+    def _note(self, message: ReplayStatus) -> None:
+        self.states.append({1: "playing", 2: "paused", 3: "finished"}[message.state])
 
     def _report(self, message: DiagnosticArray) -> None:
         self.reports.append({pair.key: pair.value for pair in message.status[0].values})
@@ -221,7 +226,7 @@ def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "two.mcap", push_messages(2.0))
     with replay(bag, play__clock_publish_frequency=40.0) as (_, client):
         client.wait_for("finished")
-        assert [json.loads(text) for text in client.rig] == [RIG]
+        assert [rig.to_record() for rig in client.rig] == [rig_from_record(RIG, "bag").to_record()]
         assert client.states in (["playing", "finished"], ["finished"])
         assert client.clock == sorted(client.clock)
         during = sorted(t for t in set(client.clock) if START <= t < end)
@@ -234,8 +239,8 @@ def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
 def test_late_subscriber_receives_the_rig(with_rig: Path) -> None:
     with replay(with_rig) as (_, client):
         client.wait_for("finished")
-        late: list[str] = []
-        client.node.create_subscription(String, "rig", lambda m: late.append(m.data), LATCHED)
+        late: list[PushRig] = []
+        client.node.create_subscription(PushRig, "rig", late.append, LATCHED)
         assert wait_until(lambda: len(late) == 1)
 
 
@@ -243,7 +248,7 @@ def test_rig_file_replaces_the_record(with_rig: Path, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({**RIG, "surface": "delrin"}))
     with replay(with_rig, rig=tmp_path / "other.yaml", play__start_paused=True) as (_, client):
         assert wait_until(lambda: bool(client.rig))
-        assert json.loads(client.rig[0])["surface"] == "delrin"
+        assert client.rig[0].surface == "delrin"
 
 
 def test_recording_without_a_rig_plays_and_warns_how_to_give_one(tmp_path: Path) -> None:

@@ -38,7 +38,6 @@ from ros_harness import (
 )
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
-from std_msgs.msg import String
 from synthetic import rows, wrench_rows
 from validator_bench import (
     CIRCLE,
@@ -58,7 +57,7 @@ from validator_bench import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
-from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
+from msg_adapters.rigs import rig_to_message
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
@@ -71,9 +70,9 @@ from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.rig import rig_from_record, save_rig
 from push_predictor.recordings.windows.finder import find_windows
-from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.msg import PushResidual, PushRig
 from push_predictor_interfaces.srv import LoadModel, Pause, PredictPush, Resume, Seek, SetRate
 
 pytestmark = pytest.mark.slow
@@ -222,7 +221,7 @@ def test_the_ellipse_of_a_window_is_centred_at_the_prediction(watched, models: d
 def test_our_reader_and_rosbags_read_the_bag_of_residuals(watched):
     out, received = watched
     bag = open_bag(out / "residuals")
-    assert bag.topics == {"/push_residual": RESIDUAL_TYPE}
+    assert bag.topics == {"/push_residual": "push_predictor_interfaces/msg/PushResidual"}
     ours = [deserialize_message(message.data, PushResidual) for message in bag.messages()]
     key = attrgetter("model", "push_id", "window")
     assert sorted(ours, key=key) == sorted(received.residuals, key=key)
@@ -232,16 +231,6 @@ def test_our_reader_and_rosbags_read_the_bag_of_residuals(watched):
         theirs = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
     assert [(m.model, m.push_id, m.window) for m in theirs] == [key(m) for m in ours]
     assert [m.predicted.tolist() for m in theirs] == [list(m.predicted) for m in ours]
-
-
-def test_the_schema_in_the_bag_is_the_installed_message():
-    own = RESIDUAL_DEFINITION.split("=" * 80)[0].split("\n")
-    written = {name: kind for kind, name in map(str.split, filter(None, own))}
-    installed = {
-        name: kind.replace("double", "float64").replace("boolean", "bool")
-        for name, kind in PushResidual.get_fields_and_field_types().items()
-    }
-    assert list(written.items()) == list(installed.items())
 
 
 def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[str, Path], tmp_path: Path):
@@ -569,16 +558,16 @@ def test_unusable_messages_are_counted_by_kind(domain: int, models):
         slider, pusher = (node.create_publisher(PoseStamped, f"{name}/pose", 100) for name in ("slider", "pusher"))
         wrench = node.create_publisher(WrenchStamped, "pusher/wrench", 100)
         node.create_publisher(WrenchStamped, "pusher/wrench", qos_profile_sensor_data)  # the other one is reliable
-        rig = node.create_publisher(String, "rig", LATCHED)  # created last: who has received it knows the others too
+        rig = node.create_publisher(PushRig, "rig", LATCHED)  # created last: who has received it knows the others too
         for publisher in (slider, pusher, wrench):
             assert wait_until(lambda publisher=publisher: publisher.get_subscription_count() > 0)
         assert subscribed(node, "/slider/pose") == [ReliabilityPolicy.BEST_EFFORT]
         assert subscribed(node, "/pusher/pose") == [ReliabilityPolicy.RELIABLE]
         assert wait_until(lambda: subscribed(node, "/pusher/wrench") == [ReliabilityPolicy.BEST_EFFORT])
 
-        rig.publish(String(data='{"shape": "rect1"}'))
-        assert "outline" in status.wait_for_message("push_rig lacks")
-        rig.publish(String(data=json.dumps(RIG)))
+        rig.publish(PushRig(shape="rect1"))
+        assert "outline" in status.wait_for_message("topic rig: push_rig")
+        rig.publish(rig_to_message(rig_from_record(RIG, "here")))
         for message in (pose(), pose(x=math.nan), pose("map"), pose("map"), pose(w=0.0)):
             slider.publish(message)
         for message in (pose(w=0.0), pose(x=-math.inf)):

@@ -27,23 +27,20 @@ from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float32, Float64, Float64MultiArray, String
 from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator
 
-from msg_adapters.residual_schema import RESIDUAL_TYPE
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
+from push_predictor.nodes.validator.scalar_topics import ScalarTopics
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
-from push_predictor.nodes.validator.sensors.scalar_topics import ScalarTopics
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.load import load_data, load_rig_for
-from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.simulation.rig_simulator import Sensors, SimulationSpec, random_pushes, simulate
@@ -162,17 +159,6 @@ def test_a_model_that_needs_a_topic_scores_as_offline(watched: Watched, model: P
     assert_same_as_offline(watched.output, model, recording)
     log = json.loads((watched.output / "windows.json").read_text())
     assert log["refused"] == [] and log["unanswered"] == 0
-
-
-def test_the_bag_of_residuals_has_the_scalar_values_at_the_windows_starts(watched: Watched, recording: Path) -> None:
-    windows = find_windows(read_recording(recording), load_rig_for([recording]))
-    topics = open_bag(watched.output / "residuals").topics
-    assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys((*OURS, PLAYED), "std_msgs/msg/Float64")}
-    for topic in (WARMTH, HUMIDITY):
-        written = [m for m in open_bag(watched.output / "residuals").messages() if m.topic == topic]
-        assert [m.log_time for m in written] == [window.start for window in windows]
-        values = [struct.unpack_from("<d", m.data, 4)[0] for m in written]
-        assert values == pytest.approx([window.covariates[f"topic:{topic}"] for window in windows], abs=1e-9)
 
 
 def test_topics_without_samples_are_named(watched: Watched) -> None:

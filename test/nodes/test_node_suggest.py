@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The service suggest_pushes of predict_server."""
+"""The action suggest_pushes of predict_server."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from action_bench import ActionGoal
+from action_msgs.msg import GoalStatus
 from hosted_nodes import hosted_node
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.action import ActionClient
+from rclpy.qos import QoSProfile
 from synthetic import square_pushes
 
 from push_predictor.design.batch import Suggested, suggest_pushes
@@ -25,10 +29,11 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server
-from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
-from push_predictor_interfaces.srv import ListModels, SuggestPushes
+from push_predictor.nodes.server.services import handle_suggest_pushes
+from push_predictor_interfaces.action import SuggestPushes
+from push_predictor_interfaces.srv import ListModels
 
-Ask = Callable[..., SuggestPushes.Response]
+Ask = Callable[..., SuggestPushes.Result]
 ARRAYS = ("velocity", "contact", "angle", "duration", "variance_left")
 LIMITS = {"speed": [0.02, 0.04], "angle": [-0.3, 0.5], "travel": 0.02, "excluded": [0.2, 0.4, 0.9, 0.1]}
 
@@ -45,16 +50,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ask(folder: Path) -> Iterator[Ask]:
-    """A function from the fields of a request to the response."""
+    """A function from the fields of a goal to the result; a refused goal is aborted."""
     domain = harness.free_domain()
     params = {"models": [str(folder)], "default_model": "gp"}
     running = hosted_node("predict_server", domain=domain, params=params)
     with running, harness.ros_context(domain) as node:
-        client = node.create_client(SuggestPushes, "suggest_pushes")
-        yield lambda **fields: harness.call(client, SuggestPushes.Request(**{"count": 2, **fields}))
+        client = ActionClient(node, SuggestPushes, "suggest_pushes")
+
+        def result(**fields: Any) -> SuggestPushes.Result:
+            goal = ActionGoal(node, client, SuggestPushes.Goal(**{"count": 2, **fields}))
+            status, result = goal.end()
+            assert status == (GoalStatus.STATUS_SUCCEEDED if result.success else GoalStatus.STATUS_ABORTED)
+            return result
+
+        yield result
 
 
-def assert_equal(response: SuggestPushes.Response, expected: Suggested) -> None:
+def assert_equal(response: SuggestPushes.Result, expected: Suggested) -> None:
     assert response.success, response.message
     columns = (*expected.inputs.T, expected.duration, expected.variance_left)
     for name, column in zip(ARRAYS, columns, strict=True):
@@ -85,17 +97,34 @@ def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactiv
     monkeypatch.setattr(predict_server, "handle_suggest_pushes", noted)
     running = hosted_node("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
     with running, harness.ros_context(domain) as node:
-        suggest = node.create_client(SuggestPushes, "suggest_pushes")
+        suggest = ActionClient(node, SuggestPushes, "suggest_pushes", feedback_sub_qos_profile=QoSProfile(depth=100))
         change = node.create_client(ChangeState, "push_predictor/change_state")
         harness.acquaint(node, "push_predictor")
-        assert suggest.wait_for_service(harness.START_TIMEOUT)
-        long = suggest.call_async(SuggestPushes.Request(count=200))
+        long = ActionGoal(node, suggest, SuggestPushes.Goal(count=200))
         assert harness.call(node.create_client(ListModels, "list_models"), ListModels.Request()).names == ["gp"]
-        assert begun.wait(harness.START_TIMEOUT) and not long.done()
+        assert begun.wait(harness.START_TIMEOUT) and not long.ended
+        _, refused = ActionGoal(node, suggest, SuggestPushes.Goal(count=1)).end()
+        assert refused.error_code == refused.BUSY and "one at a time" in refused.message
+        assert harness.wait_until(lambda: len(long.feedback) > 1)
+        assert [each.chosen for each in long.feedback] == list(range(1, len(long.feedback) + 1))
         stop = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
         assert harness.call(change, stop).success
-        assert harness.wait_until(long.done)
-        assert long.result().message == "the node is inactive"
+        status, result = long.end()
+        assert (status, result.message) == (GoalStatus.STATUS_ABORTED, "the node is inactive")
+        assert not ActionGoal(node, suggest, SuggestPushes.Goal(count=1)).accepted
+
+
+def test_a_cancelled_goal_ends_and_the_next_is_answered(folder: Path) -> None:
+    domain = harness.free_domain()
+    running = hosted_node("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
+    with running, harness.ros_context(domain) as node:
+        suggest = ActionClient(node, SuggestPushes, "suggest_pushes")
+        goal = ActionGoal(node, suggest, SuggestPushes.Goal(count=200))
+        goal.handle.cancel_goal_async()
+        status, result = goal.end()
+        assert (status, result.error_code) == (GoalStatus.STATUS_CANCELED, result.CANCELLED)
+        assert "cancelled" in result.message and not len(result.velocity)
+        assert ActionGoal(node, suggest, SuggestPushes.Goal(count=1)).end()[1].success
 
 
 def test_a_long_request_ends_with_the_node(folder: Path) -> None:
@@ -109,5 +138,5 @@ def test_a_long_request_ends_with_the_node(folder: Path) -> None:
             raise RequestError("node", "closing", "no more requests")
 
     with pytest.raises(RequestError, match="closing"):
-        handle_suggest_pushes(check_cancelled, registry, SuggestPushes.Request(count=200), SuggestPushes.Response())
+        handle_suggest_pushes(check_cancelled, registry, SuggestPushes.Goal(count=200), SuggestPushes.Result())
     assert len(asked) == 3

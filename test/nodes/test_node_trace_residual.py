@@ -23,12 +23,9 @@ from hosted_nodes import hosted_node, refused_start
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from made_up_traces import made_up_trace, pushes, slippery
-from synthetic import square_rig
 from trace_bench import RIG, Server, drifting_folder, server_of
-from validator_bench import Status
 
-from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import predict_server
 from push_predictor.online import trace_process
 from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, Failed, TraceTask, evidence_in
@@ -125,7 +122,7 @@ def cut(folder: Path) -> None:
 
 BAD = {
     "no output": ({"output": ""}, ["output: ''"]),
-    "no folder": ({"output": "absent"}, ["absent", "no data to trace", "no push_validator", "pushes.csv"]),
+    "no folder": ({"output": "absent"}, ["output", "absent", "no data to trace", "pushes.csv"]),
     "unknown model": ({"model": "other"}, ["model: 'other'", "deployed"]),
     "not a table": ({"change": cut}, ["pushes.csv line 1", "velocity"]),
 }
@@ -186,21 +183,19 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     assert f"Warning: {drifting}/pushes.csv: The push angles span" in sent[-1].message
 
 
-@pytest.mark.long
-def test_goal_without_data_uses_those_of_a_running_validator(server: Server, drifting: Path, tmp_path: Path) -> None:
+def test_the_data_may_be_in_another_place_than_the_result(server: Server, drifting: Path, tmp_path: Path) -> None:
     last = (drifting / "pushes.csv").read_text().splitlines()[-1]
     with (drifting / "pushes.csv").open("a") as stream:
-        stream.write(last[: len(last) // 2])  # the validator is writing
-    model = drifting.parent / "absent.pushmodel"
-    save_model(train_model(pushes(20, 4), square_rig(), "analytical", name="deployed"), model)
-    params, status = {"model": model, "output": drifting}, Status(server.node)
-    with harness.node_process("push_validator", domain=server.domain, params=params):
-        # A validator that has discovered predict_push has also discovered the server's earlier services and clients.
-        assert harness.wait_until(lambda: bool(status.all) and "No node offers" not in status.message), status.message
-        ended, result = server.trace(tmp_path / "elsewhere").end()
+        stream.write(last[: len(last) // 2])  # a validator is writing
+    before = names(drifting)
+    for data in (drifting, drifting / "pushes.csv"):
+        output = tmp_path / f"result of {data.name}"
+        ended, result = server.trace(output, data=data).end()
         assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
-        assert names(tmp_path / "elsewhere") == sorted([EXTENDED, REPORT, VERDICT])
-        assert list(load_model(tmp_path / "elsewhere" / EXTENDED).defaults) == ["elapsed_time"]
+        assert names(output) == sorted([EXTENDED, REPORT, VERDICT]) and names(drifting) == before
+        assert list(load_model(output / EXTENDED).defaults) == ["elapsed_time"]
+    _, result = server.trace(tmp_path / "other", data=tmp_path / "absent").end()
+    assert result.message.startswith(f"data {tmp_path}/absent: no data to trace") and not (tmp_path / "other").exists()
 
 
 def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:
@@ -235,5 +230,6 @@ def test_evidence_in_a_folder(tmp_path: Path) -> None:
     (tmp_path / "more.csv.gz").touch()
     assert [path.name for path in evidence_in(tmp_path)] == ["first", "more.csv.gz", "second"]
     assert evidence_in(tmp_path / "first") == (tmp_path / "first",)
+    assert evidence_in(tmp_path / "more.csv.gz") == (tmp_path / "more.csv.gz",)
     (tmp_path / "pushes.csv").touch()
     assert evidence_in(tmp_path) == (tmp_path / "pushes.csv",)

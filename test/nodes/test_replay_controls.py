@@ -37,7 +37,7 @@ class FakeNode:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
         self.logged: list[str] = []
 
-    def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+    def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any], **_: object) -> None:
         self.services[name] = (kind, callback)
 
     def get_logger(self) -> Any:

@@ -18,8 +18,8 @@ from repository import REPOSITORY
 from turning_sensor import add_tip, add_wrench, measured_at_mount, sensor_tf
 
 from push_predictor.errors import RecordingError
-from push_predictor.online.recorder.live_recording import NO_RIG, LiveRecording
-from push_predictor.online.recorder.progress import Progress
+from push_predictor.online.live_recording import NO_RIG, LiveRecording
+from push_predictor.online.recorder_progress import Progress
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.bag.writer import LIVE_CHUNK_SIZE, BagWriter

@@ -12,9 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_predictor.online.recorder.live_line import LOG_PERIOD, LiveLine
-from push_predictor.online.recorder.pace import Pace
-from push_predictor.online.recorder.progress import Progress, StreamFigures
+from push_predictor.online.recorder_findings import Pace
+from push_predictor.online.recorder_progress import LOG_PERIOD, LiveLine, Progress, StreamFigures
 
 
 def stamps(*seconds: float) -> np.ndarray:

@@ -17,8 +17,7 @@ from lab_bags import LABORATORY, laboratory, short_recording
 from mistakes import force_turned, late, scaled
 from repository import REPOSITORY
 
-from push_predictor.online.check_process import CheckProcess
-from push_predictor.online.sample_check import FIRST, MOST, SampleCheck
+from push_predictor.online.check_process import FIRST, MOST, CheckProcess, SampleCheck
 from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_predictor.online.sensors.topic_report import ReportLog, StampFigures, TopicReport, stamp_figures
+from push_predictor.online.topic_report import ReportLog, StampFigures, TopicReport, stamp_figures
 
 SECOND = 1_000_000_000
 REPORT = TopicReport("slider", "/vicon/block", "geometry_msgs/msg/PoseStamped", "best effort", ("world",))

@@ -21,12 +21,12 @@ from ros_harness import REPOSITORY
 import push_predictor
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.geometry.shapes import SHAPES, shape_outline
+from push_predictor.nodes import recorder_parameters
 from push_predictor.nodes.parameters import Param
-from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
-from push_predictor.nodes.validator.sensors.scalar_topics import CLOCK
+from push_predictor.nodes.validator.scalar_topics import CLOCK
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.topics import DEFAULT_TOPICS
@@ -57,10 +57,10 @@ SERVICES = (
     "predict_push_batch",
     "predict_slider_pose",
     "rollout_pushes",
-    "suggest_pushes",
     "list_models",
     "load_model",
 )
+ACTIONS = ("suggest_pushes", "trace_residual")
 
 
 def config(node: str) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def test_the_reference_page_lists_every_parameter_with_its_default(node: str):
 
 def test_the_table_of_the_validators_topics_names_what_it_uses():
     nodes = REPOSITORY / "push_predictor" / "nodes"
-    modules = [nodes / "push_validator.py", *sorted((nodes / "validator").rglob("*.py"))]
+    modules = [nodes / "push_validator.py", nodes / "rig_source.py", *sorted((nodes / "validator").rglob("*.py"))]
     code = "".join(path.read_text() for path in modules)
     calls = r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\""
     used = {*re.findall(calls, code), DEFAULT_TOPICS.slider, DEFAULT_TOPICS.pusher, DEFAULT_TOPICS.wrench, CLOCK}
@@ -124,9 +124,10 @@ def test_the_table_of_the_validators_topics_names_what_it_uses():
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row[0])} == used
 
 
-@pytest.mark.parametrize("service", SERVICES)
-def test_every_service_of_the_server_has_a_chapter(service: str):
-    assert re.search(rf"^## `{service}` \(\w+\)$", (REFERENCE / "predict_server.md").read_text(), re.MULTILINE)
+@pytest.mark.parametrize("service", (*SERVICES, *ACTIONS))
+def test_every_service_and_action_of_the_server_has_a_chapter(service: str):
+    kind = r"action \w+" if service in ACTIONS else r"\w+"
+    assert re.search(rf"^## `{service}` \({kind}\)$", (REFERENCE / "predict_server.md").read_text(), re.MULTILINE)
 
 
 # --- commands and links ----------------------------------------------------------------------------------------------

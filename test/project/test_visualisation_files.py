@@ -31,7 +31,7 @@ from visualization_msgs.msg import Marker
 
 from docs.pictures.draw_rviz import as_fields, translated
 from push_predictor.models.prediction import Prediction
-from push_predictor.nodes.validator.window_markers import window_markers
+from push_predictor.nodes.validator.publishers import window_markers
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.windows.push_window import PushWindow
 

@@ -101,10 +101,23 @@ def test_a_clock_that_is_set_back_begins_again() -> None:
     np.testing.assert_allclose(values, world(stamp), atol=1e-9)
 
 
+def test_wrenches_whose_clock_is_set_back_before_that_of_the_tip_wait_for_it() -> None:
+    turned = PosedWrench()
+    old = STAMPS + 1500 * MS
+    put(turned, old, measured(STAMPS), TIP[:-10] + 1500 * MS, poses(TIP[:-10]))
+    without = turned.without_pose
+    waiting = int(np.sum(TIP[-11] < STAMPS))
+    stamp, _ = put(turned, STAMPS[:20], measured(STAMPS[:20]), *NO_TIP)
+    assert len(stamp) == 0, "the tip's poses are still those of the old time"
+    stamp, values = put(turned, STAMPS[20:], measured(STAMPS[20:]), TIP, poses(TIP))
+    assert np.array_equal(stamp, STAMPS) and turned.without_pose == without + waiting
+    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
+
+
 def test_few_poses_are_kept() -> None:
     turned = PosedWrench()
     for second in range(10):
         put(turned, *NO_WRENCH, TIP + second * 1000 * MS, poses(TIP))
+    assert len(put(turned, STAMPS, measured(STAMPS), *NO_TIP)[0]) == 0 and turned.without_pose == len(STAMPS)
     late = STAMPS + 9000 * MS
     assert len(put(turned, late, measured(STAMPS), *NO_TIP)[0]) == len(STAMPS)
-    assert len(put(turned, STAMPS, measured(STAMPS), *NO_TIP)[0]) == 0 and turned.without_pose == len(STAMPS)

@@ -14,8 +14,8 @@ from decoding import input_of
 from replay_bags import stamped
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
+from push_predictor.nodes.validator.scalar_topics import DELAY, STALE, ClockHistory
 from push_predictor.online import stream_sync
-from push_predictor.online.clock_history import DELAY, STALE, ClockHistory
 from push_predictor.online.stream_sync import StreamSync
 from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder

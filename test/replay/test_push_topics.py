@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from push_predictor.recordings.topics import Topics
-from push_predictor.replay.push_topics import missing_poses, push_topics
+from push_predictor.replay.source import missing_poses, push_topics
 
 USUAL = ["/pusher/pose", "/pusher/wrench", "/slider/pose", "/surface/temperature"]
 LAB = ["/netft", "/robot_state", "/tf", "/tf_static", "/vicon/block/block"]

@@ -8,15 +8,16 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from functools import partial
+from threading import Event, Thread
+from time import sleep
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.clock import SECOND, PlayerClock
-from push_predictor.replay.play_range import PlayRange
-from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
+from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
 from push_predictor.replay.source import ReadAhead
 
 START = 1000 * SECOND
@@ -225,6 +226,39 @@ def test_play_next_and_burst_do_nothing_while_playing() -> None:
     stage.script[2] = ["play_next", ("burst", 3)]
     assert stage.run() == TENTHS
     assert stage.answers[:2] == [False, 0]
+
+
+def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None:
+    wall, waits, hung, published = SystemClock(), Event(), Event(), []
+
+    def prepare(message: RawMessage) -> Callable[[], bool]:
+        if message is TEN[2] and not hung.is_set():
+            waits.set()
+            hung.wait(20.0)
+        return lambda: not published.append(message)
+
+    output = PlayerOutput(prepare, lambda: None, lambda state: None)
+    player = ReplayPlayer(ListSource(TEN), PlayerClock(wall, 1e6, True), wall, output, 10, False, 0)
+    playing, answers = Thread(target=player.run, daemon=True), []
+    playing.start()
+    player.play(PlayRange())
+    while player.state != "paused":
+        sleep(0.01)
+    bursting = Thread(target=lambda: answers.append(player.burst(0)), daemon=True)
+    bursting.start()
+    assert waits.wait(20.0)
+    others = [Thread(target=control, daemon=True) for control in (lambda: player.behind, player.resume)]
+    for other in others:
+        other.start()
+        other.join(20.0)
+    free = [not other.is_alive() for other in others]
+    hung.set()
+    bursting.join(20.0)
+    while player.state != "finished" and free == [True, True]:
+        sleep(0.01)
+    player.close()
+    assert free == [True, True], "the burst held the player's lock"
+    assert published == TEN and answers == [2], "the burst ends where the replay is resumed"
 
 
 def test_seek_goes_forward_and_back_without_waiting() -> None:

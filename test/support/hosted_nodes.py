@@ -24,7 +24,7 @@ from rclpy.context import Context
 from ros_harness import START_TIMEOUT, free_domain, keep_tables, node_arguments, wait_until
 
 from push_predictor.nodes import runtime
-from push_predictor.nodes.predict_server import PredictServer, start_server
+from push_predictor.nodes.predict_server import PredictServer
 from push_predictor.nodes.push_recorder import PushRecorder
 from push_predictor.nodes.push_replay import PushReplay
 from push_predictor.nodes.push_validator import PushValidator
@@ -34,7 +34,7 @@ from push_predictor.resources import share_path
 # As main() of a replay. Fast DDS reads it once: it counts only where no other node came first in this process.
 PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}
 NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
-    "predict_server": (lambda stop: PredictServer(), start_server, {}),
+    "predict_server": (lambda stop: PredictServer(), PredictServer.start, {}),
     "push_recorder": (PushRecorder, None, {}),
     "push_replay": (PushReplay, None, PROFILES),
     "push_validator": (lambda stop: PushValidator(), None, {}),

@@ -22,7 +22,7 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from push_predictor.nodes.message_types import message_class
+from push_predictor.nodes.qos import message_class
 
 
 def main(output: str, depth: str, *topics: str) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import ros_harness as harness
+from action_bench import ActionGoal
 from lifecycle_msgs.srv import ChangeState
 from made_up_traces import pushes, slippery
 from rclpy.action import ActionClient
@@ -33,7 +34,6 @@ from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.srv import LoadModel, PredictPush
 
 STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
-PATIENCE = 240.0  # s until a trace counts as stuck; alone it takes 3, beside eight busy processes it took over 60
 DRIVERS = ["elapsed_time"]
 RIG = "pushes.rig.yaml"
 
@@ -65,8 +65,10 @@ class Server:
         )
         self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
 
-    def trace(self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "") -> Goal:
-        goal = TraceResidual.Goal(model=model, covariates=covariates, output=str(output))
+    def trace(
+        self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "", data: Path | str = ""
+    ) -> Goal:
+        goal = TraceResidual.Goal(model=model, covariates=covariates, output=str(output), data=str(data))
         return Goal(self.node, self._action, goal)
 
     def push(self, covariates: dict[str, float] | None = None, model: str = "") -> PredictPush.Response:
@@ -96,32 +98,15 @@ class Server:
         return worker
 
 
-class Goal:
-    """A goal that was sent: whether it was accepted, then its feedback so far, its status and result."""
-
-    def __init__(self, node: Node, action: ActionClient, goal: TraceResidual.Goal) -> None:
-        assert action.wait_for_server(harness.START_TIMEOUT)
-        self.stages: list[tuple[str, float]] = []
-        sent = harness.in_spin(node, lambda: action.send_goal_async(goal, self._feedback))
-        assert harness.wait_until(sent.done, PATIENCE)
-        self.handle: Any = sent.result()
-        self.accepted = bool(self.handle.accepted)
-        if self.accepted:
-            self._result = harness.in_spin(node, self.handle.get_result_async)
-
-    def _feedback(self, message: Any) -> None:
-        self.stages.append((message.feedback.stage, message.feedback.progress))
+class Goal(ActionGoal):
+    """A goal of trace_residual."""
 
     @property
-    def ended(self) -> bool:
-        return bool(self._result.done())
+    def stages(self) -> list[tuple[str, float]]:
+        return [(each.stage, each.progress) for each in self.feedback]
 
     def reached(self, stage: str, patience: float) -> bool:
         return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), patience)
-
-    def end(self) -> tuple[int, TraceResidual.Result]:
-        assert harness.wait_until(self._result.done, PATIENCE), self.stages
-        return self._result.result().status, self._result.result().result
 
 
 @contextlib.contextmanager

@@ -26,7 +26,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import push_replay
-from push_predictor.online import sample_check
+from push_predictor.online import check_process
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import taken
@@ -68,7 +68,7 @@ def hosting_validator(*ros_args: str, **where: Any) -> Iterator[HostedNode]:
     """
     with (
         patch.object(AlarmProcess, "prepare"),
-        patch.object(sample_check, "FIRST", sys.maxsize),
+        patch.object(check_process, "FIRST", sys.maxsize),
         hosted_node("push_validator", *ros_args, **where) as node,
     ):
         yield node

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import traceback
 from collections.abc import Callable
 from functools import partial
@@ -13,13 +14,13 @@ from types import ModuleType
 from typing import Any
 
 from builtin_interfaces.msg import Duration, Time
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
 from push_predictor.replay.clock import SECOND
-from push_predictor.replay.play_range import PlayRange
-from push_predictor.replay.player import ReplayPlayer
+from push_predictor.replay.player import PlayRange, ReplayPlayer
 from push_predictor_interfaces import srv as own_types
 
 
@@ -33,22 +34,27 @@ class ReplayControls:
     def __init__(self, node: Node, player: ReplayPlayer) -> None:
         self._node, self._player = node, player
         types = _imported_rosbag2() or own_types
-        for kind, name, handler in (
-            ("Pause", "pause", self._pause),
-            ("Resume", "resume", self._resume),
-            ("TogglePaused", "toggle_paused", self._toggle_paused),
-            ("IsPaused", "is_paused", self._is_paused),
-            ("GetRate", "get_rate", self._get_rate),
-            ("SetRate", "set_rate", self._set_rate),
-            ("Play", "play", self._play),
-            ("PlayNext", "play_next", self._play_next),
-            ("Burst", "burst", self._burst),
-            ("Seek", "seek", self._seek),
-            ("Stop", "stop", self._stop),
-        ):
-            node.create_service(getattr(types, kind), f"~/{name}", partial(self._guarded, handler))
+        waiting = MutuallyExclusiveCallbackGroup()  # of those that wait for subscribers
+        handlers: dict[str, Callable[[Any, Any], object]] = {
+            "Pause": lambda request, response: player.pause(),
+            "Resume": lambda request, response: player.resume(),
+            "TogglePaused": lambda request, response: player.toggle_paused(),
+            "IsPaused": lambda request, response: setattr(response, "paused", player.paused),
+            "GetRate": lambda request, response: setattr(response, "rate", player.rate),
+            "SetRate": self._set_rate,
+            "Play": self._play,
+            "PlayNext": self._play_next,
+            "Burst": self._burst,
+            "Seek": lambda request, response: player.seek(_nanoseconds(request.time)),
+            "Stop": lambda request, response: player.stop(),
+        }
+        for kind, handler in handlers.items():
+            name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind).lower()
+            group = waiting if kind in ("PlayNext", "Burst") else None
+            callback = partial(self._guarded, handler)
+            node.create_service(getattr(types, kind), f"~/{name}", callback, callback_group=group)
 
-    def _guarded(self, handler: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
+    def _guarded(self, handler: Callable[[Any, Any], object], request: Any, response: Any) -> Any:
         """Turn every exception into a refusal: one that left a callback would end the node."""
         try:
             handler(request, response)
@@ -62,21 +68,6 @@ class ReplayControls:
             self._node.get_logger().error(traceback.format_exc())
             reason = f"internal error, see the log of the node: {error!r}"
             return _refusal(response, reason, ErrorCode.INTERNAL_ERROR)
-
-    def _pause(self, request: Any, response: Any) -> None:
-        self._player.pause()
-
-    def _resume(self, request: Any, response: Any) -> None:
-        self._player.resume()
-
-    def _toggle_paused(self, request: Any, response: Any) -> None:
-        self._player.toggle_paused()
-
-    def _is_paused(self, request: Any, response: Any) -> None:
-        response.paused = self._player.paused
-
-    def _get_rate(self, request: Any, response: Any) -> None:
-        response.rate = self._player.rate
 
     def _set_rate(self, request: Any, response: Any) -> None:
         if not self._player.set_rate(request.rate):
@@ -100,12 +91,6 @@ class ReplayControls:
         if not self._player.paused:
             return NotPausedError("the replay is not paused: pause it with ~/pause")
         return NothingLeftError("no message is left: start again with ~/play or ~/seek")
-
-    def _seek(self, request: Any, response: Any) -> None:
-        self._player.seek(_nanoseconds(request.time))
-
-    def _stop(self, request: Any, response: Any) -> None:
-        self._player.stop()
 
 
 def _imported_rosbag2() -> ModuleType | None:

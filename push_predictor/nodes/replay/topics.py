@@ -16,8 +16,7 @@ from rclpy.qos import HistoryPolicy, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.nodes.message_types import message_class
-from push_predictor.nodes.qos import replay_profile
+from push_predictor.nodes.qos import message_class, replay_profile
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.fields.sources import SCALAR_FIELDS, TF_TYPES
 

@@ -16,11 +16,12 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
+
+from push_predictor.nodes.polling import NoExecutor
 
 JOIN_TIMEOUT = 5.0  # s
 RETRY_DELAY = 0.1  # s after an error
@@ -37,10 +38,9 @@ class ThreadedService:
     ) -> None:
         self._node, self._closing = node, threading.Event()
         self.service: Service = node.create_service(
-            kind, name, callback, qos_profile=qos_profile, callback_group=_NoExecutor()
+            kind, name, callback, qos_profile=qos_profile, callback_group=(apart := NoExecutor())
         )
-        with node.context.handle:
-            self._wake = rclpy_implementation.GuardCondition(node.context.handle)
+        self._wake = node.create_guard_condition(lambda: None, apart)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
@@ -52,17 +52,17 @@ class ThreadedService:
         """Answer the requests that have arrived, end the thread and destroy the service."""
         self._closing.set()
         if self._thread.is_alive():
-            with self._wake:
-                self._wake.trigger_guard_condition()
+            self._wake.trigger()
             self._thread.join(JOIN_TIMEOUT)
-        self._wake.destroy_when_not_in_use()
+        self._node.destroy_guard_condition(self._wake)
         self._node.destroy_service(self.service)
 
     def _run(self) -> None:
         context = self._node.context
         with ExitStack() as handles:
-            for handle in (context.handle, self.service.handle, self._wake):
+            for handle in (context.handle, self.service.handle, self._wake.handle):
                 handles.enter_context(handle)
+            # Not public, and without a public equal: an executor costs three turns of all entities for each request.
             wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 1, 0, context.handle)
             while context.ok() and not self._closing.is_set():
                 try:
@@ -78,7 +78,7 @@ class ThreadedService:
         """Wait for a request or for `close`."""
         wait_set.clear_entities()
         wait_set.add_service(self.service.handle)
-        wait_set.add_guard_condition(self._wake)
+        wait_set.add_guard_condition(self._wake.handle)
         wait_set.wait(-1)
 
     def _answer(self) -> bool:
@@ -89,16 +89,3 @@ class ThreadedService:
         response = self.service.callback(request, self.service.srv_type.Response())
         self.service.send_response(response, header)
         return True
-
-
-class _NoExecutor(CallbackGroup):
-    """Entities that no executor waits for."""
-
-    def can_execute(self, entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """Do nothing: execution never begins."""

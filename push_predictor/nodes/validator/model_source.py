@@ -68,7 +68,7 @@ class ModelSource:
         self._request, self._next = self._client.call_async(ListModels.Request()), now + PATIENCE
 
     def _take(self, response: ListModels.Response) -> None:
-        files = {name: _file_of(text) for name, text in zip(response.names, response.descriptions, strict=False)}
+        files = {info.name: info.file for info in response.models}
         self.problems = [
             problem for text in self._wanted if (problem := self._settle(text, files, response.default_model))
         ]
@@ -99,7 +99,3 @@ class ModelSource:
 
 def _is_path(text: str) -> bool:
     return "/" in text or Path(text).is_file()
-
-
-def _file_of(description: str) -> str:
-    return description.partition("file=")[2]

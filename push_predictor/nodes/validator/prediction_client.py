@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any, TypeAlias
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
@@ -56,8 +54,6 @@ class PredictionClient:
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=DEPTH))
-        self._wait_set = rclpy_implementation.WaitSet(0, 0, 0, 1, 0, 0, node.context.handle)
-        self._taking = False
         self._timeout, self._log = timeout, node.get_logger()
         self._waiting: dict[str, deque[_Pending]] = {}
         self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
@@ -86,8 +82,7 @@ class PredictionClient:
         self._waiting.setdefault(request.model, deque()).append(_Pending(request, on_answer))
 
     def work(self) -> None:
-        """Take answers, send waiting and overdue requests. Call it often, in the executor's thread."""
-        self._take_answers()
+        """Send waiting and overdue requests. Call it often, in the executor's thread."""
         if not self.open or not self.server_available:
             return
         now = monotonic()
@@ -107,27 +102,6 @@ class PredictionClient:
         self._waiting.clear()
         self._blocked.clear()
         self._silence = None
-
-    def _take_answers(self) -> None:
-        """Take all arrived answers: an executor that is busy with samples would deliver one a turn, and late."""
-        if self._taking:
-            return
-        self._taking = True
-        try:
-            while self._one_waits():
-                header, response = self._client.handle.take_response(PredictPush.Response)
-                if header is None:  # for another client
-                    continue
-                with suppress(KeyError):  # sent again, and answered before
-                    self._client.get_pending_request(header.request_id.sequence_number).set_result(response)
-        finally:
-            self._taking = False
-
-    def _one_waits(self) -> bool:
-        self._wait_set.clear_entities()
-        self._wait_set.add_client(self._client.handle)
-        self._wait_set.wait(0)
-        return bool(self._wait_set.get_ready_entities("client"))
 
     def _note_silence(self, now: float) -> None:
         self.timeouts += 1

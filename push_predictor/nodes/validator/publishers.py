@@ -7,17 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.alarms import alarm_to_message
+from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers, prediction_markers, push_markers
+from msg_adapters.residuals import alarm_to_message
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json, alarm_sentence
+from push_predictor.geometry.frames import to_world
+from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors.tails import Tails, half_widths, joint_radius
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.validator.window_markers import window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushAlarm, PushResidual
+
+LEVEL = 0.95
 
 
 class ResultPublishers:
@@ -39,3 +46,52 @@ class ResultPublishers:
         """Log and publish an alarm about a model that has fired; end: of the push at which it fired, ns."""
         self._log.warning(alarm_sentence(alarm_json(state)))
         self._alarms.publish(alarm_to_message(state, model, end, self._world()))
+
+
+def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
+    """Pusher, push, outlines, 95 % ellipse, observed pose and label in frame_id; prediction: of n = 1.
+
+    Each marker has a namespace of its own and id 0, so a window replaces the one before.
+    """
+    heading = np.array([window.push_heading])
+    predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
+    wider = _wider(prediction.tails)
+    covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, heading)[0]
+    start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
+    reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
+    distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
+    parts = (
+        push_markers(tip_of(rig, window), rig.pusher_radius, window.push_heading, *where),
+        prediction_markers(rig.outline.vertices, start, predicted, covariance[:2, :2], end, *where),
+        magnified_markers(predicted, covariance, end, reach, window.push_heading, *where),
+        label_marker(_label(window, distance, limit), start[:2], reach, distance > limit, *where),
+    )
+    return MarkerArray(markers=[marker for part in parts for marker in part.markers])
+
+
+def _wider(tails: Tails | None) -> Array:
+    """Factors (3,) on the sd of a Gaussian, which the markers draw, whose 95 % regions are those of the tails."""
+    plane = joint_radius(tails, LEVEL, 2) / joint_radius(None, LEVEL, 2)
+    turn = (half_widths(tails, LEVEL) / half_widths(None, LEVEL))[2]
+    return np.array([plane, plane, turn])
+
+
+def tip_of(rig: Rig, window: PushWindow) -> Array:
+    """The pusher's centre (2,), m, at the window's start: of a disc that touches the outline at the contact."""
+    contact = np.array([window.contact])
+    centre = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
+    return np.asarray(to_world(centre, window.slider_start)[0])
+
+
+def error_in_sd(window: PushWindow, prediction: Prediction) -> float:
+    """The Mahalanobis distance of the outcome (dx, dy, dtheta) from the prediction (n = 1)."""
+    away = window.displacement - prediction.mean[0]
+    return float(np.sqrt(away @ np.linalg.solve(prediction.covariance[0], away)))
+
+
+def _label(window: PushWindow, distance: float, limit: float) -> str:
+    return (
+        f"{window.push_id}, window {window.index}\n"
+        f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {limit:.1f})\n"
+        f"ellipse and dial {MAGNIFICATION:.0f} times enlarged"
+    )

@@ -14,10 +14,10 @@ from rclpy.node import Node
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
 from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
+from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.result_writer import ResultWriter
-from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess

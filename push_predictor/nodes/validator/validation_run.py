@@ -11,32 +11,35 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from rclpy.serialization import serialize_message
 
 from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
+from msg_adapters.residuals import residual_to_message
 from push_predictor.evaluation.alarm.evidence import with_alarm
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.nodes.validator.residual_recorder import residual_message, write_residuals
-from push_predictor.online.alarm_process import AlarmProcess
-from push_predictor.online.completed_pushes import CompletedPushes
-from push_predictor.online.files.residual_journal import ResidualJournal
-from push_predictor.online.files.window_table import WindowTable
+from push_predictor.online.alarm_process import AlarmProcess, CompletedPushes
+from push_predictor.online.check_process import SampleCheck
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
-from push_predictor.online.sample_check import SampleCheck
 from push_predictor.online.stream_sync import StreamSync
+from push_predictor.online.window_table import JOURNAL, ResidualJournal, WindowTable
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.checks.coverage import pushed_part
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
+from push_predictor.recordings.fields.installed_definitions import definition_text
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import PredictPush
+
+TOPIC, TYPE, BAG = "push_residual", "push_predictor_interfaces/msg/PushResidual", "residuals"
 
 
 class ValidationRun:
@@ -160,9 +163,8 @@ class ValidationRun:
         window, name = self.validation.windows[number], self.validation.names[model]
         try:
             prediction = _finite(prediction_from_response(response))
-            residual = residual_message(
-                name, window, prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
-            )
+            mean, covariance, in_domain = prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
+            residual = residual_to_message(name, window, mean, covariance, in_domain)
         except (RefusedError, MessageError) as error:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
@@ -172,13 +174,27 @@ class ValidationRun:
         self.validation.record(model, number, prediction)
         self._settle(model, number, window, prediction)
         if self.journal is not None:
-            self.journal.add(name, window, prediction.mean[0], prediction.covariance[0])
+            self.journal.add(name, window, mean, covariance)
         self._publish(self.rig, model, window, prediction, residual)
 
     def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
         if model == 0:
             self._pushes.answered(number, window, prediction)
             self._pass_to_alarm()
+
+
+def write_residuals(validation: LiveValidation, folder: Path) -> Path:
+    """Write FOLDER/residuals, a rosbag2 folder, and remove the journal of the same residuals.
+
+    One push_residual for each prediction of each model, at the window's end. Raises RecordingError.
+    """
+    path = folder / BAG
+    with BagWriter(path) as bag:
+        bag.add_topic(TOPIC, TYPE, definition_text(TYPE))
+        for residual in validation.residuals():
+            bag.write(TOPIC, residual.window.end, serialize_message(residual_to_message(*residual)))
+    (folder / JOURNAL).unlink(missing_ok=True)
+    return path
 
 
 def _finite(prediction: Prediction) -> Prediction:

@@ -40,6 +40,7 @@ UNKNOWN_BIAS = (
 
 KEPT = 2_000_000_000  # ns of the tip's poses that are kept before the first wrench that waits: streams lag by less
 MOST_WAITING = 20_000  # wrenches that wait, and poses of the tip for them
+_NEVER = int(np.iinfo(np.int64).min)
 # Of stamps (n,) ns, which are decided and the poses (k, 7) of the axes at these; the second: no more will come.
 AxesAt: TypeAlias = Callable[[IntArray, bool], tuple[BoolArray, Array]]
 
@@ -118,6 +119,8 @@ class WrenchInput:
 class PosedWrench:
     """Wrenches wait until poses of the tip and of the sensor at or after their stamp are known.
 
+    Where the clock of the wrench is set back before that of the tip, the wrenches of the new time wait for the tip's.
+
     axes: the sensor's poses; None for a sensor with the axes of the tip. without_pose: how many wrenches got no pose;
     oriented: whether a pose of the tip had an orientation.
     """
@@ -126,6 +129,7 @@ class PosedWrench:
         self.without_pose, self.oriented = 0, False
         self._axes = axes
         self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 6))
+        self._early, self._latest = np.empty(0, np.bool_), _NEVER  # whether of a time that the tip has not been set to
         self._tip_stamp, self._tip = np.empty(0, np.int64), np.empty((0, 7))
 
     def put(self, stamp: IntArray, values: Array, tip_stamp: IntArray, tip: Array, last: bool = False) -> Wrenches:
@@ -136,10 +140,12 @@ class PosedWrench:
         """
         self._note_tip(tip_stamp, tip)
         self._stamp, self._values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
-        newest = self._tip_stamp.max() if len(self._tip_stamp) else np.iinfo(np.int64).min
-        due, sensor = self._sensor((self._stamp <= newest) | last, last)
+        latest = np.maximum.accumulate(np.concatenate([[self._latest], stamp]))
+        self._early, self._latest = np.concatenate([self._early, latest[1:] - stamp > CLOCK_SET]), int(latest[-1])
+        newest = self._tip_stamp.max() if len(self._tip_stamp) else _NEVER
+        due, sensor = self._sensor((self._stamp <= newest) & ~self._early | last, last)
         ready, wrenches = self._stamp[due], self._values[due]
-        self._stamp, self._values = self._stamp[~due][-MOST_WAITING:], self._values[~due][-MOST_WAITING:]
+        self._keep(np.flatnonzero(~due)[-MOST_WAITING:])
         poses = poses_at(ready, self._tip_stamp, self._tip)
         sensor = poses if sensor is None else sensor
         known = ~np.isnan(poses).any(axis=1) & ~np.isnan(sensor).any(axis=1)
@@ -163,12 +169,17 @@ class PosedWrench:
             poses = upright(poses)  # tf has the orientation
         if not len(stamp):
             return
-        if len(self._tip_stamp) and self._tip_stamp[-1] - stamp[-1] > CLOCK_SET:  # all that waits is old
-            self.without_pose += len(self._stamp)
-            self._stamp, self._values = self._stamp[:0], self._values[:0]
+        if len(self._tip_stamp) and self._tip_stamp[-1] - stamp[-1] > CLOCK_SET:
+            self.without_pose += int(np.sum(~self._early))
+            self._keep(np.flatnonzero(self._early))
+            self._early, self._latest = np.zeros_like(self._early), int(self._stamp.max(initial=_NEVER))
             self._tip_stamp, self._tip = self._tip_stamp[:0], self._tip[:0]
         self._tip_stamp = np.concatenate([self._tip_stamp, stamp])
         self._tip = np.concatenate([self._tip, poses])
+
+    def _keep(self, rows: IntArray) -> None:
+        """Let only these wrenches wait."""
+        self._stamp, self._values, self._early = self._stamp[rows], self._values[rows], self._early[rows]
 
     def _forget(self) -> None:
         """Drop the tip's poses that no wrench needs, after those that came were used: the first portion may be long."""

@@ -1,0 +1,154 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A live topic of a decoder: subscribed with the type and QoS of its publishers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from time import monotonic
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from push_predictor.errors import PushPredictorError, RecordingError
+from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.online.topic_report import TopicReport, stamp_figures
+from push_predictor.recordings.bag.message_types import definition_text
+from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.topic_input import TopicInput
+from push_predictor.types import IntArray
+
+DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones; memory grows as the queue fills
+SILENT = 5.0  # s without a sample that are reported
+NO_WRENCH = "No publisher: contact is found from geometry alone."
+
+
+class TopicStream:
+    """Moves the messages of a topic into an input of a decoder.
+
+    earlier: also take what was sent before. Call `look` and
+    `report` in the executor's thread; not at the same time as `move`.
+    """
+
+    def __init__(self, node: Node, own: TopicInput, earlier: bool = False) -> None:
+        self.input = own
+        topic = own.source.topic
+        self.name = node.resolve_topic_name(topic) + own.source.text[len(topic) :]  # after remapping, for people
+        self._subscription = FollowingSubscription(node, topic, DEPTH, earlier=earlier, overridable=not earlier)
+        self.refusals: dict[str, str] = {}  # by type
+        self._offered: list[tuple[str, ReliabilityPolicy]] = []  # type and reliability of each publisher
+        self._heard = monotonic()  # when the last message came, or the last publisher
+        if own.target.type and not own.source.field:
+            self._follow(own.target.type, [])
+
+    @property
+    def lost(self) -> int:
+        """How many messages were overwritten or missed."""
+        return self._subscription.lost
+
+    @property
+    def kinds(self) -> list[str]:
+        """The types of the publishers."""
+        return sorted({kind for kind, _ in self._offered})
+
+    @property
+    def refused(self) -> bool:
+        """Whether there are publishers, but not of one type that fits."""
+        return bool(self._offered) and len(self._usable()) != 1
+
+    @property
+    def refusal(self) -> str:
+        """Why the types of the publishers do not fit."""
+        return next(iter(filter(None, map(self.refusals.get, self.kinds))), "One type of publishers is accepted.")
+
+    def look(self) -> None:
+        """Subscribe to the type that the publishers have, as they offer it."""
+        publishers = self._subscription.publishers()
+        if not self._offered:
+            self._heard = monotonic()
+        self._offered = [(each.topic_type, each.qos_profile.reliability) for each in publishers]
+        if len(usable := self._usable()) == 1:
+            self._follow(usable[0], [each for each in publishers if each.topic_type == usable[0]])
+
+    def move(self) -> None:
+        """Move arrived messages from the middleware into the input."""
+        if taken := self.taken():
+            self.input.put(*as_messages(taken, self.input.source.topic, self.input.kind))
+
+    def taken(self) -> list[Taken]:
+        """The messages that have arrived."""
+        found = [*self._subscription.taken()]
+        self._heard = monotonic() if found else self._heard
+        return found
+
+    def report(self, stream: str) -> TopicReport:
+        """What is known of the topic now."""
+        stamp, received, found = self.input.recent()
+        frames, kind = tuple(sorted(found - {""})), self.input.kind
+        return TopicReport(
+            stream=stream,
+            topic=self.name,
+            kind=kind if kind in self.kinds or not self.kinds else " and ".join(self.kinds),
+            reliability=reliability_text(self._subscription.reliability),
+            frames=frames,
+            figures=stamp_figures(stamp, received),
+            problem=self._problem(stream, frames),
+            refused=self.refused,
+            note=NO_WRENCH if stream == "wrench" and not self._offered else "",
+        )
+
+    def _problem(self, stream: str, frames: Sequence[str]) -> str:
+        if not self._offered:
+            return "" if stream == "wrench" else "No publisher."
+        if self.refused:
+            return self.refusal
+        offered = [reliability for kind, reliability in self._offered if kind == self.input.kind]
+        if self._subscription.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
+            return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
+        expected = self.input.expected
+        if expected and (others := [frame for frame in frames if frame.strip("/") != expected]):
+            wrench = ", or wrench_frame to tip or a frame of tf" if stream == "wrench" else ""
+            names = " and ".join(map(repr, others))
+            return f"frame_id {names} is not accepted, give {expected!r}, or set world_frame{wrench}."
+        if monotonic() - self._heard > SILENT:
+            return f"No message for over {SILENT:g} s."
+        return ""
+
+    def _usable(self) -> list[str]:
+        return [kind for kind in self.kinds if self._understood(kind)]
+
+    def _understood(self, kind: str) -> bool:
+        """Whether messages of a type have what the stream needs; remembers why not."""
+        if kind == self.input.kind:
+            return True
+        if kind not in self.refusals:
+            try:
+                self.input.check(kind, {kind: definition_text(kind)})
+                self.refusals[kind] = ""
+            except RecordingError as error:
+                self.refusals[kind] = str(error)
+        return not self.refusals[kind]
+
+    def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        if kind != self.input.kind:
+            self.input.declare(kind, {kind: definition_text(kind)})
+        try:
+            self._subscription.follow(kind, publishers)
+        except PushPredictorError as error:
+            self.refusals[kind] = f"{error}."
+
+
+def as_messages(taken: Sequence[Taken], topic: str, kind: str) -> tuple[Messages, IntArray]:
+    """Messages as a decoder takes them, dated by their sending, and when they arrived, ns."""
+    arrived = np.array([message.received for message in taken], np.int64)
+    return Messages.of(
+        topic, kind, [message.sent for message in taken], [message.message for message in taken]
+    ), arrived
+
+
+def reliability_text(reliability: ReliabilityPolicy | None) -> str:
+    """In words; empty for none."""
+    return "" if reliability is None else reliability.name.lower().replace("_", " ")

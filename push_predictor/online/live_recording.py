@@ -1,0 +1,137 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording while it is made: the bag, what has been found in it so far, and what is missing."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from push_predictor.online.live_bag import LiveBag
+from push_predictor.online.recorder_findings import NANOSECOND, Findings
+from push_predictor.online.recorder_progress import Progress
+from push_predictor.recordings.bag.metadata import TopicInfo
+from push_predictor.recordings.decoder.sources import sources_of, topics_to_record
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.topics import Topics
+
+NO_RIG = "No rig. Give --rig FILE.yaml (of the node: the parameter rig), or publish it on topic rig."
+OTHER_RIG = "Topic rig now has another rig. The bag contains the first one."
+
+
+class LiveRecording:
+    """Writes messages into a bag, and finds windows in them.
+
+    path, topics: see LiveBag; topics have full names. wanted: the topics to subscribe to. Times `now` are of one
+    monotonic clock, in s. with_wrench: whether its absence is a problem. Raises RecordingError if path exists and is no
+    bag.
+    """
+
+    def __init__(self, path: Path, topics: Topics, now: float, with_wrench: bool = True) -> None:
+        self.wanted = topics_to_record(topics, with_wrench)
+        self._texts = {source.text: source.topic for _, source in sources_of(topics)}
+        self._bag = LiveBag(path, topics)
+        self._findings = Findings(topics, now)
+        self._rig: Rig | None = None
+        self._first: int | None = None  # log times, ns
+        self._last = 0
+        self._noted: dict[str, str] = {}
+        self._unpublished: set[str] = set()
+        self._lost: Counter[str] = Counter()
+
+    def type_of(self, topic: str) -> str:
+        """The type with which a topic is recorded, '' as long as it is unknown."""
+        return self._bag.type_of(topic)
+
+    def add_topic(self, topic: TopicInfo) -> None:
+        """Declare the type and QoS of a topic, once."""
+        self.note(f"{topic.name} definition", self._bag.add_topic(topic))
+        self._findings.add_topic(topic.name, topic.type, self._bag.schemas[topic.type])
+
+    def set_rig(self, rig: Rig) -> None:
+        """Record the rig, and find windows with it. The first one counts; another one becomes a problem."""
+        if self._rig is None:
+            self._rig = rig
+            self._bag.set_rig(rig)
+            self._findings.set_rig(rig)
+        elif rig is not self._rig and rig.to_record() != self._rig.to_record():
+            self.note("rig", OTHER_RIG)
+
+    def note(self, subject: str, problem: str) -> None:
+        """State a problem, '' if there is none any more. subject: a topic, if the problem explains its silence."""
+        self._noted.pop(subject, None)
+        if problem:
+            self._noted[subject] = problem
+
+    def set_published(self, topic: str, published: bool) -> None:
+        """State whether a topic has a publisher."""
+        (self._unpublished.discard if published else self._unpublished.add)(topic)
+
+    def write(self, topic: str, log_time: int, data: bytes, lost: int = 0) -> None:
+        """Write a message of a declared topic. log_time in ns; lost: messages before it that did not arrive.
+
+        Raises RecordingError that names the bag if it cannot be written.
+        """
+        self._bag.write(topic, log_time, data)
+        self._lost[topic] += lost
+        self._first = log_time if self._first is None else min(self._first, log_time)
+        self._last = max(self._last, log_time)
+        self._findings.put(topic, log_time, data)
+
+    def work(self, now: float) -> None:
+        """Hand what was written to the disk, and find windows. Call it once a second. Raises RecordingError."""
+        self._bag.flush()
+        self._findings.work(now)
+
+    def close(self, now: float) -> Progress:
+        """Complete the bag; returns the summary. Raises RecordingError that names the bag if it cannot be written."""
+        self._bag.close()
+        self._findings.work(now, last=True)
+        return self.progress(now, ended=True)
+
+    @property
+    def seconds(self) -> float:
+        """Time since the first message, s."""
+        return 0.0 if self._first is None else (self._last - self._first) * NANOSECOND
+
+    def progress(self, now: float, ended: bool = False) -> Progress:
+        """The figures of this moment; after the end only a stream without any message is called silent."""
+        found, rig = self._findings, self._rig is not None
+        return Progress(
+            path=str(self._bag.path),
+            seconds=self.seconds,
+            messages={topic.name: self._bag.messages[topic.name] for topic in self.wanted},
+            streams=found.figures,
+            windows=found.windows if rig else None,
+            pushes=found.pushes,
+            contact=found.contact,
+            problems=self._problems(now, ended),
+        )
+
+    def _problems(self, now: float, ended: bool) -> dict[str, str]:
+        found = {} if self._rig is not None else {"rig": NO_RIG}
+        found |= self._noted | (self._never_heard() if ended else self._silent(now))
+        found |= {
+            f"{topic} lost": f"{topic}: {lost} messages were lost before they arrived."
+            for topic, lost in self._lost.items()
+            if lost
+        }
+        return found | {f"{name} samples": text for name, text in self._findings.problems.items()}
+
+    def _silent(self, now: float) -> dict[str, str]:
+        """The topics without publisher and the streams without messages, except those that nobody expects."""
+        heard = self._bag.messages
+        missed = {t.name for t in self.wanted if (t.expected or heard[t.name]) and not t.static}
+        found = {topic: f"No publisher of {topic}." for topic in sorted(missed & self._unpublished)}
+        known = found.keys() | self._noted.keys()
+        for text, quiet in self._findings.silent(now).items():
+            if self._texts[text] in missed - known:
+                found[f"{text} silent"] = f"No message on {text} for {quiet:.0f} s."
+        return found
+
+    def _never_heard(self) -> dict[str, str]:
+        """The expected topics without any message."""
+        silent = [t.name for t in self.wanted if t.expected and not self._bag.messages[t.name]]
+        why = {topic: "No publisher of" if topic in self._unpublished else "No message on" for topic in silent}
+        return {topic: f"{why[topic]} {topic}." for topic in silent if topic not in self._noted}

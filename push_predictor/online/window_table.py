@@ -1,0 +1,145 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a validator keeps on disk while a run is open, so that an interrupted one loses nothing.
+
+Every window is appended with its covariates to the table that a residual trace starts from as soon as it is found, and
+every prediction to the journal of the residuals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from push_predictor.recordings.atomic import append_lines
+from push_predictor.recordings.rig import Rig, save_rig
+from push_predictor.recordings.table import COLUMNS, OUTPUTS, PushTable
+from push_predictor.recordings.table_file import rig_path, write_table
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.types import Array
+
+TABLE = "pushes.csv"
+JOURNAL = "residuals.csv"  # exists while a validation is open, and after one that was interrupted
+_PREDICTED = tuple(f"predicted_{name}" for name in OUTPUTS)
+_COVARIANCE = tuple(f"covariance_{first}_{second}" for first in OUTPUTS for second in OUTPUTS)
+HEADER = (*COLUMNS, "model", "window", "end", *_PREDICTED, *_COVARIANCE)
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
+
+class WindowTable:
+    """FOLDER/pushes.csv and its rig file, started again with the first window that is added."""
+
+    def __init__(self, folder: Path, rig: Rig) -> None:
+        self.path, self._rig = folder / TABLE, rig
+        self._names: tuple[str, ...] | None = None
+        self.cut_off: Path | None = None  # folder that an earlier, interrupted validation was moved to
+
+    def add(
+        self, windows: Sequence[PushWindow], before: Sequence[PushWindow], first: Mapping[str, float] = NOTHING
+    ) -> None:
+        """Append windows; `before` are all those that are in the file.
+
+        first: first value of each scalar topic, which windows before it get, as when a recording is read. Raises
+        OSError that names the path.
+        """
+        if not windows:
+            return
+        names = tuple(dict.fromkeys(name for window in windows for name in window.covariates))
+        try:
+            if self._names is None or not set(names) <= set(self._names):
+                self._begin(tuple(dict.fromkeys([*(self._names or ()), *names])), before, first)
+            self._append(windows, first)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+
+    def _begin(self, names: tuple[str, ...], before: Sequence[PushWindow], first: Mapping[str, float]) -> None:
+        if self._names is None:
+            self.cut_off = put_aside(self.path.parent)
+            ResidualJournal(self.path.parent).begin()
+        self._names = names
+        write_table(self.path, _table(before, names, first))
+        save_rig(self._rig, rig_path(self.path))
+
+    def _append(self, windows: Sequence[PushWindow], first: Mapping[str, float]) -> None:
+        assert self._names is not None
+        append_lines(self.path, (",".join(_cells(window, self._names, first)) for window in windows))
+
+
+class ResidualJournal:
+    """FOLDER/residuals.csv: a push table of the predicted windows, with the model and its prediction.
+
+    Every prediction is appended as soon as it arrives, as a whole line.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / JOURNAL
+        self.failure = ""  # why no more residuals are saved, in words
+
+    def begin(self) -> None:
+        """Write the empty table, which marks an open validation. Raises OSError that names the path."""
+        self.path.unlink(missing_ok=True)
+        append_lines(self.path, [",".join(HEADER)])
+
+    def add(self, model: str, window: PushWindow, mean: Array, covariance: Array) -> None:
+        """Append a prediction (3,), (3, 3). A full disk does not end the measurement: see `failure`."""
+        if self.failure:
+            return
+        inputs = (window.velocity, window.contact, window.angle, window.duration)
+        cells = [
+            *map(repr, map(float, (*inputs, *window.displacement))),
+            window.push_id,
+            *(_quoted(model), str(window.index), str(window.end)),
+            *map(repr, (*mean.tolist(), *covariance.ravel().tolist())),
+        ]
+        try:
+            append_lines(self.path, [",".join(cells)])
+        except OSError as error:
+            self.failure = f"Residuals are no longer saved: {error}"
+
+
+def put_aside(folder: Path) -> Path | None:
+    """Move the windows and residuals of an interrupted validation to FOLDER/cut_off_DATE, so that they are kept.
+
+    DATE is that of the last residual, UTC. Returns None if there is no such validation. Raises OSError.
+    """
+    journal = folder / JOURNAL
+    if not journal.exists():
+        return None
+    date = datetime.fromtimestamp(journal.stat().st_mtime, timezone.utc)
+    place = folder / f"cut_off_{date:%Y%m%dT%H%M%S%f}"
+    place.mkdir(exist_ok=True)
+    for path in (folder / TABLE, rig_path(folder / TABLE), journal):  # the journal last: it marks the interruption
+        if path.exists():
+            path.replace(place / path.name)
+    return place
+
+
+def _table(windows: Sequence[PushWindow], names: Sequence[str], first: Mapping[str, float]) -> PushTable:
+    """The windows as rows with exactly these covariates; a missing one gets its first value, or NaN."""
+    return PushTable(
+        np.array([[w.velocity, w.contact, w.angle] for w in windows]).reshape(-1, 3),
+        np.array([w.duration for w in windows]),
+        np.array([w.displacement for w in windows]).reshape(-1, 3),
+        np.array([w.push_id for w in windows], dtype=np.str_),
+        {name: np.array([_value(w, name, first) for w in windows]) for name in names},
+    )
+
+
+def _cells(w: PushWindow, names: Sequence[str], first: Mapping[str, float]) -> list[str]:
+    numbers = [w.velocity, w.contact, w.angle, w.duration, *w.displacement.tolist()]
+    others = [_value(w, name, first) for name in names]
+    return [*map(repr, map(float, numbers)), w.push_id, *map(repr, others)]
+
+
+def _value(window: PushWindow, name: str, first: Mapping[str, float]) -> float:
+    return float(window.covariates.get(name, first.get(name, np.nan)))
+
+
+def _quoted(text: str) -> str:
+    """A cell of a CSV file: a server may give its models any name."""
+    return '"' + text.replace('"', '""') + '"'

@@ -1,0 +1,50 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The rig of a node from the topic rig: what is taken, and what is stated while there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import ros_harness as harness
+from synthetic import square_rig
+
+from msg_adapters.rigs import rig_to_message
+from push_predictor.nodes.qos import LATCHED
+from push_predictor.nodes.rig_source import NO_RIG, VOLATILE, RigSource
+from push_predictor.recordings.rig import save_rig
+from push_predictor_interfaces.msg import PushRig
+
+pytestmark = pytest.mark.ros
+
+
+def test_the_topic_gives_the_rig_and_states_what_is_wrong(tmp_path: Path) -> None:
+    with harness.ros_context(harness.free_domain()) as node:
+        rigs, own = RigSource(node, ""), square_rig()
+        assert (rigs.rig, rigs.missing) == (None, NO_RIG)
+        volatile = node.create_publisher(PushRig, "rig", 1)
+        assert harness.wait_until(lambda: rigs.problem == VOLATILE)
+        node.destroy_publisher(volatile)
+
+        def taken() -> bool:
+            rigs.work()
+            return rigs.rig is not None
+
+        latched = node.create_publisher(PushRig, "rig", LATCHED)
+        latched.publish(rig_to_message(own))
+        assert harness.wait_until(taken)
+        assert (rigs.problem, rigs.missing, rigs.differs_from(own)) == ("", "", False)
+        latched.publish(PushRig(shape="nothing"))
+
+        def refused() -> bool:
+            rigs.work()
+            return bool(rigs.problem)
+
+        assert harness.wait_until(refused) and "topic rig: push_rig" in rigs.problem
+        assert rigs.missing == "", "the earlier rig stays"
+        save_rig(own, tmp_path / "rig.yaml")
+        of_file = RigSource(node, str(tmp_path / "rig.yaml"))
+        of_file.work()
+        assert of_file.rig is not None and of_file.problem == ""
