@@ -14,7 +14,7 @@ import visualization_msgs.msg
 from rclpy.utilities import get_rmw_implementation_identifier
 
 import push_predictor_interfaces.srv
-from push_predictor.nodes.network_security import limit_discovery, require_security
+from push_predictor.nodes.network_security import limit_discovery, require_security, security_hint
 
 DISCOVERY = 1.0  # s to discover other nodes
 USED = (geometry_msgs.msg.PoseStamped, visualization_msgs.msg.MarkerArray, push_predictor_interfaces.srv.PredictPush)
@@ -24,8 +24,11 @@ def main() -> None:
     """Print the middleware, the domain and the other nodes. Raises what rclpy or the middleware raises."""
     limited = limit_discovery()
     require_security()
-    rclpy.init(args=[])
-    node = rclpy.create_node("push_predictor_doctor")
+    try:
+        rclpy.init(args=[])
+        node = rclpy.create_node("push_predictor_doctor")
+    except Exception as error:
+        raise SystemExit(f"{error}{security_hint()}") from None
     time.sleep(DISCOVERY)
     names = sorted(f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces())
     others = ", ".join(name for name in names if name != node.get_fully_qualified_name()) or "none"

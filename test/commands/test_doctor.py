@@ -76,7 +76,7 @@ def test_missing_interfaces_are_named(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_missing_security_is_found_before_a_node_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
     finding = ros_node()
-    assert finding.state == "missing" and "unset ROS_SECURITY_ENABLE" in finding.found
+    assert finding.state == "missing" and "security is requested (ROS_SECURITY_ENABLE=true" in finding.found
 
 
 def test_missing_package_and_bad_model_are_named(

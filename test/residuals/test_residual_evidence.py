@@ -144,13 +144,13 @@ def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTa
 
 
 def test_the_question_has_the_analysis_pushes_alone_each_with_its_own_deviation(known: PushTable) -> None:
-    slow = with_inputs(known, 0, np.full(len(known), 0.02))
+    slow = with_inputs(replace(known, outcomes=1.01 * known.outcomes), 0, np.full(len(known), 0.02))  # other pushes
     half = np.arange(len(known)) % 2 == 0
     mixed = with_inputs(known, 0, np.where(half, 0.06, 0.02))
-    question = Question.of(trained(slow), LoadedData(mixed, None, square_rig()))
+    question = Question.of(trained(slow, "analytical"), LoadedData(mixed, None, square_rig()))
     analysis = ~held_out_rows(mixed)
     np.testing.assert_array_equal(question.inside, ~half[analysis])
-    plain = evidence_of(trained(slow), mixed.take(analysis))
+    plain = evidence_of(trained(slow, "analytical"), mixed.take(analysis))
     factor = np.where(half[analysis], 3.0, 1.0)[:, None]
     assert question.evidence.z == pytest.approx(plain.z / factor)
 

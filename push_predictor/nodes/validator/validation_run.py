@@ -27,11 +27,11 @@ from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
 from push_predictor.online.stream_sync import StreamSync
 from push_predictor.online.window_table import JOURNAL, ResidualJournal, WindowTable
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.checks.coverage import pushed_part
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
-from push_predictor.recordings.fields.installed_definitions import definition_text
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder

@@ -20,7 +20,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 SPAN = 0.05  # s before and after a sample that determine its speed
 MOVING = 0.003  # m/s: a faster slider moves, whatever the tracker's noise
-NOISE = 6.0  # standard deviations of the speed of a slider at rest: what is faster moves
+NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
 FEWEST = 5  # samples of each stream
 OFF = 0.001  # m from the outline
 
