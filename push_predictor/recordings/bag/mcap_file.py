@@ -347,9 +347,11 @@ def _read_summary(stream: BinaryIO, start: int, end: int) -> list[McapRecord]:
     """
     if not 0 <= end - start <= LARGEST_CHUNK:
         raise ValueError("the footer places the summary outside the file")
+    if read_at(stream, max(start - _DATA_END.size, 0), HEAD.size) != HEAD.pack(Opcode.DATA_END, 4):
+        raise ValueError("the summary is not where the footer places it")
     content = read_at(stream, start, end - start + _FOOTER.size)
     crc = _FOOTER.unpack_from(content, end - start)[4]
-    if crc and zlib.crc32(content[: -len(MAGIC) - 4]) != crc:
+    if crc and zlib.crc32(memoryview(content)[: -len(MAGIC) - 4]) != crc:
         raise ValueError("the summary's checksum is wrong")
     return list(StreamReader(BytesIO(content), skip_magic=True).records)
 
