@@ -123,7 +123,6 @@ class PredictServer(LifecycleNode):
     def finish(self) -> bool:
         """End long requests and goals; whether their clients have got the answers, or will not be waited for."""
         self._closing.set()
-        self._timer.cancel()
         self._closing_until = self._closing_until or monotonic() + CLOSE_TIMEOUT
         return not self.abandons_callbacks or monotonic() > self._closing_until
 
