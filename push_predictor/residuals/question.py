@@ -30,7 +30,7 @@ class Question:
 
     model: the deployed one, or one about mechanics where that cannot extrapolate. windows: of the analysis, as they
     were measured. inside: those among the inputs of training. trained: number of pushes that are not judged, because
-    the model was trained on them.
+    a learned model was trained on them.
     """
 
     deployed: PushModel
@@ -87,10 +87,12 @@ class Question:
 
 
 def unseen(model: PushModel, table: PushTable) -> PushTable:
-    """The windows of pushes that the model was not trained on; covariates that only grow go on from its trace.
+    """The windows of pushes that a learned model was not trained on; covariates that only grow go on from its trace.
 
-    A model fits its training pushes better than others, which would look like a change between recordings.
+    What was learnt fits its training pushes better than others, which would look like a change between recordings.
     """
+    if not model.base.predictor.learnt:
+        return model.continued(table)
     return model.continued(table.take(~np.isin(table.push_id, trained_on(model, table))))
 
 
@@ -100,7 +102,7 @@ def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequenc
     if not len(model.training):
         raise RequestError("model", model.name, "one that was trained on pushes: retrain it on those at hand")
     if len(table.pushes) < FEWEST_PUSHES:
-        accepted = f"at least {FEWEST_PUSHES} that the model was not trained on, preferably hundreds"
+        accepted = f"at least {FEWEST_PUSHES} that a learned model was not trained on, preferably hundreds"
         raise RequestError("pushes", len(table.pushes), accepted)
     for name in covariates or ():
         if name not in table.covariates or name in LOCAL:

@@ -314,5 +314,7 @@ def test_pushes_that_the_model_was_trained_on_are_not_judged() -> None:
     assert question.trained == len(model.training.pushes)
     assert not {*question.windows.pushes, *question.held_out.pushes} & {*model.training.pushes}
     assert f"trained on {question.trained} of the pushes" in " ".join(notes_of_data(question))
-    with pytest.raises(RequestError, match=r"pushes: 0 .*that the model was not trained on"):
+    textbook = train_model(model.training, model.rig, "analytical", name="textbook")
+    assert Question.of(textbook, both).trained == 0  # its mean was fitted to none
+    with pytest.raises(RequestError, match=r"pushes: 0 .*that a learned model was not trained on"):
         Question.of(model, replace(both, table=with_inputs(model.training)))
