@@ -26,6 +26,8 @@ from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.recordings.windows.push_window import TIMED_ID
 from push_predictor.types import Array, BoolArray
 
+FIRST_DATE = 10**9  # s since 1970: in 2001
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -127,7 +129,8 @@ def pit(comparison: Comparison) -> Array:
 def trained_on(model: PushModel, table: PushTable) -> list[str]:
     """The pushes of a table that were used to train the model: scores on them are optimistic.
 
-    These are the pushes with a training window, and those that began at the time of a training push.
+    These are the pushes with a training window, and those that began at the time of a training push: after a correction
+    of the streams its windows differ. A clock that begins at zero gives the same time to pushes of other days.
     """
     known = {row.tobytes() for row in np.column_stack([model.training.inputs, model.training.outcomes])}
     rows = np.column_stack([table.inputs, table.outcomes])
@@ -137,9 +140,10 @@ def trained_on(model: PushModel, table: PushTable) -> list[str]:
 
 
 def _timed(push_id: str) -> str | None:
-    """The part of an id that the window finder derived from the time of first contact, None for other ids."""
+    """The part of an id with the date and time of first contact; None for other ids, and for a clock without dates."""
     name = push_id.rpartition("/")[2]
-    return name if name.startswith(TIMED_ID) else None
+    seconds = name.removeprefix(TIMED_ID).partition(".")[0]
+    return name if name.startswith(TIMED_ID) and seconds.isdecimal() and int(seconds) >= FIRST_DATE else None
 
 
 def _intervals(c: Comparison) -> dict[str, object]:

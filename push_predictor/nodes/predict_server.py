@@ -128,8 +128,13 @@ class PredictServer(LifecycleNode):
 
     @property
     def abandons_callbacks(self) -> bool:
-        """Whether a long request still runs: the process cannot wait for it when it ends."""
-        idle = all(each.callback_group.can_execute(each) for each in (*self._long_services, self._timer))
+        """Whether a long request or a transition still runs: the process cannot wait for it when it ends."""
+        groups = (
+            *self._long_services,
+            self._short_services[0],
+            self._timer,
+        )  # a transition is in the short ones' group
+        idle = all(each.callback_group.can_execute(each) for each in groups)
         return not (idle and all(action.settled for action in self._actions))
 
     def close(self) -> None:

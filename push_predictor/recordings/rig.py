@@ -82,17 +82,6 @@ def rig_from_record(record: Mapping[str, object], source: str) -> Rig:
     )
 
 
-def rig_from_json(text: str, source: str) -> Rig:
-    """Read the record from JSON text, as on the topic `rig`. Raises RigError."""
-    try:
-        record = json.loads(text)
-    except ValueError as error:
-        raise RigError(f"{source}: push_rig is not JSON ({error}); {HOW_TO_GIVE}") from None
-    if not isinstance(record, dict):
-        raise RigError(f"{source}: push_rig is a {type(record).__name__}, give an object of keys and values")
-    return rig_from_record(record, source)
-
-
 def load_rig(path: Path) -> Rig:
     """Read NAME.rig.yaml. Raises RigError if the file is missing or invalid."""
     import yaml

@@ -397,3 +397,11 @@ def test_a_prior_of_few_draws_is_read(models: dict[str, PushModel], tmp_path: Pa
     save_model(few, tmp_path / "m")
     loaded = load_model(tmp_path / "m").predictor
     assert isinstance(loaded, PriorPredictor) and np.array_equal(loaded.draws, model.predictor.draws[:2])
+
+
+def test_quantiles_of_tails_do_not_decrease(tailed: PushModel, tmp_path: Path) -> None:
+    """Intervals would be far too narrow, and no prediction shows it."""
+    assert tailed.predictor.tails is not None
+    falling = tailed.predictor.tails.quantiles[::-1].tolist()
+    with pytest.raises(ModelFileError, match="tails: quantiles decrease"):
+        load_changed(tailed, put("predictor.tails.quantiles", falling), tmp_path / "m")

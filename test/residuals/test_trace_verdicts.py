@@ -318,3 +318,12 @@ def test_pushes_that_the_model_was_trained_on_are_not_judged() -> None:
     assert Question.of(textbook, both).trained == 0  # its mean was fitted to none
     with pytest.raises(RequestError, match=r"pushes: 0 .*that a learned model was not trained on"):
         Question.of(model, replace(both, table=with_inputs(model.training)))
+
+
+def test_pushes_at_the_same_time_of_a_clock_without_dates_are_other_pushes() -> None:
+    model, later = learnt(), faultless()
+    again = replace(model.training, outcomes=1.5 * model.training.outcomes)
+    names = np.char.replace(again.push_id, "push-15", "push-00")
+    data = replace(later, table=with_inputs(replace(again, push_id=names)), recordings=None)
+    known = replace(model, training=replace(model.training, push_id=names))
+    assert Question.of(known, data).trained == 0

@@ -137,6 +137,16 @@ def _table(a: SimpleNamespace) -> None:
         raise ValueError(f"a training push is longer than {LONGEST_PUSH:g} m")
 
 
+def _tails(a: SimpleNamespace) -> None:
+    if np.any(np.diff(a.quantiles, axis=0) < 0.0):
+        raise ValueError("quantiles decrease")
+
+
+def _correlation(a: SimpleNamespace) -> None:
+    if a.rows is not None and np.any(a.rows < 0):
+        raise ValueError("rows: a number of a training row is negative")
+
+
 def _sparse(a: SimpleNamespace) -> None:
     for name in ("inducing_signal", "inducing_noise"):
         rows = getattr(a, name)
@@ -226,6 +236,8 @@ def _check_covariance(covariance: Array) -> None:
 
 CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     PushTable: _table,
+    Tails: _tails,
+    Correlation: _correlation,
     SparseVHGP: _sparse,
     FittedMechanics: _fitted,
     PushMechanics: _mechanics,
