@@ -78,10 +78,10 @@ def scores_of(found: tuple[Corpus, ...], tmp_path_factory: pytest.TempPathFactor
     [
         ("random", "analytical", 0.221, -16.82),
         pytest.param("random", "gp", 0.153, -17.40, marks=pytest.mark.long),
-        pytest.param("random", "vhgp", 0.148, -17.52, marks=pytest.mark.long),
+        pytest.param("random", "vhgp", 0.149, -17.54, marks=pytest.mark.long),
         ("push", "analytical", 0.228, -16.65),
         ("push", "gp", 0.189, -17.09),
-        ("push", "vhgp", 0.180, -17.18),
+        ("push", "vhgp", 0.180, -17.19),
     ],
 )
 def test_a_fit_of_the_paper_has_the_scores_of_the_docs(
