@@ -92,13 +92,10 @@ class PredictServer(LifecycleNode):
         self._frames = RequestFrames(self, self.value("world_frame"))
         self._create_services()
         self._introspect(self.value("introspection"))
-        self._trace = TraceAction(
-            self, self._deployed, lambda: float(self.value("trace_alpha")), self._check_active, self._check_loaded
-        )
-        check, suggest = self._check_active, self._suggest
+        check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))
         self._actions = [
-            self._trace.action,
-            GuardedAction(self, SuggestPushes, "suggest_pushes", suggest, check, check),
+            TraceAction(self, self._deployed, alpha, check, self._check_loaded).action,
+            GuardedAction(self, SuggestPushes, "suggest_pushes", self._suggest, check, check),
         ]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         period, steady = self.value("diagnostics_period"), Clock(clock_type=ClockType.STEADY_TIME)
@@ -129,12 +126,8 @@ class PredictServer(LifecycleNode):
     @property
     def abandons_callbacks(self) -> bool:
         """Whether a long request or a transition still runs: the process cannot wait for it when it ends."""
-        groups = (
-            *self._long_services,
-            self._short_services[0],
-            self._timer,
-        )  # a transition is in the short ones' group
-        idle = all(each.callback_group.can_execute(each) for each in groups)
+        one_of_each_group = (*self._long_services, self._short_services[0], self._timer)  # the second: transitions too
+        idle = all(each.callback_group.can_execute(each) for each in one_of_each_group)
         return not (idle and all(action.settled for action in self._actions))
 
     def close(self) -> None:

@@ -64,6 +64,7 @@ class PushReplay(Node):
         self._stop = stop
         self._ending = threading.Event()
         self._options = options = read_options(self)
+        self._given_rig = None if options.rig is None else load_rig(options.rig)
         bag = open_bag(options.recording)
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
@@ -102,13 +103,10 @@ class PushReplay(Node):
         return topics
 
     def _publish_rig(self, bag: Bag) -> str:
-        """Publish the push_rig record; returns what is wrong with it, empty if nothing."""
+        """Publish the given rig, or the recorded one; returns what is wrong with that, empty if nothing."""
         try:
-            given, record = self._options.rig, bag.metadata.get(RECORD_NAME, {})
-            rig = load_rig(given) if given is not None else rig_from_record(record, str(bag.path))
+            rig = self._given_rig or rig_from_record(bag.metadata.get(RECORD_NAME, {}), str(bag.path))
         except RigError as error:
-            if self._options.rig is not None:
-                raise
             self.get_logger().warning(f"the topic rig is not published: {error}")
             return str(error)
         self._rig.publish(rig_to_message(rig))
@@ -134,8 +132,7 @@ class PushReplay(Node):
         elif (size := _size(bag.path)) > LARGEST_CHECKED:
             self._checks.skip(f"{size / 1e6:.0f} MB. Run `push_predictor check`.")
         else:
-            rig = None if self._options.rig is None else load_rig(self._options.rig)
-            self._checks.start(self._options.recording, rig, self._options.topics)
+            self._checks.start(self._options.recording, self._given_rig, self._options.topics)
 
     def _report_regularly(self) -> None:
         checked = not self._checks.busy

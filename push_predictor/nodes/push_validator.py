@@ -114,10 +114,11 @@ class PushValidator(Node):
         self._advance()
         if self._run is not None:
             self._run.checks.work()
-        self._finish.answer()
         if self._session.over:
+            self._writer.close()  # or the callers of ~/finish would wait for a report that is not completed
             self._status.publish(self._run)
             self._closed = True
+        self._finish.answer()
 
     def _advance(self) -> None:
         """Let the session go through its states: open, drain, write."""

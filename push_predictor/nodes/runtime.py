@@ -27,7 +27,7 @@ from push_predictor.online.child_process import kill_children
 
 TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
-LONGEST = 3.0  # s in which a callback may: less than a launch waits for
+LONGEST = 3.0  # s in which a callback of an executor with one thread may: less than a launch waits for
 _GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
 
 
@@ -135,7 +135,7 @@ class Life:
                 self._close(self._executor)
         finally:
             if self._executor is not None:
-                self._executor.shutdown()
+                self._executor.shutdown(timeout_sec=0.0 if self.leaves_threads else None)
             if self._node is not None:
                 self._node.destroy_node()
             rclpy.try_shutdown(context=self._context)
@@ -171,11 +171,16 @@ class Life:
         if error is None:
             return 0
         refused = isinstance(error, PushPredictorError)
-        if not refused and not (self._executor is None and isinstance(error, _GRAPH_ERRORS)):
+        if not refused and not (self._executor is None and _of_the_graph(error)):
             raise error
         hint = "" if refused else security_hint()
         print(f"{self._name}: {one_line(error)}{hint}", file=sys.stderr)
         return 1
+
+
+def _of_the_graph(error: BaseException) -> bool:
+    """Whether rclpy or rcl refuses to start a node; any other RuntimeError is a bug, which needs its traceback."""
+    return isinstance(error, _GRAPH_ERRORS) and type(error).__module__.partition(".")[0] == rclpy.__name__
 
 
 def _parse(name: str, args: Sequence[str] | None) -> None:
@@ -208,7 +213,10 @@ def one_line(error: BaseException) -> str:
 
 
 def _handle_signals(stop: Stop, life: Life) -> None:
-    """End at SIGINT and SIGTERM; a start that takes longer than GRACE then is interrupted, a callback after LONGEST."""
+    """End at SIGINT and SIGTERM; a start that takes longer than GRACE then is interrupted, a callback after LONGEST.
+
+    Callbacks in further threads are not interrupted: finish() and close() of their node end them.
+    """
 
     def end(number: int, frame: object) -> None:
         stop.request()

@@ -149,18 +149,22 @@ class ReplayPlayer:
         return done
 
     def _publish_paused(self) -> bool:
-        """Publish the next message if paused; False if not. Other controls work while subscribers are waited for."""
+        """Publish the next message; False if not paused or after the last message.
+
+        Other controls work while subscribers are waited for: after a seek another message is the next.
+        """
+        while (head := self._paused_head()) is not None:
+            publish = self._output.prepare(head)
+            with self._control():
+                if self._paused_head() is head:
+                    self._send(head, publish)
+                    self._clock.jump(head.log_time)
+                    return True
+        return False
+
+    def _paused_head(self) -> RawMessage | None:
         with self._control():
-            head = self._head() if self._clock.paused else None
-        if head is None:
-            return False
-        publish = self._output.prepare(head)
-        with self._control():
-            if not self._clock.paused or self._head() is not head:
-                return False  # a control has come meanwhile
-            self._send(head, publish)
-            self._clock.jump(head.log_time)
-        return True
+            return self._head() if self._clock.paused else None
 
     def seek(self, time: int) -> None:
         """Continue from a log time, ns, no earlier than the first message. After the end, play again."""

@@ -11,6 +11,7 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
+from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.online.session import Session
 
@@ -183,3 +184,27 @@ def test_without_samples_there_is_nothing_to_write() -> None:
     finish.answer()
     service.turn()
     assert not service.responses[0][1].success and "No sample" in service.responses[0][1].message
+
+
+def test_the_end_of_the_node_answers_those_who_wait_for_a_report() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=True)
+    finish = finish_service(service, session)
+    writer: Any = finish._writer
+    writer.report.busy = True
+    writer.close = lambda: vars(writer.report).update(busy=False, failed=True)
+    service.call("caller")
+    ended_run(session, finish)
+    session.written()
+    finish.answer()
+    service.turn()
+    assert not service.responses
+    idle = SimpleNamespace(**dict.fromkeys(("look", "drain", "work", "models", "publish"), lambda *_: None))
+    parts = {"_session": session, "_finish": finish, "_writer": writer, "_advance": lambda: None, "_run": None}
+    others = dict.fromkeys(("_sensors", "_models", "_alarm", "_rigs", "_status"), idle)
+    node: Any = SimpleNamespace(_closing=True, _closed=False, **parts, **others)
+    PushValidator._work(node)
+    assert node._closed and not finish.sent
+    service.turn()
+    assert finish.sent
+    ((caller, response),) = service.responses
+    assert caller == "caller" and not response.success and "report failed" in response.message

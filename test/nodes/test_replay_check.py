@@ -26,7 +26,8 @@ class Bench:
         self.logged: list[str] = []
         self.started: list[tuple[Any, ...]] = []
         monkeypatch.setattr(CheckProcess, "start", lambda _, *what: self.started.append(what))
-        self._options = SimpleNamespace(recording=recording, topics=topics, rig=None)
+        self._options = SimpleNamespace(recording=recording, topics=topics)
+        self._given_rig = None
         self._rig_warning, self._checks = "", CheckProcess()
 
     def get_logger(self) -> Any:

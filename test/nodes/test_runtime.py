@@ -77,3 +77,12 @@ def test_arguments_of_ros_are_left_to_it(arguments: list[str]) -> None:
 def test_arguments_that_ros_refuses_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("push_replay", no_node, ["--ros-args", "-r", "nonsense"]) == 1
     assert capsys.readouterr().err.startswith("push_replay: ")
+
+
+def test_an_error_of_the_program_keeps_its_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    def make_node(stop: Stop) -> Any:
+        raise RuntimeError("dictionary changed size during iteration")
+
+    with pytest.raises(RuntimeError, match="changed size"):
+        run("push_replay", make_node, [])
+    assert capsys.readouterr().err == ""

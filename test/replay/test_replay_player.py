@@ -228,6 +228,32 @@ def test_play_next_and_burst_do_nothing_while_playing() -> None:
     assert stage.answers[:2] == [False, 0]
 
 
+@pytest.mark.parametrize(
+    ("control", "expected", "published"),
+    [
+        (lambda player: player.seek(START + 8 * SECOND // 10), 4, [0.0, 0.1, 0.8, 0.9]),
+        (lambda player: player.seek(START + 2 * SECOND), 2, [0.0, 0.1]),
+    ],
+    ids=["to a message", "behind the last"],
+)
+def test_a_burst_goes_on_where_a_seek_leads_while_it_waits(
+    control: Callable[[ReplayPlayer], None], expected: int, published: list[float]
+) -> None:
+    stage = Stage(TEN, paused=True)
+    prepare = stage.prepare
+
+    def prepare_and_seek(message: RawMessage) -> Callable[[], bool]:
+        if message is TEN[2]:
+            control(stage.player)
+        return prepare(message)
+
+    output = PlayerOutput(prepare_and_seek, lambda: None, lambda state: None)
+    stage.player = ReplayPlayer(ListSource(TEN), stage.clock, stage, output, 10, False, 0)
+    stage.when_stuck = [("burst", 0)]
+    assert stage.run() == published
+    assert stage.answers[0] == expected
+
+
 def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None:
     wall, waits, hung, published = SystemClock(), Event(), Event(), []
 

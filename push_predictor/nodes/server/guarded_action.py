@@ -46,6 +46,7 @@ class GuardedAction:
         self._log, self._kind, self._name = node.get_logger(), kind, name
         self._work, self._may_begin, self._may_continue = work, may_begin, may_continue
         self._running, self._ended = threading.Lock(), -SENDING
+        self._counting, self._goals = threading.Lock(), 0  # accepted, without a result
         self.doing = ""
         ActionServer(
             node,
@@ -59,19 +60,32 @@ class GuardedAction:
 
     @property
     def settled(self) -> bool:
-        """Whether no goal runs, and the last result has been sent."""
-        return not self._running.locked() and monotonic() - self._ended > SENDING
+        """Whether no goal is accepted or runs, and the last result has been sent."""
+        return not self._goals and monotonic() - self._ended > SENDING
 
     def _accepts(self) -> bool:
         """Whether a goal is accepted now; ROS gives a client no reason for a rejected goal, so the log has it."""
+        self._count(1)  # before the check: a node that ends sees the goal, or the goal that the node ends
         try:
             self._may_begin()
         except InactiveError as error:
+            self._count(-1)
             self._log.warning(f"{self._name}: goal rejected, {error}")
             return False
         return True
 
+    def _count(self, change: int) -> None:
+        with self._counting:
+            self._goals += change
+
     def _execute(self, goal: Any) -> Any:
+        try:
+            return self._result(goal)
+        finally:
+            self._ended = monotonic()
+            self._count(-1)
+
+    def _result(self, goal: Any) -> Any:
         if not self._running.acquire(blocking=False):
             accepted = f"one at a time: {self.doing or self._name} is under way, wait or cancel it"
             return self._abort(goal, BusyError(f"goal: {self._name!r} is not accepted, give {accepted}"))
@@ -88,7 +102,7 @@ class GuardedAction:
             self._log.error(traceback.format_exc())
             return self._abort(goal, error)
         finally:
-            self.doing, self._ended = "", monotonic()
+            self.doing = ""
             self._running.release()
 
     def _check(self, goal: Any) -> None:
