@@ -109,6 +109,11 @@ class Outline:
         return float(np.sum(cross * squares) / (6.0 * np.sum(cross)))
 
     @cached_property
+    def reach(self) -> float:
+        """Distance of the farthest vertex from the origin, m."""
+        return float(np.max(np.linalg.norm(self.vertices, axis=1)))
+
+    @cached_property
     def rotational_symmetry(self) -> int:
         """Order of the rotational symmetry about the origin: square 4, ellipse 2, 1 for none, 0 for a circle."""
         if self.semi_axes is not None:
