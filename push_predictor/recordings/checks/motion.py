@@ -16,6 +16,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
 SPAN = 0.05  # s before and after a sample that determine its speed
@@ -161,7 +162,7 @@ def _velocity(time: Array, values: Array) -> Array:
 
 def _speed_noise(values: Array) -> float:
     """Standard deviation (m/s) of the speed at rest, from the second differences of n samples (n, k), m."""
-    spread = 1.4826 * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
+    spread = SD * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
     return float(np.max(spread) * np.sqrt(2.0) / (2.0 * SPAN))
 
 
