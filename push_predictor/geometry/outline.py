@@ -65,7 +65,7 @@ class Outline:
             raise RigError(f"outline: shape {vertices.shape} is not accepted, give at least three [x, y] in metres")
         if not np.all(np.isfinite(vertices)):
             raise RigError("outline: a vertex is not finite, give [x, y] in metres")
-        if _signed_area(vertices) <= 0.0:
+        if signed_area(vertices) <= 0.0:
             raise RigError("outline: the vertices run clockwise or enclose nothing, give them counter-clockwise")
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
@@ -84,7 +84,7 @@ class Outline:
         """Enclosed area, m^2."""
         if self.semi_axes is not None:
             return float(np.pi * self.semi_axes[0] * self.semi_axes[1])
-        return float(_signed_area(self.vertices))
+        return signed_area(self.vertices)
 
     @cached_property
     def centroid(self) -> Array:
@@ -107,6 +107,11 @@ class Outline:
         cross = here[:, 0] * after[:, 1] - after[:, 0] * here[:, 1]
         squares = np.sum(here * here + here * after + after * after, axis=1)
         return float(np.sum(cross * squares) / (6.0 * np.sum(cross)))
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance of the farthest vertex from the origin, m."""
+        return float(np.max(np.linalg.norm(self.vertices, axis=1)))
 
     @cached_property
     def rotational_symmetry(self) -> int:
@@ -255,6 +260,7 @@ class Outline:
         return np.asarray(np.clip(contact, 0.0, np.nextafter(1.0, 0.0)))
 
 
-def _signed_area(vertices: Array) -> float:
+def signed_area(vertices: Array) -> float:
+    """The area (m^2) that vertices (V, 2) enclose, negative if they run clockwise."""
     x, y = vertices.T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

@@ -92,8 +92,8 @@ def near_symmetry(outline: Outline) -> int:
     exact = outline.rotational_symmetry
     if outline.semi_axes is not None:
         return exact
-    reach = float(np.max(np.linalg.norm(outline.vertices, axis=1)))
-    orders = (k for k in range(len(outline.vertices), 1, -1) if _after_turn(outline.vertices, k) < NEAR * reach)
+    vertices, near = outline.vertices, NEAR * outline.reach
+    orders = (k for k in range(len(vertices), 1, -1) if _after_turn(vertices, k) < near)
     return next(orders, exact)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RequestError, RigError
-from push_predictor.geometry.outline import SAME_LENGTH, Outline
+from push_predictor.geometry.outline import SAME_LENGTH, Outline, signed_area
 from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array
@@ -122,7 +122,7 @@ def read_polygon(path: Path, keep_origin: bool = False) -> Polygon:
             f"{path}: is not accepted, give a CSV with the columns x,y, or a YAML or JSON list of [x, y], in m"
         )
     vertices, notes = _from_list(path) if path.suffix in LISTS else _from_csv(path), []
-    if _area(vertices) < 0.0:
+    if signed_area(vertices) < 0.0:
         notes.append("the vertices run clockwise: their order was reversed")
         vertices = np.concatenate([vertices[:1], vertices[:0:-1]])
     repeated = np.linalg.norm(vertices - np.roll(vertices, -1, axis=0), axis=1) < SAME_LENGTH
@@ -199,7 +199,7 @@ def _check(path: Path, vertices: Array) -> None:
         raise RigError(
             f"{path}: sides {pair[0] + 1} and {pair[1] + 1} cross, give the vertices in order around the outline"
         )
-    if abs(_area(vertices)) < SMALLEST**2 / 4.0:
+    if abs(signed_area(vertices)) < SMALLEST**2 / 4.0:
         raise RigError(f"{path}: the polygon encloses nothing, give {ACCEPTED}")
 
 
@@ -215,8 +215,3 @@ def _crossing(vertices: Array) -> tuple[int, int] | None:
     apart = side(start) * side(end) < 0.0
     pairs = np.argwhere(apart & apart.T)
     return None if not len(pairs) else (int(pairs[0, 0]), int(pairs[0, 1]))
-
-
-def _area(vertices: Array) -> float:
-    x, y = vertices.T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

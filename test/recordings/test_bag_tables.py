@@ -50,7 +50,7 @@ def rig_of(name: str) -> Rig:
 
 def lacking(table: PushTable, name: str = WHOLE) -> dict[str, Finding]:
     rig = rig_of(name)
-    return {each.name: each for each in coverage_findings(coverage_of(table, rig.outline, rig.pusher_radius))}
+    return {each.name: each for each in coverage_findings(coverage_of(table, rig))}
 
 
 def changed(table: PushTable, dy: float = 1.0, dtheta: float = 1.0, angle: float = 1.0) -> PushTable:

@@ -14,6 +14,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 
 SQUARE, RADIUS = shape_outline("rect1"), 0.00475
@@ -33,14 +34,18 @@ def pushes(count: int = 80, slip: float = 0.5, turn: float = 0.0) -> PushTable:
     return PushTable(np.column_stack([velocity, contact, angle]), np.full(n, 0.2), outcomes, names)
 
 
+def rig_with(outline: Outline) -> Rig:
+    return Rig("shape", outline, RADIUS, "unknown")
+
+
 def covered(table: PushTable, outline: Outline = SQUARE) -> Coverage:
-    coverage = coverage_of(table, outline, RADIUS)
+    coverage = coverage_of(table, rig_with(outline))
     assert coverage is not None
     return coverage
 
 
 def found(table: PushTable, outline: Outline | None = SQUARE) -> dict[str, Finding]:
-    return {finding.name: finding for finding in coverage_findings(coverage_of(table, outline, RADIUS))}
+    return {finding.name: finding for finding in coverage_findings(coverage_of(table, outline and rig_with(outline)))}
 
 
 def on_sides(table: PushTable, *sides: int) -> PushTable:
@@ -65,7 +70,9 @@ def test_few_pushes_are_counted(count: int, severity: str) -> None:
 
 
 def test_no_push_at_all_is_a_warning() -> None:
-    assert [finding.name for finding in coverage_findings(coverage_of(empty_table(), SQUARE, RADIUS))] == ["no_pushes"]
+    assert [finding.name for finding in coverage_findings(coverage_of(empty_table(), rig_with(SQUARE)))] == [
+        "no_pushes"
+    ]
 
 
 def test_missing_sides_of_a_square_are_a_note_and_named() -> None:

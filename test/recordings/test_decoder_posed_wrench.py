@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from turning_sensor import in_sensor_axes
 
 from push_predictor.recordings.decoder.wrench import PosedWrench
-from push_predictor.recordings.fields.pose_rows import at_tip, in_sensor_axes
+from push_predictor.recordings.fields.pose_rows import at_tip
 from push_predictor.types import Array, IntArray
 
 MS = 10**6

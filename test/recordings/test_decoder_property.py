@@ -23,11 +23,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lab_bags import Lab, Message, pose_rows, pose_values
 from synthetic import Push, moved, translating_push
-from turning_sensor import MOUNT, add_wrench, measured_at, wrench_rows
+from turning_sensor import MOUNT, add_wrench, in_sensor_axes, measured_at, wrench_rows
 
 from push_predictor.recordings.decoder import transform_buffer
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
-from push_predictor.recordings.fields.pose_rows import composed, in_sensor_axes, inverted, normalised
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.fields.wrench_bias import estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream

@@ -15,13 +15,13 @@ import pytest
 pytest.importorskip("rosbags")
 from decoding import decoder_of, in_portions, joined_samples, put
 from lab_bags import Lab, Message, short_recording
-from turning_sensor import add_tip, add_wrench, measured_at_mount, sensor_tf, tip_rows
+from turning_sensor import add_tip, add_wrench, in_sensor_axes, measured_at_mount, sensor_tf, tip_rows
 
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder import bias_so_far
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
-from push_predictor.recordings.fields.pose_rows import in_sensor_axes, normalised
+from push_predictor.recordings.fields.pose_rows import normalised
 from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.recordings.fields.wrench_bias import BiasError, gravity_direction
 from push_predictor.recordings.read import read_recording

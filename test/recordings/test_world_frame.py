@@ -15,12 +15,12 @@ pytest.importorskip("rosbags")
 from decoding import decoded, decoder_of, in_portions, put
 from lab_bags import Lab, pose_rows, pose_values
 from test_lab_topics import assert_same_windows, original
-from turning_sensor import add_tip, add_wrench, wrench_rows
+from turning_sensor import add_tip, add_wrench, in_sensor_axes, wrench_rows
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM
-from push_predictor.recordings.fields.pose_rows import composed, in_sensor_axes, inverted, normalised
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.topics import Topics, load_topics

@@ -16,11 +16,20 @@ from hypothesis import strategies as st
 pytest.importorskip("rosbags")
 from lab_bags import Lab
 from test_lab_topics import assert_same_windows, original, tf_lab
-from turning_sensor import add_tip, add_wrench, measured_at_mount, measured_at_tip, sensor_tf, tip_rows, wrench_rows
+from turning_sensor import (
+    add_tip,
+    add_wrench,
+    in_sensor_axes,
+    measured_at_mount,
+    measured_at_tip,
+    sensor_tf,
+    tip_rows,
+    wrench_rows,
+)
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.fields.pose_rows import about_points, in_sensor_axes, in_world_axes, normalised, poses_at
+from push_predictor.recordings.fields.pose_rows import about_points, in_world_axes, normalised, poses_at
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import Topics, load_topics, save_topics

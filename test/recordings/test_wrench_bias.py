@@ -16,12 +16,12 @@ import pytest
 pytest.importorskip("rosbags")
 from lab_bags import Lab
 from test_lab_topics import assert_same_windows, original
-from turning_sensor import add_tip, add_wrench, tip_rows
+from turning_sensor import add_tip, add_wrench, in_sensor_axes, tip_rows
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.geometry.frames import to_body
-from push_predictor.recordings.fields.pose_rows import in_sensor_axes, in_world_axes
+from push_predictor.recordings.fields.pose_rows import in_world_axes
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, gravity_direction
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream

@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 from lab_bags import Lab, pose_values
 
-from push_predictor.recordings.fields.pose_rows import about_points, composed, in_sensor_axes, inverted, normalised
+from push_predictor.recordings.fields.pose_rows import about_points, composed, in_world_axes, inverted, normalised
 from push_predictor.recordings.streams import PoseStream, WrenchStream
 from push_predictor.types import Array, IntArray
 
 TILT = 0.35  # rad, of the axis from the vertical
 TURN = 0.8  # rad/s
 MOUNT = normalised(np.array([[0.02, -0.03, 0.11, 0.2, 0.1, 0.9, 0.3]]))  # of the sensor in the tip's frame
+
+
+def in_sensor_axes(wrenches: Array, poses: Array) -> Array:
+    """Wrenches (n, 6) along the world's axes, along those of sensors at poses (n, 7): the inverse of in_world_axes."""
+    return in_world_axes(wrenches, inverted(poses))
 
 
 def tip_rows(pusher: PoseStream, stamp: IntArray, tilt: float = TILT) -> Array:

@@ -58,8 +58,8 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
     wider = _wider(prediction.tails)
     covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, heading)[0]
     start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
-    reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
     distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
+    reach = rig.outline.reach
     parts = (
         push_markers(tip_of(rig, window), rig.pusher_radius, window.push_heading, *where),
         prediction_markers(rig.outline.vertices, start, predicted, covariance[:2, :2], end, *where),

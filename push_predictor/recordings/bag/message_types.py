@@ -175,4 +175,3 @@ WRENCH = _standard(
     "geometry_msgs/msg/WrenchStamped", "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"
 )
 FLOAT64 = _standard("std_msgs/msg/Float64", "705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a")
-HEADER_DEFINITION = f"{_RULE}\nMSG: std_msgs/Header\n{_with_types('std_msgs/Header', _STANDARD.__getitem__)}"

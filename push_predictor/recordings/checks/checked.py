@@ -70,7 +70,7 @@ def checked_recording(recording: Recording) -> CheckedData:
     table = windows_to_table(windows)
     if all(finding.severity == "note" for finding in found):
         found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
-    coverage = coverage_of(table, rig.outline, rig.pusher_radius)
+    coverage = coverage_of(table, rig)
     fit = contact_fit(used, rig, table)
     return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
 
@@ -89,5 +89,5 @@ def _checked_table(name: str, table: PushTable, rig: Rig | None) -> CheckedData:
     found = check_table(table, rig)
     if any(finding.severity == "refused" for finding in found):
         return CheckedData(name, found, None, None, rig)
-    coverage = coverage_of(table) if rig is None else coverage_of(table, rig.outline, rig.pusher_radius)
+    coverage = coverage_of(table, rig)
     return CheckedData(name, (*found, *coverage_findings(coverage)), coverage, None, rig, table)

@@ -59,11 +59,11 @@ class Coverage:
         }
 
 
-def coverage_of(table: PushTable, outline: Outline | None = None, radius: float = 0.0) -> Coverage | None:
-    """The coverage of a table, None without a row. radius: of the tip, m."""
+def coverage_of(table: PushTable, rig: Rig | None = None) -> Coverage | None:
+    """The coverage of a table, None without a row. Sides and sliding contacts need the rig."""
     if not len(table):
         return None
-    counts, side, alike = (None, "side", 0) if outline is None else _sides(table, outline)
+    counts, side, alike = (None, "side", 0) if rig is None else _sides(table, rig.outline)
     return Coverage(
         len(table.pushes),
         len(table),
@@ -72,7 +72,7 @@ def coverage_of(table: PushTable, outline: Outline | None = None, radius: float 
         alike,
         _middle(table.inputs[:, 0]),
         _middle(table.inputs[:, 2]),
-        None if outline is None else _sliding(table, outline, radius),
+        None if rig is None else _sliding(table, rig),
     )
 
 
@@ -90,7 +90,7 @@ def pushed_part(table: PushTable, rig: Rig | None = None) -> list[Finding]:
 
     The limits are those of the warnings of `push_predictor check`. Sides and sliding contacts need the rig.
     """
-    coverage = coverage_of(table) if rig is None else coverage_of(table, rig.outline, rig.pusher_radius)
+    coverage = coverage_of(table, rig)
     if coverage is None:
         return []
     lacking = [finding for finding in coverage_findings(coverage) if finding.severity == "warning"]
@@ -113,11 +113,11 @@ def _sides(table: PushTable, outline: Outline) -> tuple[IntArray, str, int]:
     return np.bincount(index, minlength=count), side, alike
 
 
-def _sliding(table: PushTable, outline: Outline, radius: float) -> float | None:
+def _sliding(table: PushTable, rig: Rig) -> float | None:
     """Share of sliding steps. A contact that sticks moves along the edge only as the slider rolls around the tip."""
     path = table.inputs[:-1, 0] * table.duration[:-1]
     step = np.diff(table.inputs[:, 1])
-    slip = np.abs(outline.perimeter * (step - np.round(step)) + radius * table.outcomes[:-1, 2]) / path
+    slip = np.abs(rig.outline.perimeter * (step - np.round(step)) + rig.pusher_radius * table.outcomes[:-1, 2]) / path
     used = (table.push_id[1:] == table.push_id[:-1]) & (slip < LARGEST_SLIP)
     if (time := table.covariates.get("elapsed_time")) is not None:
         used &= np.abs(np.diff(time) - table.duration[:-1]) < 0.1 * table.duration[:-1]  # windows end to end
@@ -137,8 +137,7 @@ def _pushes(coverage: Coverage) -> Finding | None:
     severity = _severity(coverage.pushes, FEWEST_PUSHES, GOOD_PUSHES)
     if severity is None:
         return None
-    count = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
-    sentence = f"The data contain {count}: a learnt model needs {GOOD_PUSHES} or more."
+    sentence = f"{_contained(coverage)}: a learnt model needs {GOOD_PUSHES} or more."
     advice = f"Record at least {GOOD_PUSHES - coverage.pushes} more pushes of 20 mm or longer."
     return Finding("few_pushes", severity, sentence, advice, {"pushes": Value(coverage.pushes, "1")})
 
@@ -203,4 +202,8 @@ def _without_need(finding: Finding, coverage: Coverage) -> str:
     """The sentence of a finding, without what a learnt model needs."""
     if finding.name != "few_pushes":
         return finding.sentence
-    return f"The data contain {coverage.pushes} push{'' if coverage.pushes == 1 else 'es'} only."
+    return f"{_contained(coverage)} only."
+
+
+def _contained(coverage: Coverage) -> str:
+    return f"The data contain {coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"

@@ -39,7 +39,7 @@ class DataChecks:
 
     def learnt_from(self, paths: Iterable[Path], table: PushTable, rig: Rig) -> None:
         """Check that the pushes of all paths together suffice for a learnt model."""
-        self._judge(paths, coverage_findings(coverage_of(table, rig.outline, rig.pusher_radius)))
+        self._judge(paths, coverage_findings(coverage_of(table, rig)))
 
     def judged_by(self, paths: Iterable[Path], table: PushTable, rig: Rig | None) -> None:
         """Check which part of the domain the pushes of all paths cover: a model is judged on that part only."""

@@ -19,7 +19,6 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.motion import body_velocity, motion_of
 from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
 from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
-from push_predictor.recordings.checks.units import reach
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
@@ -93,7 +92,7 @@ def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
 
 def _findings_of_large_gap(recording: Recording, rig: Rig, contacts: Contacts, fit: OutlineFit) -> list[Finding]:
     """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
-    far = FAR * reach(rig)
+    far = FAR * rig.outline.reach
     explained = min(BETTER * fit.gap, far)
     if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
@@ -170,7 +169,7 @@ def tip_follows(recording: Recording, rig: Rig) -> bool:
 
 def _is_implausible(fit: OutlineFit, rig: Rig) -> bool:
     """Whether the correction is another slider rather than a mistake in this one's outline."""
-    return bool(np.hypot(*fit.estimate[[X, Y]]) > reach(rig) or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
+    return bool(np.hypot(*fit.estimate[[X, Y]]) > rig.outline.reach or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
 
 
 def _reflected(contacts: Contacts, mirror: Mirror) -> Contacts:

@@ -16,6 +16,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
 SPAN = 0.05  # s before and after a sample that determine its speed
@@ -30,9 +31,9 @@ class Motion:
     """n samples at the slider's stamps.
 
     time (n,) s; slider (n, 3): x, y m, heading rad, unwrapped; tip (n, 2) m; tip_height (n,) m above its lowest place;
-    tip_velocity (n, 2) m/s; slider_speed (n,) and tip_speed (n,) m/s, means over SPAN on both sides; force (n, 2) N on
-    the tip, NaN if unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip.
-    push (n,): number of the contact.
+    tip_velocity (n, 2) and tip_speed (n,) m/s, means over SPAN on both sides; force (n, 2) N on the tip, NaN if
+    unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip. push (n,):
+    number of the contact.
     """
 
     time: Array
@@ -40,7 +41,6 @@ class Motion:
     tip: Array
     tip_height: Array
     tip_velocity: Array
-    slider_speed: Array
     tip_speed: Array
     force: Array
     moving: BoolArray
@@ -110,7 +110,7 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     contact = moving & lowered & (tip_speed > options.least_speed)
     force = _force(recording, origin, time)
     height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    return Motion(time, pose, tip[:, :2], height, tip_velocity, speed, tip_speed, force, moving, contact, number)
+    return Motion(time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, moving, contact, number)
 
 
 def body_velocity(motion: Motion) -> Array:
@@ -162,7 +162,7 @@ def _velocity(time: Array, values: Array) -> Array:
 
 def _speed_noise(values: Array) -> float:
     """Standard deviation (m/s) of the speed at rest, from the second differences of n samples (n, k), m."""
-    spread = 1.4826 * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
+    spread = SD * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
     return float(np.max(spread) * np.sqrt(2.0) / (2.0 * SPAN))
 
 

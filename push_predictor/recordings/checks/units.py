@@ -92,16 +92,11 @@ def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding
 
 
 def _rig_length(rig: Rig) -> Finding | None:
-    size = reach(rig)
+    size = rig.outline.reach
     if max(size, rig.pusher_radius) < LARGEST:
         return None
     sentence = f"The rig's outline reaches {size:.4g} m, the tip radius is {rig.pusher_radius:.4g} m: probably mm."
     return Finding("units_rig", "refused", sentence, "Give the rig's lengths in metres.", {"reach": Value(size, "m")})
-
-
-def reach(rig: Rig) -> float:
-    """Distance (m) of the outline's farthest vertex from the origin."""
-    return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
 
 
 def _rate(name: str, stream: PoseStream) -> Finding | None:
@@ -140,7 +135,7 @@ def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
     ]
     step = np.diff(pose, axis=0)
     turn, path = float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
-    if turn * reach(rig) <= OUTRUN * max(path, TRAVEL):
+    if turn * rig.outline.reach <= OUTRUN * max(path, TRAVEL):
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
     return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})

@@ -74,20 +74,22 @@ class TransformBuffer:
         self._wanted: dict[str, int | None] = {}  # by who asks for single stamps, from which (ns) on
         self._histories: dict[str, _History] = {}
         self._waiting: list[tuple[Messages, bool]] = []
-        self._read = 0  # messages that were read since poses were taken
+        self._unread = self._read = 0  # messages that wait, and those that were read since poses were taken
         self._problem = ""
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
         """How many messages came since poses were taken."""
-        return sum(len(messages) for messages, _ in self._waiting) + self._read
+        return self._unread + self._read
 
     def put(self, messages: Messages, static: bool, live: bool = False) -> None:
         """Add messages, of /tf_static if static; live: beyond LIMIT the oldest are dropped."""
         with self._lock:
             self._waiting.append((messages, static))
-            while live and sum(len(each) for each, _ in self._waiting) > LIMIT:
-                self.dropped += len(self._waiting.pop(0)[0])
+            self._unread += len(messages)
+            while live and self._unread > LIMIT:
+                old = len(self._waiting.pop(0)[0])
+                self.dropped, self._unread = self.dropped + old, self._unread - old
 
     def tree(self) -> TransformTree:
         """The transforms that are kept."""
@@ -169,7 +171,7 @@ class TransformBuffer:
     def _absorb(self) -> None:
         with self._lock:
             waiting, self._waiting = self._waiting, []
-            self._read += sum(len(messages) for messages, _ in waiting)
+            self._read, self._unread = self._read + self._unread, 0
         for static in (True, False):
             if not (portion := [each for each in waiting if each[1] is static]):
                 continue

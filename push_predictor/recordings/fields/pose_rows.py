@@ -86,11 +86,6 @@ def in_world_axes(wrenches: Array, poses: Array) -> Array:
     return np.hstack([turned(quaternion, wrenches[:, :3]), turned(quaternion, wrenches[:, 3:])])
 
 
-def in_sensor_axes(wrenches: Array, poses: Array) -> Array:
-    """Wrenches (n, 6) along the world's axes, along those of sensors at poses (n, 7): the inverse of in_world_axes."""
-    return in_world_axes(wrenches, inverted(poses))
-
-
 def at_tip(wrenches: Array, sensor: Array, tip: Array) -> Array:
     """Wrenches (n, 6) along a sensor's axes, along the world's and about the tip; sensor, tip: their poses (n, 7)."""
     return about_points(in_world_axes(wrenches, sensor), sensor[:, :3], tip[:, :3])

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, IntArray
 
 LONGEST_GAP = 5_000_000_000  # ns; in a longer gap between samples a scalar keeps the earlier value
-SET_BACK = 1_000_000_000  # ns; a stamp earlier than this before the last one restarts the topic
 
 
 class ScalarTrack:
@@ -30,7 +30,7 @@ class ScalarTrack:
         if not len(stream):
             return
         stamp, value = np.append(self._stamp, stream.stamp), np.append(self._value, stream.value)
-        back = np.flatnonzero(np.diff(stamp) < -SET_BACK)
+        back = np.flatnonzero(np.diff(stamp) < -CLOCK_SET)
         if back.size:
             stamp, value = stamp[back[-1] + 1 :], value[back[-1] + 1 :]
         newer = np.diff(np.maximum.accumulate(stamp), prepend=np.iinfo(np.int64).min // 2) > 0
