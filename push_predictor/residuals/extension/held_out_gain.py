@@ -140,7 +140,7 @@ def held_out_windows(model: PushModel) -> Unseen:
 
 def uncertainty_of_effects(model: PushModel, table: PushTable) -> Array:
     """Covariance (n, 3, 3) of a table's outcomes that comes from the effects of a model."""
-    return model.predictor.shift(Push(table.inputs, table.duration, table.covariates)).covariance
+    return model.predictor.shift(Push.of(table)).covariance
 
 
 def _likeliest(square: Array, own: Array, other: Array) -> float:
