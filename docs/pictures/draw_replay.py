@@ -77,7 +77,7 @@ def main() -> None:
 
 def replayed(model: PushModel, recording: Path) -> Replay:
     """Predict a recording window by window, and follow the alarm push by push."""
-    windows, table = recorded_windows(model, recording)
+    windows, table, _ = recorded_windows(model, recording)
     predicted, monitor = compare(model, table), AlarmMonitor(calibrate(model))
     pushes, evidence, fired = list(dict.fromkeys(table.push_id.tolist())), [], None
     for k, push in enumerate(pushes):

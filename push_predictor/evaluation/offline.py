@@ -39,15 +39,16 @@ def recorded_windows(
     report: Callable[[str], None] | None = None,
     topics: Topics = Topics(),
     checks: DataChecks | None = None,
-) -> tuple[list[PushWindow], PushTable]:
-    """Find the windows of a recording, with the model's duration. Raises RecordingError if there is none.
+) -> tuple[list[PushWindow], PushTable, Rig]:
+    """The windows of a recording, with the model's duration, and its rig. Raises RecordingError without a window.
 
     report receives a sentence for each fault of the streams. checks: of the recording and of what its windows cover.
     """
     recording = read_recording(path, rig=rig, topics=topics)
+    rig = require_rig(recording)
     if checks is not None:
-        checks(path, recording, require_rig(recording))
-    finder = WindowFinder(require_rig(recording), window_options(model))
+        checks(path, recording, rig)
+    finder = WindowFinder(rig, window_options(model))
     windows = finder.find(recording)
     if report is not None:
         for fault in describe_recording_faults(recording, finder.counts):
@@ -56,8 +57,8 @@ def recorded_windows(
         raise RecordingError(f"{path}: no push was found in {len(recording.slider)} slider poses")
     table = windows_to_table(windows)
     if checks is not None:
-        checks.judged_by([path], table, require_rig(recording))
-    return windows, table
+        checks.judged_by([path], table, rig)
+    return windows, table, rig
 
 
 def window_options(model: PushModel) -> WindowOptions:
@@ -107,8 +108,8 @@ def validate_recording(
     checks: DataChecks | None = None,
 ) -> tuple[list[PushWindow], Comparison]:
     """Predict every window of a recording, as predict_server does; report and checks as for `recorded_windows`."""
-    windows, table = recorded_windows(model, path, rig, report, topics, checks)
-    model = on_supports(model, rig or recording_rig(path), {})
+    windows, table, rig = recorded_windows(model, path, rig, report, topics, checks)
+    model = on_supports(model, rig, {})
     table = model.continued(table)
     check_pushes(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
@@ -130,8 +131,8 @@ def report_recording(
     watch: called with the share of the work done. report and checks as for `recorded_windows`.
     """
     watch("windows", 0.0)
-    windows, table = recorded_windows(models[0], path, rig, report, topics, checks)
-    models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
+    windows, table, rig = recorded_windows(models[0], path, rig, report, topics, checks)
+    models = [on_supports(model, rig, {}) for model in models]
     tables = [model.continued(table) for model in models]
     for model, own in zip(models, tables, strict=True):
         check_pushes(model, own)

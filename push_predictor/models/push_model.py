@@ -152,14 +152,12 @@ class PushModel:
         if block is None:
             block = np.unique(rows.push_id, return_inverse=True)[1]
         with one_blas_thread():
-            return self.predictor.held_out_moments(Push(rows.inputs, rows.duration, rows.covariates), block)
+            return self.predictor.held_out_moments(Push.of(rows), block)
 
     def exact_log_density(self, table: PushTable) -> Array | None:
         """Log density (n, 3) of a table's outcomes under the exact predictive, None if that is a Gaussian."""
         with one_blas_thread():
-            return self.predictor.exact_log_density(
-                Push(table.inputs, table.duration, table.covariates), table.outcomes
-            )
+            return self.predictor.exact_log_density(Push.of(table), table.outcomes)
 
     def in_domain(self, inputs: Array) -> BoolArray:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
@@ -202,7 +200,7 @@ class PushModel:
         if not self.predictor.covariates:
             return {}
         rows = self.training
-        known = self.predictor.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
+        known = self.predictor.completed(Push.of(rows)).covariates
         names = [name for name in self.predictor.covariates if name not in (*INPUTS, *self.predictor.past)]
         ranges = {name: range_of(name, known[name]) for name in names}
         return {name: found.reaching(self.defaults.get(name, found.high)) for name, found in ranges.items()}
@@ -226,7 +224,7 @@ class PushModel:
         """Some pushes that the model predicts: training rows, or pushes all around the slider if there are none."""
         if len(self.training):
             rows = self.training.take(np.linspace(0, len(self.training) - 1, count).astype(int))
-            return Push(rows.inputs, rows.duration, rows.covariates)
+            return Push.of(rows)
         contact, angle = np.arange(count) / count, np.linspace(-1.0, 1.0, count)
         inputs = np.column_stack([np.full(count, USUAL_SPEED), contact, angle])
         return Push(inputs, np.full(count, USUAL_DURATION), {})

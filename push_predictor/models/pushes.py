@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.recordings.table import INPUTS
+from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
 Numbers = float | Sequence[float] | np.ndarray
@@ -95,6 +95,11 @@ class Push:
     inputs: Array
     duration: Array
     covariates: Mapping[str, Array]
+
+    @staticmethod
+    def of(table: PushTable) -> Push:
+        """The pushes of a table's windows."""
+        return Push(table.inputs, table.duration, table.covariates)
 
     def take(self, rows: IntArray | BoolArray | slice) -> Push:
         """Some of these pushes."""

@@ -107,7 +107,7 @@ def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch
     if not options.tails:
         return predictor
     watch(f"train {options.kind}: tails", 0.95)
-    push = Push(rows.inputs, rows.duration, rows.covariates)
+    push = Push.of(rows)
     learnt = predictor.of_targets().held_out_moments(push, _blocks(rows))
     counts = [regression.parameters.count for regression in predictor.regressions]
     tails = fit_tails(trained.observed - learnt.mean, learnt.covariance, rows.push_id, counts)

@@ -17,7 +17,7 @@ from push_predictor.residuals.channels.measurement import correct, measurement_e
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
 from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.channels.wrench import wrench_effects
-from push_predictor.residuals.evidence.loading import corrected_data
+from push_predictor.residuals.evidence.loading import cut_again
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.question import Question, unseen
@@ -86,8 +86,8 @@ def _corrected(question: Question, measured: ChannelFinding) -> Corrected:
     recordings = list(question.loaded.recordings)
     for error in measured.effects:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
-    again = corrected_data(question.loaded, recordings, window_options(question.model))
-    table = unseen(question.deployed, again.table)
+    again = cut_again(recordings, question.loaded.rig, window_options(question.model))
+    table = unseen(question.deployed, again)
     held = held_out_rows(table)
     return Corrected(measured, evidence_of(question.model, table.take(~held)), table.take(held))
 

@@ -21,7 +21,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
-from push_predictor.recordings.table import concatenate
+from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
@@ -205,7 +205,7 @@ def test_force_bias_is_a_measurement_error_only_if_its_correction_changes_the_wi
     """moved: by what the correction of the force would change the inputs of the windows, rad."""
     monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: pulled())
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.corrected_data", turned(moved))
+    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(moved))
     result = trace_json(trace(learnt(), faultless()))
     harmful = verdict == "measurement"
     assert (result["verdict"], result["channel"], result["motion_model_changed"]) == (verdict, verdict, False)
@@ -219,7 +219,7 @@ def test_correction_of_the_force_does_harm_from_two_per_cent_of_the_windows(
 ) -> None:
     monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: pulled())
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.corrected_data", turned(1e-9, share))
+    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(1e-9, share))
     assert (trace(learnt(), faultless()).verdict == "measurement") == harmful
 
 
@@ -236,13 +236,14 @@ def pulled() -> ChannelFinding:
     return ChannelFinding((ChannelEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ()),), ())
 
 
-def turned(angle: float, share: float = 1.0) -> Callable[..., LoadedData]:
-    """Cuts windows again of which this share has an angle larger by `angle`."""
+def turned(angle: float, share: float = 1.0) -> Callable[..., PushTable]:
+    """Cuts the faultless windows again, of which this share has an angle larger by `angle`."""
 
-    def cut(data: LoadedData, *_: Any) -> LoadedData:
-        inputs = data.table.inputs.copy()
+    def cut(*_: Any) -> PushTable:
+        table = faultless().table
+        inputs = table.inputs.copy()
         inputs[: round(share * len(inputs)), 2] += angle
-        return replace(data, table=replace(data.table, inputs=inputs))
+        return replace(table, inputs=inputs)
 
     return cut
 

@@ -148,7 +148,7 @@ def held_out_moments(model: PushModel, watch: Watch = no_watch) -> tuple[Array, 
     half the rows are too few to refit them.
     """
     predictor, rows, folds = model.predictor, model.training, push_folds(model.training, FOLDS)
-    push = Push(rows.inputs, rows.duration, rows.covariates)
+    push = Push.of(rows)
     of_base = replace(rows, outcomes=rows.outcomes - predictor.shift(push).mean)
     base = _by_refits(model.base, of_base, folds, watch) if predictor.learnt else None
     moments = model.held_out_moments(folds) if base is None else predictor.with_effects(base, push)
@@ -165,7 +165,7 @@ def _by_refits(base: PushModel, rows: PushTable, folds: IntArray, watch: Watch) 
         except TrainingError:
             return None
         part = rows.take(np.flatnonzero(own))
-        moments = model.predictor.moments(Push(part.inputs, part.duration, part.covariates))
+        moments = model.predictor.moments(Push.of(part))
         for whole, values in zip(found, moments, strict=True):
             whole[own] = values
     return found

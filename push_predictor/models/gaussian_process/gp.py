@@ -30,6 +30,7 @@ _UNIT = 0.1  # of the logarithms: about the length of the first step from the mi
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 _FIRST_STEPS = 3  # from each start
+_MOST_ITERATIONS = 100
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,7 @@ class GaussianProcess:
         return LatentPrediction(mean, variance, log_noise, np.zeros(len(mean)))
 
 
-def fit_gp(
-    inputs: Array, outputs: Array, *, most_iterations: int = 100, shortest: float = SHORTEST, rough: bool = False
-) -> GaussianProcess:
+def fit_gp(inputs: Array, outputs: Array, *, shortest: float = SHORTEST, rough: bool = False) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
     inputs (n, D) and outputs (n,) standardised. shortest: lengthscale. rough: whether the search ends early, with the
@@ -108,7 +107,7 @@ def fit_gp(
     """
     check_rows(inputs, outputs)
     box = np.array([(np.log(shortest), _LONGEST)] * inputs.shape[1] + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
-    rows, whole = some_rows(len(outputs), MOST_SEARCHED), Descent(box, most_iterations, _STOP)
+    rows, whole = some_rows(len(outputs), MOST_SEARCHED), Descent(box, _MOST_ITERATIONS, _STOP)
     few = replace(whole, stop=_ROUGH_STOP) if rough or len(rows) < len(outputs) else whole
     cost = _cost(inputs[rows], outputs[rows])
     found = few.run(cost, _start(cost, inputs[rows].shape, few))

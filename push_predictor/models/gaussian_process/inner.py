@@ -16,11 +16,12 @@ from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpProbl
 
 _SHORTEST_STEP = 1.0 / 64.0
 _PART = 0.02
+_MOST_STEPS = 60
 _USUAL_SHARE, _LARGEST_SHARE = 0.25, 0.8  # gain of a step over that of the step before
 
 
 def maximise_over_noise(
-    problem: VhgpProblem, start: Sites | None, tolerance: float, *, goal: float | None = None, most_steps: int = 60
+    problem: VhgpProblem, start: Sites | None, tolerance: float, *, goal: float | None = None
 ) -> Bound:
     """The bound at its maximum over (mean weights, site precisions), found to `tolerance` nats.
 
@@ -30,7 +31,7 @@ def maximise_over_noise(
     """
     bound = _first(problem, start)
     progress = _Progress()
-    for _ in range(most_steps):
+    for _ in range(_MOST_STEPS):
         value, sites, target = bound.value, bound.sites, bound.optimal_sites
         del bound  # frees its matrices before the next ones are computed
         bound, accepted = _improved(problem, value, sites, target, tolerance)

@@ -24,9 +24,10 @@ _LOG_WEIGHTS = np.log(_NODE_WEIGHTS) - 0.5 * np.log(2.0 * np.pi)
 
 @dataclass(frozen=True)
 class LatentPrediction:
-    """f ~ N(mean, variance) and the log noise variance g ~ N(log_noise_mean, log_noise_variance), each (m,).
+    """f ~ N(mean, variance) and the log noise variance g ~ N(log_noise_mean, log_noise_variance).
 
-    The outcome is y ~ N(f, exp(g)). A homoscedastic process has log_noise_variance 0.
+    Each (m,), or (m, 3) for three outputs together. The outcome is y ~ N(f, exp(g)). A homoscedastic process has a
+    log_noise_variance of 0.
     """
 
     mean: Array
@@ -36,7 +37,7 @@ class LatentPrediction:
 
     @property
     def process_variance(self) -> Array:
-        """E[exp(g)], the variance of the process itself, shape (m,)."""
+        """E[exp(g)], the variance of the process itself."""
         return np.asarray(np.exp(self.log_noise_mean + 0.5 * self.log_noise_variance))
 
     @property

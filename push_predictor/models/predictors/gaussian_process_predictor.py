@@ -165,11 +165,9 @@ class GaussianProcessPredictor(BasePredictor):
         found = np.empty((4, len(latent[0].mean), len(latent)))
         for k, p in enumerate(latent):
             found[:, :, k] = p.mean, p.variance, p.log_noise_mean, p.log_noise_variance
-        mean, variance, log_noise, uncertainty = found
-        of_process = np.exp(log_noise + 0.5 * uncertainty)
-        factor = self.reported_sd**2
-        mean = mean * self.scaling.outcome_sd + self.scaling.outcome_mean
-        return Moments(mean, *covariances(variance * factor, of_process * factor, correlation))
+        joined, factor = LatentPrediction(*found), self.reported_sd**2
+        mean = joined.mean * self.scaling.outcome_sd + self.scaling.outcome_mean
+        return Moments(mean, *covariances(joined.variance * factor, joined.process_variance * factor, correlation))
 
     def _log_density(self, latent: Sequence[LatentPrediction], push: Push, outcomes: Array) -> Array:
         """Log density (n, 3) of outcomes (n, 3) under latent predictions in standardised units, one per output."""

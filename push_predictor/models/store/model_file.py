@@ -187,7 +187,7 @@ def _predictor(
 
 def _outputs(base: GaussianProcessPredictor, training: PushTable) -> Array:
     """What the regressions of a base without effects were trained on (n, 3)."""
-    return base.standardised(Push(training.inputs, training.duration, training.covariates), training.outcomes)
+    return base.standardised(Push.of(training), training.outcomes)
 
 
 def _check_lengthscales(parameters: Mapping[str, Any], inputs: Array, place: str) -> None:

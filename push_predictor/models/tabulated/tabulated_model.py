@@ -204,9 +204,7 @@ def probed(model: PushModel, count: int = CHECKED) -> Probes:
     At most `count` of each.
     """
     rng, known = np.random.default_rng(0), model.training.inputs
-    low, high = known.min(axis=0), known.max(axis=0)
-    low[1], high[1] = 0.0, 1.0
-    spread = rng.uniform(low, high, (20 * count, 3))
+    spread = rng.uniform(*narrow_box(model), (20 * count, 3))
     spread = spread[model.in_domain(spread)][:count]
     inputs = np.concatenate([spread, rng.permutation(known)[:count], outside_pushes(model, count)])
     exact = model.predict_rows(inputs, np.full(len(inputs), model.usual_duration))

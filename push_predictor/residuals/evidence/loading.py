@@ -73,11 +73,6 @@ def cut_again(recordings: Sequence[Recording], rig: Rig, options: WindowOptions 
     return _loaded(recordings, [], rig, options).table
 
 
-def corrected_data(loaded: LoadedData, recordings: Sequence[Recording], options: WindowOptions) -> LoadedData:
-    """The same data after a correction of their recordings' streams, in the same order."""
-    return _loaded(recordings, [], loaded.rig, options)
-
-
 def with_inputs(table: PushTable) -> PushTable:
     """The table with the model's inputs among its covariates: an effect may depend on them too."""
     inputs = dict(zip(INPUTS, table.inputs.T, strict=True))

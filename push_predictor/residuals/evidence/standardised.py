@@ -49,7 +49,7 @@ class Evidence:
     @property
     def push(self) -> Push:
         """The windows as the mechanisms' input."""
-        return Push(self.table.inputs, self.table.duration, self.table.covariates)
+        return Push.of(self.table)
 
     @cached_property
     def block(self) -> IntArray:
@@ -81,7 +81,7 @@ def evidence_of(model: PushModel, table: PushTable) -> Evidence:
     itself.
     """
     predictor = model.predictor.with_independent_outputs()
-    mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
+    mean, covariance, _ = predictor.moments(Push.of(table))
     residual = table.outcomes - mean
     return Evidence(table, residual, whitener_of(covariance), mechanics_under(model), model.predictor.effects)
 

@@ -49,7 +49,7 @@ def extend(
     predictor = replace(_with_effects(base.predictor, effects, cross), session=session)
     table = spread_rows(base, evidence.table)
     if learnt or absorbs:
-        shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
+        shift, _ = predictor.shift(Push.of(table))
         trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift), nearby=True)
         of_trained = predictor.with_base(trained.predictor.base)
         return held_out_windows(with_predictor(trained, table, of_trained)).calibrated()
@@ -92,7 +92,7 @@ def refit_base(model: PushModel, table: PushTable) -> PushModel:
     predictor, table = model.predictor, spread_rows(model, table)
     if not predictor.effects:
         return retrain_model(model, table)
-    shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
+    shift, _ = predictor.shift(Push.of(table))
     base = retrain_model(model.base, replace(table, outcomes=table.outcomes - shift))
     return with_predictor(base, table, predictor.with_base(base.predictor.base))
 

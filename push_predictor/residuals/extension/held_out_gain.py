@@ -9,6 +9,7 @@ Predicted deviations are made to fit pushes that the model did not see: only the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -43,18 +44,18 @@ def held_out_gain(
     An effect of size zero with its uncertainty improves an overconfident model too. So the predicted deviations of both
     references fit pushes that they did not see, with the uncertainty of the effects added and without it.
     """
-    there, mean = uncertainty_of_effects(after, held_out), deployed.training_mean
+    extended, mean = new_windows(after, held_out), deployed.training_mean
     references: dict[Reference, Unseen] = {
         "deployed": new_windows(deployed, analysis),
         "refit": held_out_windows(refit),
     }
-    found, scored = [], new_windows(after, held_out).compared(mean)
+    found, scored = [], extended.compared(mean)
     for name, unseen in references.items():
         seen = new_windows(unseen.model, held_out)
         alone = seen.scaled(unseen.factor()).compared(mean)
         widened = seen.scaled(unseen.factor(uncertainty_of_effects(after, unseen.table))).compared(mean)
         nmse = _difference(alone, scored, total_nmse)
-        for each in (alone, replace(widened, covariance=widened.covariance + there)):
+        for each in (alone, replace(widened, covariance=widened.covariance + extended.of_effects)):
             found.append(HeldOutGain(name, nmse, _difference(each, scored, total_nlpd)))
     return max(found, key=lambda each: each.nlpd.high)
 
@@ -85,16 +86,17 @@ def _difference(first: Comparison, second: Comparison, figure: Figure) -> Estima
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """A model's predictions of n windows that it did not see: mean (n, 3) and covariance (n, 3, 3) in their table.
-
-    of_effects (n, 3, 3): the part of the covariance that comes from the model's effects.
-    """
+    """A model's predictions of n windows that it did not see: mean (n, 3) and covariance (n, 3, 3) in their table."""
 
     model: PushModel
     table: PushTable
     mean: Array
     covariance: Array
-    of_effects: Array
+
+    @cached_property
+    def of_effects(self) -> Array:
+        """The part (n, 3, 3) of the covariance that comes from the model's effects."""
+        return uncertainty_of_effects(self.model, self.table)
 
     def factor(self, extra: Array | float = 0.0) -> Array:
         """Factors (3,) of largest likelihood on the base's deviations; that of the effects stays as it is.
@@ -127,18 +129,18 @@ class Unseen:
 def new_windows(model: PushModel, table: PushTable) -> Unseen:
     """Predictions of a table that the model was not trained on."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
-    return Unseen(model, table, prediction.mean, prediction.covariance, uncertainty_of_effects(model, table))
+    return Unseen(model, table, prediction.mean, prediction.covariance)
 
 
 def held_out_windows(model: PushModel) -> Unseen:
     """Predictions of the model's training windows, each without its push."""
     mean, covariance, _ = model.held_out_moments()
-    return Unseen(model, model.training, mean, covariance, uncertainty_of_effects(model, model.training))
+    return Unseen(model, model.training, mean, covariance)
 
 
 def uncertainty_of_effects(model: PushModel, table: PushTable) -> Array:
     """Covariance (n, 3, 3) of a table's outcomes that comes from the effects of a model."""
-    return model.predictor.shift(Push(table.inputs, table.duration, table.covariates)).covariance
+    return model.predictor.shift(Push.of(table)).covariance
 
 
 def _likeliest(square: Array, own: Array, other: Array) -> float:

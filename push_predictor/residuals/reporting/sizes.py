@@ -32,7 +32,7 @@ def shift_sizes(trace: Trace, effect: Effect, table: PushTable) -> dict[str, Est
 
     The 95 % intervals are of draws of the effect's coefficients.
     """
-    on, push = mechanics_under(trace.model), Push(table.inputs, table.duration, table.covariates)
+    on, push = mechanics_under(trace.model), Push.of(table)
     together = joint(on, [effect], push)
     shift, design = together.shift, together.designs[0]
     rng = np.random.default_rng(0)

@@ -199,7 +199,7 @@ def analysis_rows(trace: Trace) -> Rows:
         evidence = evidence_of(trace.extended, trace.analysis)
         return Rows(trace.analysis, evidence.z, evidence.whitener)
     evidence = evidence_of(trace.model, trace.analysis)
-    shift = joint_shift(mechanics_under(trace.model), trace.terms, _push(trace.analysis))
+    shift = joint_shift(mechanics_under(trace.model), trace.terms, Push.of(trace.analysis))
     unexplained = replace(evidence, residual=evidence.residual - shift)
     return Rows(trace.analysis, unexplained.z, unexplained.whitener)
 
@@ -217,7 +217,7 @@ def strength_of(effect: Effect) -> Strength:
 def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     """Standardised outcome (n, 3, q) per unit of each of the q parameters."""
     effect = strength.effect
-    on, push = mechanics_under(trace.model), _push(rows.table)
+    on, push = mechanics_under(trace.model), Push.of(rows.table)
     if effect.exact:
         bare = JointEffects.of([effect]).shifted(on, push)[1].transpose(0, 2, 1)
     else:
@@ -260,7 +260,3 @@ def _of_bin(target: Array, response: Array, push_id: np.ndarray, place: Array, r
     value, draws = estimate_with_draws(target[rows], response[rows], nothing, nothing, push)
     low, high = np.quantile(draws, [0.025, 0.975], axis=0)
     return np.stack([np.full(len(value), place[rows].mean()), value, low, high])
-
-
-def _push(table: PushTable) -> Push:
-    return Push(table.inputs, table.duration, table.covariates)
