@@ -27,17 +27,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blind.recordings import later_spec, rig_of
+from benchmarks.blind.recordings import later_spec, rig_of, windows_of
 from benchmarks.blind.scores import wilson
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.evaluation.alarm.scores import Calibration, alarm_state, calibrate
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.finder import find_windows
-from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.simulation.changes import Changes, Moment
-from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.types import Array
 
@@ -130,8 +127,8 @@ def rows_without_change(seed: int, count: int) -> Iterator[Row]:
     """The later recordings of one seed, by each kind of model."""
     rng = np.random.default_rng([seed, 7])
     rig = rig_of(rng, f"{seed}", TRAINING)
-    training = _table_of(rig)
-    later = [_table_of(later_spec(rig, rng, LATER)) for _ in range(count)]
+    training = windows_of(rig)
+    later = [windows_of(later_spec(rig, rng, LATER)) for _ in range(count)]
     for kind in KINDS:
         model = _trained(training, rig, kind, seed, ROWS)
         calibration = calibrate(model)
@@ -146,8 +143,8 @@ def row_with_change(seed: int) -> Row:
     _, later = (later_spec(rig, rng, LONG_LATER) for _ in range(2))
     change = int(rng.integers(round(SHARES[0] * LONG_LATER), round(SHARES[1] * LONG_LATER)))
     later = replace(later, changes=Changes(contact_friction=partial(_risen, change)))
-    model = _trained(_table_of(rig), rig, "vhgp", seed, MANY_ROWS)
-    return _row(seed, rig, "vhgp", change, _state_of(model, calibrate(model), _table_of(later)))
+    model = _trained(windows_of(rig), rig, "vhgp", seed, MANY_ROWS)
+    return _row(seed, rig, "vhgp", change, _state_of(model, calibrate(model), windows_of(later)))
 
 
 def _risen(change: int, moment: Moment) -> Array:
@@ -161,11 +158,6 @@ def _row(seed: int, rig: SimulationSpec, kind: str, change: int | None, state: A
 def _trained(table: PushTable, rig: SimulationSpec, kind: str, seed: int, rows: int) -> PushModel:
     options = TrainingOptions(n_train=rows, seed=seed, mean="zero")
     return train_model(table, simulated_rig(rig), kind, name=f"{seed}", options=options)
-
-
-def _table_of(spec: SimulationSpec) -> PushTable:
-    """The windows of a simulated recording."""
-    return windows_to_table(find_windows(simulate(spec), simulated_rig(spec)))
 
 
 def _state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:

@@ -26,7 +26,6 @@ from push_predictor.types import Array
 SIZES = ("small", "medium", "large")
 TEMPERATURE, HUMIDITY = "surface/temperature", "room/humidity"
 LONGEST_WAY = 0.06  # m of a tip
-ANGULAR = 2  # a shift, a pull, an anisotropy has a direction: two numbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from benchmarks.blind.effects import GROUPS, HUMIDITY, SIZES, TEMPERATURE, Drawn
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
+from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
@@ -23,7 +24,7 @@ from push_predictor.simulation.changes import Changes, Conditions, Topic
 from push_predictor.simulation.physics import GRAVITY
 from push_predictor.simulation.pushes import PushPlan, pusher_path
 from push_predictor.simulation.rig_simulator import simulate
-from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, start_poses
+from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, simulated_rig, start_poses
 
 SHAPES = ("rect1", "rect1", "rect1", "ellip2", "hex")
 SURFACES = ("abs", "delrin", "plywood", "pu")
@@ -51,19 +52,22 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     """Simulate recording `number` of a group (none or one of GROUPS) into out/NNN, its truth into truth/NNN.json."""
     plain, later, drawn = drawn_recording(number, group, seed, size)
     folder = out / f"{number:03d}"
-    training = simulate(replace(plain, name="training"))
+    table = windows_of(replace(plain, name="training"))
     folder.mkdir(parents=True, exist_ok=True)
     write_recording(folder / "new", simulate(later))
-    rig = training.rig
-    assert rig is not None  # the simulator knows its rig
-    table = windows_to_table(find_windows(training, rig))
     rows = min(size.rows, len(table))
     options = TrainingOptions(n_train=rows, seed=seed, mean=size.mean)
-    save_model(train_model(table, rig, size.kind, name=f"{number:03d}", options=options), folder / MODEL)
+    model = train_model(table, simulated_rig(plain), size.kind, name=f"{number:03d}", options=options)
+    save_model(model, folder / MODEL)
     known = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
     known |= {"friction": plain.table.friction, "pushes": len(later.pushes)}
     (truth / f"{number:03d}.json").write_text(json.dumps({**known, **drawn.described()}, indent=1))
     return drawn
+
+
+def windows_of(spec: SimulationSpec) -> PushTable:
+    """The windows of a simulated recording."""
+    return windows_to_table(find_windows(simulate(spec), simulated_rig(spec)))
 
 
 def drawn_recording(number: int, group: str, seed: int, size: Size) -> tuple[SimulationSpec, SimulationSpec, Drawn]:

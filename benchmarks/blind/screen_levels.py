@@ -20,15 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blind.recordings import later_spec, rig_of
+from benchmarks.blind.recordings import later_spec, rig_of, windows_of
 from benchmarks.blind.scores import wilson
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MEANS
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.finder import find_windows
-from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.loading import cut_again
@@ -37,7 +34,7 @@ from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.gate import Gate
 from push_predictor.simulation.rig_simulator import simulate
-from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.types import Array
 
 ALPHAS = (0.2, 0.05, 0.01)
@@ -65,7 +62,6 @@ class _TrainedRig:
     """A simulated rig, the model trained on its first recording, and the generator of its later ones."""
 
     plain: SimulationSpec
-    rig: Rig
     model: PushModel
     rng: np.random.Generator
 
@@ -74,19 +70,17 @@ def _trained_rig(options: argparse.Namespace, number: int) -> _TrainedRig:
     """Draw a rig by options.seed and number, and train options.base on options.rows windows of its pushes."""
     rng = np.random.default_rng([options.seed, number])
     plain = rig_of(rng, f"{number:03d}", TRAINING)
-    training = simulate(replace(plain, name="training"))
-    assert training.rig is not None  # the simulator knows its rig
-    table = windows_to_table(find_windows(training, training.rig))
+    table = windows_of(replace(plain, name="training"))
     trained = TrainingOptions(n_train=min(options.rows, len(table)), seed=options.seed, mean=options.mean,
                               fit=options.base == "analytical")  # fmt: skip
-    model = train_model(table, training.rig, options.base, name=plain.name, options=trained)
-    return _TrainedRig(plain, training.rig, model, rng)
+    model = train_model(table, simulated_rig(plain), options.base, name=plain.name, options=trained)
+    return _TrainedRig(plain, model, rng)
 
 
 def _later_windows(rig: _TrainedRig, pushes: int) -> PushTable:
     """The windows of a later recording, in which nothing has changed."""
     later = simulate(replace(later_spec(rig.plain, rig.rng, pushes), name="new"))
-    return cut_again([later], rig.rig)
+    return cut_again([later], rig.model.rig)
 
 
 @dataclass(frozen=True, eq=False)

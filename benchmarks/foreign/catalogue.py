@@ -30,7 +30,6 @@ TWO_EFFECTS = 0.2  # share of the recordings with an effect on motion that have 
 SESSION = ("session", "model_inputs")
 WORLD = ("session", "push_heading", "slider_heading")
 BODY = ("session", "edge", "model_inputs")
-PROGRESS = ("push_index", "elapsed_time", "slid_distance")
 TEMPERATURE = "topic:/surface/temperature"
 
 

@@ -143,11 +143,6 @@ def cpu_seconds(work: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - start, result
 
 
-def least_cpu_seconds(work: Callable[[], Any], repeats: int = 5) -> float:
-    """The least CPU time of some repeats, s."""
-    return min(cpu_seconds(work)[0] for _ in range(repeats))
-
-
 def peak_bytes(work: Callable[[], Any]) -> int:
     """Peak memory of `work` beyond the memory in use before, bytes; includes numpy's arrays."""
     tracemalloc.start()

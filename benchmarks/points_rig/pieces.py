@@ -26,14 +26,6 @@ def displacements(session: Session, tracks: Tracks) -> Array:
     return np.column_stack([rotate(moved[:, :2], -tracks.heading[pushes]), moved[:, 2]])
 
 
-def noise_share(rig: Rig, session: Session, seed: int) -> float:
-    """Noise of the pieces as a share of their displacement, turning counted at the load's mean radius."""
-    first, second = (_pieces(rig, session, seed + draw) for draw in range(2))
-    scale = np.array([1.0, 1.0, rig.load_radius])
-    noise = np.sum(((first - second) * scale) ** 2) / 2
-    return float(np.sqrt(noise / np.sum((first * scale) ** 2)))
-
-
 def clean_ratio(rig: Rig, session: Session, seed: int, effects: tuple[Effect, ...], ratio: float) -> float:
     """Size of the change in displacement over the difference between two noise draws without the change.
 

@@ -57,7 +57,7 @@ def test_the_splits_have_the_rows_that_the_tables_of_the_docs_state(found: tuple
         assert not set(push[whole.training].tolist()) & set(push[whole.test].tolist())
 
 
-# NMSE and NLPD at n = 100, all tested rows together: docs/results/accuracy.md
+# NMSE and NLPD at n = 100, all tested rows together: benchmarks/measured/RESULTS.md
 ScoresOf = Callable[[SplitName, str], PushScores]
 
 

@@ -265,6 +265,3 @@ def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
 
 def test_sums_of_no_rows_give_independence() -> None:
     assert np.array_equal(correlations(np.zeros((2, 6)), 3.0), np.broadcast_to(np.eye(3), (2, 3, 3)))
-
-
-# --- files ----------------------------------------------------------------------------------------------------------

@@ -305,9 +305,6 @@ def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushMod
         check_pushes(extended(bases["gp"], slippery(0.1)), replace(pushes(5, 1), covariates={}))
 
 
-# --- files ---------------------------------------------------------------------------------------------------
-
-
 # --- estimation -------------------------------------------------------------------------------------------------
 
 

@@ -342,6 +342,3 @@ def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
         assert found.covariance == pytest.approx(answer.covariance[rows], rel=0.02, abs=1e-12)
         assert found.process_covariance == pytest.approx(answer.process_covariance[rows], rel=0.02, abs=1e-12)
         assert found.tails is tails_of(model)
-
-
-# On disk

@@ -50,7 +50,6 @@ pytestmark = pytest.mark.slow
 WARMTH, ROD, HUMIDITY, NAME = "/surface/warmth", "/rod/temperature", "/room/humidity", "/rod/name"
 OURS = (WARMTH, ROD, HUMIDITY)
 FIELD = "/fan/load.wrench.torque.y"  # of a type that is no scalar's
-PLAYED = "/fan/load/wrench/torque/y"  # what a player can publish
 ASKED = ["surface/warmth", "/rod/temperature", "room/humidity", "rod/name", "nowhere", "fan/load.wrench.torque.y"]
 SECOND = 10**9
 

@@ -38,7 +38,7 @@ class Bench:
         self._streams = PushReplay._stream_topics(self)  # type: ignore[arg-type]  # a stand-in for the node
         self._rig_warning = rig_warning
         bag = SimpleNamespace(path=self._options.recording, topics=LAB)
-        PushReplay._check(self, bag)  # type: ignore[arg-type]
+        PushReplay._check(self, bag)  # type: ignore[arg-type]  # stand-ins for the node and the bag
         return self._checks.result
 
 

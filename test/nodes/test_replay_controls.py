@@ -170,10 +170,11 @@ def test_a_response_that_refuses_nothing_has_the_code_of_no_error(name: str) -> 
 def of_rosbag2(kind: type) -> Any:
     """A stand-in for rosbag2's type: the fields of this project's type without message and error_code."""
 
-    class Request(kind.Request):  # type: ignore[name-defined]
+    class Request(kind.Request):  # type: ignore[name-defined]  # a class that is an argument
         """The fields are the same."""
 
-    names = [n for n in kind.Response.get_fields_and_field_types() if n not in ("message", "error_code")]  # type: ignore[attr-defined]
+    declared = kind.Response.get_fields_and_field_types()  # type: ignore[attr-defined]  # of a service's type
+    names = [n for n in declared if n not in ("message", "error_code")]
 
     class Response:
         """Only the fields that rosbag2 has."""

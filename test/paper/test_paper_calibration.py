@@ -43,7 +43,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
 PAIR = ("rect1", "plywood")
-SURE, OPEN = Estimate(0.95, 0.93, 0.97), Estimate(0.9, 0.7, 1.0)
+SURE = Estimate(0.95, 0.93, 0.97)
 NOTHING = Corpus("simulated", "made up", {}, PAIR)
 
 

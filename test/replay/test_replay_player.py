@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from functools import partial
-from threading import Event, Thread
+from threading import Condition, Event, Thread
 from time import sleep
 
 import pytest
@@ -62,7 +61,7 @@ class Stage:
     def sleep(self, duration: int) -> None:
         self.time += duration
 
-    def wait(self, condition: threading.Condition, duration: int | None) -> None:
+    def wait(self, condition: Condition, duration: int | None) -> None:
         if duration is not None:
             self.time += duration
             return
@@ -88,7 +87,7 @@ class Stage:
     def run(self, what: PlayRange | None = None) -> list[float]:
         """Play, and return the recorded seconds of the published messages."""
         assert self.player.play(what or PlayRange())
-        thread = threading.Thread(target=self.player.run)
+        thread = Thread(target=self.player.run)
         thread.start()
         thread.join(10.0)
         assert not thread.is_alive(), "the player hangs"
