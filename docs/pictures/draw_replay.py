@@ -109,9 +109,9 @@ def paint_table(ax: Axes, replay: Replay, k: int) -> None:
     contact = np.array([window.contact])
     normal = rig.outline.inward_normal(contact)
     tip = to_world(rig.outline.point(contact) - rig.pusher_radius * normal, window.slider_start)[0]
-    way = rotate(np.array([[0.03, 0.0]]), np.array([window.push_heading]))[0]
+    along = rotate(np.array([[0.03, 0.0]]), np.array([window.push_heading]))[0]
     ax.add_patch(Circle(tip, rig.pusher_radius, fc=BLUE, ec="none"))
-    ax.annotate("", tip, tip - way, arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 1.4})
+    ax.annotate("", tip, tip - along, arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 1.4})
     centre = window.slider_start
     ax.set(xlim=(centre[0] - REACH, centre[0] + REACH), ylim=(centre[1] - REACH, centre[1] + REACH), aspect="equal")
     ax.set_axis_off()
@@ -147,7 +147,7 @@ def paint_evidence(ax: Axes, replay: Replay, push: int, first: int) -> None:
     ax.semilogy(np.arange(len(shown)), 10.0**shown, color=RED if push >= replay.fired else GREY, lw=1.8)
     if push >= PLAIN:
         ax.axvline(PLAIN, color=GREY, lw=0.9, ls=":")
-        note = "the rig changes\n(nobody says so)"
+        note = "the rig changes\n(unannounced)"
         ax.text(PLAIN + 0.2, 0.97, note, color=GREY, fontsize=8, va="top", transform=ax.get_xaxis_transform())
     top = 10.0 ** (replay.evidence[: replay.fired + AFTER + 1].max() + 0.5)
     ax.set(xlim=(first, replay.fired + AFTER), ylim=(0.05, top), xlabel="push", ylabel="evidence of a change")

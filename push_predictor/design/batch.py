@@ -35,8 +35,8 @@ from push_predictor.watch import Watch, no_watch, part_of
 CANDIDATES, MATTER = 256, 128  # pushes
 BEFORE_CHOICE = 0.6  # share of the time, for 20 pushes
 MOST_PUSHES = 200  # half a minute; later pushes should wait for the outcomes of the first
-FIRST = 10  # pushes of a learnt model that are spread evenly; docs/results/prior.md compares this start with others
-CHOSEN_OF_PRIOR = 5  # pushes; the same page has those of a prior model
+FIRST = 10  # pushes of a learnt model that are spread evenly; benchmarks/models/RESULTS.md compares this start
+CHOSEN_OF_PRIOR = 5  # pushes; docs/results/prior.md has those of a prior model
 
 
 @dataclass(frozen=True, eq=False)
