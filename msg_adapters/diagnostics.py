@@ -10,7 +10,7 @@ from enum import Enum
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 
 
 class Level(Enum):

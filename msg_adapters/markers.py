@@ -16,7 +16,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 from push_predictor.geometry.frames import to_world, wrap_angle
 from push_predictor.types import Array
 

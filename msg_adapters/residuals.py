@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from msg_adapters import MessageError
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import MessageError, ns_to_stamp
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array

@@ -6,38 +6,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from msg_adapters.predictions import covariates_of_push, doubles
+from msg_adapters.predictions import doubles
 from push_predictor.design.batch import Suggested
 from push_predictor.design.limits import Interval, Limits
 from push_predictor.errors import RequestError
 
 
-@dataclass(frozen=True)
-class SuggestQuery:
-    """A request. model: a name, empty for the default one. covariates: by name, of all pushes. seed: of candidates."""
-
-    model: str
-    count: int
-    limits: Limits
-    covariates: dict[str, float]
-    seed: int
-
-
-def query_from_suggest_request(request: Any) -> SuggestQuery:
-    """The query of a SuggestPushes request. Raises RequestError for a limit or covariates that are not accepted."""
-    speed, angle = (_intervals(name, getattr(request, name), 2) for name in ("speed", "angle"))
+def limits_from_request(request: Any) -> Limits:
+    """The robot's limits in a SuggestPushes request. Raises RequestError for one that is not accepted."""
+    speed, angle = (next(iter(_intervals(name, getattr(request, name), 2)), None) for name in ("speed", "angle"))
     excluded = _intervals("excluded", request.excluded, None)
-    limits = Limits(
-        speed[0] if speed else None,
-        angle[0] if angle else None,
-        request.travel,
-        excluded,
-        request.transfer_speed if request.transfer_speed != 0.0 else None,
-    )
-    return SuggestQuery(request.model, request.count, limits, covariates_of_push(request), request.seed)
+    return Limits(speed, angle, request.travel, excluded, request.transfer_speed or None)
 
 
 def fill_suggest_response(response: Any, suggested: Suggested) -> None:

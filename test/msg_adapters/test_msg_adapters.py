@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from made_up_windows import made_up_windows
 from rclpy.serialization import deserialize_message, serialize_message
 
-from msg_adapters import MessageError
+from msg_adapters import MessageError, ns_to_stamp, stamp_to_ns
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
 from msg_adapters.markers import confidence_ellipse, prediction_markers
 from msg_adapters.predictions import (
@@ -31,7 +31,6 @@ from msg_adapters.predictions import (
 )
 from msg_adapters.residuals import residual_to_message
 from msg_adapters.rigs import rig_from_message, rig_to_message
-from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import PushPredictorError, RequestError, RigError
 from push_predictor.geometry.frames import to_world

@@ -57,8 +57,8 @@ from validator_bench import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
+from msg_adapters import ns_to_stamp
 from msg_adapters.rigs import rig_to_message
-from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
