@@ -55,7 +55,7 @@ class LiveRecording:
             self._rig = rig
             self._bag.set_rig(rig)
             self._findings.set_rig(rig)
-        elif rig is not self._rig and rig.to_record() != self._rig.to_record():
+        elif rig is not self._rig:
             self.note("rig", OTHER_RIG)
 
     def note(self, subject: str, problem: str) -> None:

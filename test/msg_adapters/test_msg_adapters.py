@@ -169,7 +169,7 @@ def residual_of(covariance: np.ndarray, difference: np.ndarray, in_domain: bool 
     window = replace(
         made_up_windows(1)[0], push_id="run1/3", index=4, end=10**18 + 7, displacement=PREDICTED + difference
     )
-    return over_the_wire(residual_to_message("vhgp", window, PREDICTED, covariance, in_domain))
+    return over_the_wire(residual_to_message("vhgp", window, PREDICTED, covariance, in_domain, "lab"))
 
 
 @given(st.lists(SPREADS, min_size=3, max_size=3), CORRELATIONS, st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
@@ -186,7 +186,7 @@ def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlati
 def test_a_residual_survives():
     covariance, window = np.diag([1e-6, 4e-6, 1e-2]), made_up_windows(1)[0]
     message = residual_of(covariance, np.array([1e-3, -4e-3, 0.2]))
-    assert message.header.frame_id == "world"
+    assert message.header.frame_id == "lab"
     np.testing.assert_allclose(message.standardised, [1.0, -2.0, 2.0])
     assert stamp_to_ns(message.header.stamp) == 10**18 + 7
     assert message.in_domain is False and residual_of(covariance, np.zeros(3), in_domain=True).in_domain

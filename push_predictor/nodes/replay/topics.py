@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, ReliabilityPolicy
@@ -118,7 +119,7 @@ class ReplayTopics:
         try:
             options = QoSOverridingOptions.with_default_policies()
             return self._node.create_publisher(found, name, profile, qos_overriding_options=options)
-        except (InvalidQosOverridesError, ParameterException, RuntimeError, TypeError) as error:
+        except (InvalidQosOverridesError, ParameterException, rclpy_implementation.RCLError, TypeError) as error:
             raise PushPredictorError(f"qos_overrides.{topic}.publisher: {error}, give a QoS policy") from None
 
 
