@@ -119,7 +119,9 @@ class ReplayTopics:
         try:
             options = QoSOverridingOptions.with_default_policies()
             return self._node.create_publisher(found, name, profile, qos_overriding_options=options)
-        except (InvalidQosOverridesError, ParameterException, rclpy_implementation.RCLError, TypeError) as error:
+        except rclpy_implementation.RCLError:  # a RuntimeError too, but not about an override
+            raise
+        except (InvalidQosOverridesError, ParameterException, RuntimeError, TypeError) as error:
             raise PushPredictorError(f"qos_overrides.{topic}.publisher: {error}, give a QoS policy") from None
 
 
