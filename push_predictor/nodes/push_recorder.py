@@ -12,21 +12,29 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
     sys.exit(entry.push_recorder())
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from time import monotonic
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.validate_topic_name import validate_topic_name
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.nodes.recorder_parameters import read_options
+from push_predictor.errors import RequestError
+from push_predictor.nodes.parameter_tables import PUSH_RECORDER
+from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.live_recording import LiveRecording
 from push_predictor.online.recorder_progress import LiveLine, Progress
+from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.topics import load_topics, topics_of
 
 PERIOD = 0.02  # s between two looks at what has arrived
 SHOWN = 1.0  # s between two updates of the line
@@ -41,17 +49,18 @@ class PushRecorder(Node):
     def __init__(self, stop: Stop) -> None:
         super().__init__("push_recorder")
         self.summary: Progress | None = None
-        self._stop, self._options = stop, read_options(self)
-        self._rigs = RigSource(self, self._options.rig)
-        options = self._options
-        self._recording = LiveRecording(options.bag, options.topics, monotonic(), options.with_wrench)
+        declare(self, PUSH_RECORDER)
+        values = values_of(self, PUSH_RECORDER)
+        self._stop, self._duration = stop, values["duration"]
+        self._recording = new_recording(self, values)
+        self._rigs = RigSource(self, values["rig"])
         self._topics = RecorderSubscriptions(self, self._recording)
         self._line = LiveLine(self.get_logger().info, self.get_logger().warning)
         self._publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(PERIOD, self._work, clock=steady)
         self.create_timer(SHOWN, self._show, clock=steady)
-        self.create_timer(self._options.diagnostics_period, self._publish, clock=steady)
+        self.create_timer(values["diagnostics_period"], self._publish, clock=steady)
 
     def close(self) -> None:
         """Write what has arrived, and complete the bag. Raises RecordingError if it cannot be written."""
@@ -65,7 +74,7 @@ class PushRecorder(Node):
     def _work(self) -> None:
         self._move()
         self._topics.look()
-        if 0.0 < self._options.duration <= self._recording.seconds:
+        if 0.0 < self._duration <= self._recording.seconds:
             self._stop.request()
 
     def _move(self) -> None:
@@ -82,6 +91,30 @@ class PushRecorder(Node):
         name, progress = self.get_fully_qualified_name(), self._recording.progress(monotonic())
         status = recorder_status(name, progress, self._rigs.rig)
         self._publisher.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
+
+
+def new_recording(node: Node, values: Mapping[str, Any]) -> LiveRecording:
+    """The recording that the parameters describe, with topics as they are named in the node's namespace.
+
+    Raises RequestError that names the parameter, its value and what is accepted; RecordingError for an unreadable
+    NAME.recording.yaml.
+    """
+    if not values["bag"]:
+        raise RequestError("bag", "", "the path of a bag: a folder, or FILE.mcap")
+    path = Path(values["bag"]).expanduser()
+    if path.exists() and not values["force"]:
+        raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
+    given = topics_of(values).over(load_topics(path))
+    topics = resolved(given, lambda topic: _full_name(node, topic))
+    return LiveRecording(path, topics, monotonic(), with_wrench=bool(given.wrench))
+
+
+def _full_name(node: Node, topic: str) -> str:
+    try:
+        validate_topic_name(topic)
+        return str(node.resolve_topic_name(topic))
+    except InvalidTopicNameException as error:
+        raise RequestError("topic", topic, f"a topic's name ({' '.join(str(error).split())})") from None
 
 
 def record(args: Sequence[str] | None = None) -> tuple[int, Progress | None]:

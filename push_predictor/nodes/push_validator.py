@@ -20,13 +20,13 @@ from rclpy.node import Node
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
+from push_predictor.nodes.parameter_tables import PUSH_VALIDATOR
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.parameters import PARAMETERS
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.publishers import ResultPublishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
@@ -50,8 +50,8 @@ class PushValidator(Node):
 
     def __init__(self) -> None:
         super().__init__("push_validator")
-        declare(self, PARAMETERS)
-        values = values_of(self, PARAMETERS)
+        declare(self, PUSH_VALIDATOR)
+        values = values_of(self, PUSH_VALIDATOR)
         self._closing = self._closed = False
         self._results = ResultPublishers(self, self._world)
         self._alarm = AlarmProcess(checked_rate(values["false_alarm_rate"]), self._on_alarm)
