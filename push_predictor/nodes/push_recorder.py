@@ -14,28 +14,34 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from time import monotonic
+from time import monotonic, time_ns
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_topic_name import validate_topic_name
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.errors import RequestError
+from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
+from push_predictor.nodes.polling import FollowingSubscription
+from push_predictor.nodes.qos import common_profile
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.live_recording import LiveRecording
 from push_predictor.online.recorder_progress import LiveLine, Progress
+from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import load_topics, topics_of
 
+DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones
+LOOK = 0.1  # s between two looks at the publishers
 PERIOD = 0.02  # s between two looks at what has arrived
 SHOWN = 1.0  # s between two updates of the line
 
@@ -91,6 +97,78 @@ class PushRecorder(Node):
         name, progress = self.get_fully_qualified_name(), self._recording.progress(monotonic())
         status = recorder_status(name, progress, self._rigs.rig)
         self._publisher.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
+
+
+class RecorderSubscriptions:
+    """Moves messages into a recording, with the time at which they arrived, or that of /clock with use_sim_time."""
+
+    def __init__(self, node: Node, recording: LiveRecording) -> None:
+        self._node, self._recording = node, recording
+        self._topics = {topic.name: FollowingSubscription(node, topic.name, DEPTH) for topic in recording.wanted}
+        self._looked = 0.0
+
+    def look(self) -> None:
+        """Subscribe to topics that have appeared. Call it often."""
+        if monotonic() - self._looked < LOOK:
+            return
+        self._looked = monotonic()
+        for name, reader in self._topics.items():
+            self._recording.note(name, self._follow(name, reader))
+
+    def drain(self) -> None:
+        """Write the messages that have arrived since the last call, in order of arrival.
+
+        Raises RecordingError if that fails.
+        """
+        if (now := self._simulated_time()) == 0:
+            return  # the messages wait for the first time on /clock
+        arrived: list[tuple[int, str, bytes, int]] = []
+        for name, reader in self._topics.items():
+            lost = reader.lost
+            for message in reader.taken():
+                arrived.append((now or message.received or time_ns(), name, message.message, reader.lost - lost))
+                lost = reader.lost
+        for at, topic, data, missing in sorted(arrived, key=lambda message: message[0]):
+            self._recording.write(topic, at, data, missing)
+
+    def _follow(self, name: str, reader: FollowingSubscription) -> str:
+        """Subscribe to a topic as it is published now; returns why that is not possible, '' if it is."""
+        publishers = reader.publishers()
+        kinds = sorted({publisher.topic_type for publisher in publishers})
+        known = self._recording.type_of(name)
+        self._recording.set_published(name, bool(kinds))
+        if not kinds:
+            return ""
+        if known and known not in kinds:
+            return f"{name} is now of type {kinds[0]}. Only its first type, {known}, is recorded."
+        if not known and len(kinds) > 1:
+            return f"{name} has publishers of the types {' and '.join(kinds)}. One type is accepted."
+        chosen = [publisher for publisher in publishers if publisher.topic_type == (known or kinds[0])]
+        try:
+            reader.follow(known or kinds[0], chosen)
+        except PushPredictorError as error:
+            return f"{name} is not recorded: {error}."
+        if not known:
+            self._recording.add_topic(_description(name, chosen))
+        return ""
+
+    def _simulated_time(self) -> int | None:
+        """The time on /clock in ns, 0 before the first, None without use_sim_time."""
+        clock = self._node.get_clock()
+        simulated = clock.clock_type == ClockType.ROS_TIME and clock.ros_time_is_active
+        return int(clock.now().nanoseconds) if simulated else None
+
+
+def _description(name: str, publishers: list[TopicEndpointInfo]) -> TopicInfo:
+    profile = common_profile([publisher.qos_profile for publisher in publishers])
+    return TopicInfo(
+        name,
+        publishers[0].topic_type,
+        0,
+        str(publishers[0].topic_type_hash),
+        durability="transient_local" if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL else "volatile",
+        reliability="reliable" if profile.reliability == ReliabilityPolicy.RELIABLE else "best_effort",
+    )
 
 
 def new_recording(node: Node, values: Mapping[str, Any]) -> LiveRecording:

@@ -8,13 +8,10 @@ Scoring a push takes tenths of a second, calibrating on the training pushes seco
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +20,10 @@ from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.child_process import start_child
+from push_predictor.online.child_process import Child
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array
-
-NICENESS = 5  # a sensor's queue must not wait for the alarm
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +47,7 @@ class AlarmProcess:
     def __init__(self, rate: float, fire: Callable[[AlarmState, int], None]) -> None:
         self._rate, self._fire = rate, fire
         self._model: PushModel | None = None
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
+        self._child: Child | None = None
         self._waiting: list[CompletedPush] = []
         self._asked = False
         self._run = 0
@@ -64,7 +58,7 @@ class AlarmProcess:
     @property
     def busy(self) -> bool:
         """Whether pushes are waiting to be scored."""
-        return bool(self._waiting or self._asked) and self._process is not None
+        return bool(self._waiting or self._asked) and self._child is not None
 
     @property
     def json(self) -> dict[str, object]:
@@ -77,9 +71,7 @@ class AlarmProcess:
             return
         self.stop()
         self._model = model
-        self._connection, theirs = multiprocessing.Pipe()
-        self._process = start_child(_work, (theirs, model, self._rate), "alarm")
-        theirs.close()
+        self._child = Child("alarm", _work, model, self._rate)
         self._asked = True  # the process speaks first
 
     def begin(self) -> None:
@@ -89,17 +81,17 @@ class AlarmProcess:
 
     def add(self, push: CompletedPush) -> None:
         """Take a push of which every window was predicted or refused."""
-        if self._process is not None:
+        if self._child is not None:
             self._waiting.append(push)
 
     def work(self) -> None:
         """Send the pushes that wait, take the replies."""
         try:
-            while self._connection is not None and self._connection.poll():
+            while self._child is not None and (reply := self._child.received()) is not None:
                 self._asked = False
-                self._take(self._connection.recv())
-            if self._connection is not None and self._waiting and not self._asked:
-                self._connection.send((self._run, self._waiting))
+                self._take(reply)
+            if self._child is not None and self._waiting and not self._asked:
+                self._child.send((self._run, self._waiting))
                 self._waiting, self._asked = [], True
         except (EOFError, OSError):
             self.stop()
@@ -107,10 +99,9 @@ class AlarmProcess:
 
     def stop(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.terminate()
-            self._process.join()
-        self._process, self._connection, self._asked, self._waiting = None, None, False, []
+        if self._child is not None:
+            self._child.stop()
+        self._child, self._asked, self._waiting = None, False, []
 
     def _take(self, reply: _Reply) -> None:
         self.off = reply.off
@@ -124,9 +115,8 @@ class AlarmProcess:
             self._fire(self.state, reply.fired)
 
 
-def _work(connection: Connection, model: PushModel, rate: float) -> None:
+def _work(connection: Any, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
-    os.nice(NICENESS)
     try:
         calibration = calibrate(model)
     except RequestError as error:

@@ -29,9 +29,8 @@ from validator_bench import HEXAGON, Status, beginning, hosting_replay
 from push_predictor.errors import RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.push_recorder import new_recording
+from push_predictor.nodes.push_recorder import RecorderSubscriptions, new_recording
 from push_predictor.nodes.qos import DEPTH
-from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
 from push_predictor.online.live_recording import LiveRecording
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_rig_for
