@@ -385,4 +385,4 @@ class PredictServer(LifecycleNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit status."""
-    return run("predict_server", lambda stop: PredictServer(), args, start=PredictServer.start)
+    return run("predict_server", lambda stop: PredictServer(), args)

@@ -16,7 +16,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from msg_adapters import MessageError, ns_to_stamp, stamp_to_ns
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from msg_adapters.markers import confidence_ellipse, prediction_markers
+from msg_adapters.markers import Sheet, confidence_ellipse, prediction_markers
 from msg_adapters.predictions import (
     PushQuery,
     RefusedError,
@@ -282,8 +282,8 @@ def points_of(marker) -> np.ndarray:
     return np.array([[point.x, point.y] for point in marker.points])
 
 
-def by_name(array) -> dict:
-    return {marker.ns: marker for marker in array.markers}
+def by_name(markers) -> dict:
+    return {marker.ns: marker for marker in markers}
 
 
 def some_markers(mirror: float = 1.0) -> dict:
@@ -291,7 +291,7 @@ def some_markers(mirror: float = 1.0) -> dict:
     covariance = np.array([[4e-6, mirror * 1e-6], [mirror * 1e-6, 1e-6]])
     vertices = shape_outline("rect1").vertices
     poses = [flip * pose for pose in ([0.1, 0.2, 0.3], [0.11, 0.22, 0.4], [0.112, 0.219, 0.45])]
-    return by_name(prediction_markers(vertices, *poses[:2], covariance, poses[2], "world", 5))
+    return by_name(prediction_markers(Sheet("world", 5), vertices, *poses[:2], covariance, poses[2]))
 
 
 def test_markers_have_the_slider_poses():
