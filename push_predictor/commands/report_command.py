@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading, add_recording
 from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
-from push_predictor.commands.common.progress import JobProgress, progress
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.watch import Watch, part_of, watched
 
@@ -109,10 +109,9 @@ def _paper(options: argparse.Namespace) -> None:
         raise RequestError("--data", str(options.data), "a folder that exists")
     plan = QUICK if options.quick else FULL
     with _parallel(options.cluster), progress("report paper") as watch:
-        bar = JobProgress(watch)
-        work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
+        work = Work(options.out.resolve() / "work", options.jobs or -1)
         keep = None if options.recordings is None else options.recordings.resolve()
-        page, content = report_paper(plan, work, options.out, options.data, keep, bar)
+        page, content = report_paper(plan, work, options.out, options.data, keep, watch)
     if not write_json(options, {"report": str(page), **content}):
         print(page)
 

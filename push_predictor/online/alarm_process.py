@@ -8,7 +8,6 @@ Scoring a push takes tenths of a second, calibrating on the training pushes seco
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -156,7 +155,6 @@ class CompletedPush:
 class _OpenPush:
     """A push: its predicted windows by number, and the numbers that are neither predicted nor refused yet."""
 
-    push_id: str
     predicted: dict[int, tuple[PushWindow, Prediction]] = field(default_factory=dict)
     missing: set[int] = field(default_factory=set)
 
@@ -165,21 +163,15 @@ class CompletedPushes:
     """Collects the windows of the main model until their push is complete."""
 
     def __init__(self) -> None:
-        self._open: deque[_OpenPush] = deque()
-        self._push_of: dict[int, _OpenPush] = {}
+        self._open: dict[str, _OpenPush] = {}  # by name, in order
 
     def found(self, number: int, window: PushWindow) -> None:
         """Note that a window was found."""
-        if not self._open or self._open[-1].push_id != window.push_id:
-            self._open.append(_OpenPush(window.push_id))
-        self._open[-1].missing.add(number)
-        self._push_of[number] = self._open[-1]
+        self._open.setdefault(window.push_id, _OpenPush()).missing.add(number)
 
     def answered(self, number: int, window: PushWindow, prediction: Prediction | None) -> None:
-        """Note that a window was predicted, or (None) refused."""
-        push = self._push_of.pop(number, None)
-        if push is None:
-            return  # too late: the push has left without it
+        """Note that a window was predicted, or (None) refused; without effect if its push was taken without it."""
+        push = self._open.get(window.push_id, _OpenPush())
         push.missing.discard(number)
         if prediction is not None:
             push.predicted[number] = (window, prediction)
@@ -187,10 +179,8 @@ class CompletedPushes:
     def take(self, last: bool = False) -> list[CompletedPush]:
         """Remove and return the complete pushes: another was found since. last: neither windows nor answers follow."""
         done = []
-        while self._open and (last or (len(self._open) > 1 and not self._open[0].missing)):
-            push = self._open.popleft()
-            for number in push.missing:
-                self._push_of.pop(number, None)
+        while self._open and (last or (len(self._open) > 1 and not next(iter(self._open.values())).missing)):
+            push = self._open.pop(next(iter(self._open)))
             if push.predicted:
                 done.append(_completed(push))
         return done
