@@ -113,8 +113,12 @@ def extend_batch_response(response: PredictPushBatch.Response, prediction: Predi
 
 
 def refuse(response: Any, reason: str, code: ErrorCode) -> Any:
-    """A new response of the same kind without numbers: success false, the reason and its code."""
-    return type(response)(success=False, message=reason, error_code=int(code))
+    """A new response of the same kind without numbers: success false, the reason and its code, as far as it has them.
+
+    Types of rosbag2 have no message, and some no `success`.
+    """
+    fields = {"success": False, "message": reason, "error_code": int(code)}
+    return type(response)(**{name: value for name, value in fields.items() if hasattr(response, name)})
 
 
 def prediction_from_response(response: Any) -> Prediction:
