@@ -24,6 +24,8 @@ from msg_adapters.predictions import (
     covariates_of_push,
     extend_batch_response,
     fill_response,
+    fill_suggest_response,
+    limits_from_request,
     push_from_request,
     query_from_batch_request,
     residual_from_request,
@@ -38,7 +40,6 @@ from msg_adapters.slider_poses import (
     world_slider,
     world_start,
 )
-from msg_adapters.suggestions import fill_suggest_response, limits_from_request
 from push_predictor.design.batch import suggest_pushes
 from push_predictor.errors import FrameError, PredictionError, RequestError, TooLargeError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
