@@ -24,7 +24,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
-from push_predictor.planning.rollout import PARTICLES, rollout
+from push_predictor.planning.rollout import FARTHEST, PARTICLES, rollout
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import RolloutPushes
@@ -154,6 +154,13 @@ def test_rejects_slider_that_does_not_lie_flat() -> None:
     tilted = SpatialPose(np.zeros(3), np.array([np.sin(0.1), 0.0, 0.0, np.cos(0.1)]))
     with pytest.raises(RequestError, match=r"orientation tilt: 0\.2 .*flat within 0\.1 rad"):
         world_start(request(), tilted)
+
+
+def test_rejects_slider_too_far_away() -> None:
+    message = request()
+    message.slider.pose.position.x = -2.0 * FARTHEST
+    with pytest.raises(RequestError, match=r"slider\.pose\.position: .* give a place within"):
+        world_start(message, SAME_FRAME)
 
 
 def answered(model: PushModel, message: RolloutPushes.Request, frame: SpatialPose) -> RolloutPushes.Response:
