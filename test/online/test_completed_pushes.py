@@ -23,19 +23,21 @@ def ends(pushes: list[CompletedPush]) -> list[tuple[str, int]]:
 
 
 def test_a_push_is_complete_when_all_its_windows_are_answered_and_another_has_begun() -> None:
-    windows = [replace(w, push_id=name) for w, name in zip(made_up_windows(4), "aabc", strict=True)]
+    windows = [replace(w, push_id=name) for w, name in zip(made_up_windows(5), "aabbc", strict=True)]
     pushes = CompletedPushes()
     for number in (0, 1):
         pushes.found(number, windows[number])
         pushes.answered(number, windows[number], NOWHERE)
     assert ends(pushes.take()) == [], "it may go on"
-    pushes.found(2, windows[2])
+    for number in (2, 3):
+        pushes.found(number, windows[number])
+    pushes.answered(2, windows[2], NOWHERE)
     assert ends(pushes.take()) == [("a", 2)]
-    pushes.found(3, windows[3])
-    assert ends(pushes.take()) == [], "b has no answer yet"
-    pushes.answered(2, windows[2], None)
-    assert ends(pushes.take()) == [], "b was refused, c may go on"
-    pushes.answered(3, windows[3], NOWHERE)
+    pushes.found(4, windows[4])
+    assert ends(pushes.take()) == [], "a window of b has no answer yet"
+    pushes.answered(3, windows[3], None)
+    assert ends(pushes.take()) == [("b", 1)], "it was refused"
+    pushes.answered(4, windows[4], NOWHERE)
     assert ends(pushes.take(last=True)) == [("c", 1)]
-    pushes.answered(3, windows[3], NOWHERE)
+    pushes.answered(4, windows[4], NOWHERE)
     assert ends(pushes.take(last=True)) == [], "too late"
