@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
-from push_predictor.online.recorder_findings import NANOSECOND, Findings
-from push_predictor.online.recorder_progress import Progress
+from push_predictor.online.recorder_findings import Findings
+from push_predictor.online.recorder_progress import NANOSECOND, Progress
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.metadata import TopicInfo
 from push_predictor.recordings.bag.writer import BagWriter
@@ -123,7 +123,7 @@ class LiveRecording:
             path=str(self.path),
             seconds=self.seconds,
             messages={topic.name: self._messages[topic.name] for topic in self.wanted},
-            streams=found.figures,
+            streams=found.paces,
             windows=found.windows if rig else None,
             pushes=found.pushes,
             contact=found.contact,
