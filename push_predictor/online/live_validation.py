@@ -26,7 +26,7 @@ from push_predictor.recordings.windows.push_window import PushWindow, windows_to
 from push_predictor.types import Array, BoolArray, IntArray
 
 MAIN_RESULT = "validation.json"
-_Row: TypeAlias = "tuple[str, int, int, int, tuple[str, ...], array[float]]"  # names of covariates; all other numbers
+_Row: TypeAlias = tuple[str, int, int, int, tuple[str, ...], bytes]  # names of covariates; all other numbers
 
 
 class Residual(NamedTuple):
@@ -132,7 +132,7 @@ class WindowRows(Sequence[PushWindow]):
         numbers = [w.velocity, w.contact, w.angle, w.duration, w.push_heading]
         numbers += [*w.displacement, *w.slider_start, *w.slider_end, *w.covariates.values()]
         known = self._names.setdefault(names, names)
-        self._rows.append((w.push_id, w.index, w.start, w.end, known, array("d", numbers)))
+        self._rows.append((w.push_id, w.index, w.start, w.end, known, array("d", numbers).tobytes()))
 
     def take(self, numbers: Iterable[int]) -> WindowRows:
         """Some of the windows, in the order of the numbers."""
@@ -150,7 +150,8 @@ class WindowRows(Sequence[PushWindow]):
     def __getitem__(self, number: int | slice) -> PushWindow | WindowRows:
         if isinstance(number, slice):
             return self.take(range(*number.indices(len(self))))
-        push_id, index, start, end, names, numbers = self._rows[number]
+        push_id, index, start, end, names, packed = self._rows[number]
+        numbers = array("d", packed)
         velocity, contact, angle, duration, heading = numbers[:5]
         poses = np.array(numbers[5:14]).reshape(3, 3)
         covariates = dict(zip(names, numbers[14:], strict=True))
