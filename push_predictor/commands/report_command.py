@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading, add_recording
+from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading
 from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
@@ -55,7 +55,8 @@ def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) 
         VALIDATION_EXAMPLE,
     )
     add_model(parser, "*", note="; the report compares the others with the first")
-    add_recording(parser, "give one that was not used for training")
+    meaning = "a recording; give one that was not used for training"
+    parser.add_argument("--recording", type=Path, metavar="RECORDING", help=meaning)
     _add_common(parser)
     add_reading(parser)
     parser.set_defaults(run=_validation)
