@@ -25,7 +25,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_topic_name import validate_topic_name
 
-from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
@@ -223,6 +223,6 @@ def recorder_status(node_name: str, progress: Progress, rig: Rig | None) -> Diag
     for each in progress.streams:
         values |= {f"{each.name} samples": each.samples, f"{each.name} rate": each.rate}
         values[f"{each.name} largest gap"] = each.largest_gap
-    level = Level.WARN if progress.problems else Level.OK
+    level = DiagnosticStatus.WARN if progress.problems else DiagnosticStatus.OK
     message = " ".join(progress.problems.values()) or str(values["state"])
     return diagnostic_status(node_name, "recording", level, message, values, rig.shape if rig else "")
