@@ -6,33 +6,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import Enum
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from msg_adapters.stamps import ns_to_stamp
-
-
-class Level(Enum):
-    """The health of a node."""
-
-    OK = DiagnosticStatus.OK
-    WARN = DiagnosticStatus.WARN
-    ERROR = DiagnosticStatus.ERROR
-    STALE = DiagnosticStatus.STALE
+from msg_adapters import ns_to_stamp
 
 
 def diagnostic_status(
-    node: str, subject: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str
+    node: str, subject: str, level: bytes, message: str, values: Mapping[str, object], hardware_id: str
 ) -> DiagnosticStatus:
     """The status of one subject of a node, named `NODE: SUBJECT` as diagnostic_updater names its tasks.
 
-    node: its fully qualified name. hardware_id: name of the rig, model or recording that the status is about, '' while
-    there is none. Of the values, floats get six digits, lists commas; None becomes '-'.
+    node: its fully qualified name. level: a constant of DiagnosticStatus. hardware_id: name of the rig, model or
+    recording that the status is about, '' while there is none. Of the values, floats get six digits, lists commas; None
+    becomes '-'.
     """
     name = f"{node}: {subject}"
     pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
-    return DiagnosticStatus(level=level.value, name=name, message=message, hardware_id=hardware_id, values=pairs)
+    return DiagnosticStatus(level=level, name=name, message=message, hardware_id=hardware_id, values=pairs)
 
 
 def diagnostic_array(stamp_ns: int, *statuses: DiagnosticStatus) -> DiagnosticArray:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One window as visualization_msgs/MarkerArray: predicted next to observed (docs/how_to/visualisation.md).
+"""One window as visualization_msgs/Marker: predicted next to observed (docs/how_to/visualisation.md).
 
 A window moves a slider of 90 mm by some millimetres, and the model's uncertainty is tenths of one: invisible at the
 scale of the slider. So the error is drawn twice: at true scale, and magnified MAGNIFICATION times.
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 from push_predictor.geometry.frames import to_world, wrap_angle
 from push_predictor.types import Array
 
@@ -35,32 +35,40 @@ WHITE, RED = (0.9, 0.9, 0.9, 0.8), (1.0, 0.35, 0.3, 1.0)
 
 
 @dataclass(frozen=True)
-class _Sheet:
-    """Frame and stamp of the markers of one window, and the kinds of marker."""
+class Sheet:
+    """Frame and stamp (ns) of the markers of one window, and the kinds of marker.
+
+    Each marker has a namespace of its own and id 0, so a window replaces the one before.
+    """
 
     frame_id: str
     stamp_ns: int
 
     def line(self, name: str, points: Array, colour: tuple[float, ...], width: float = LINE_WIDTH) -> Marker:
+        """A line through points (n, 2)."""
         marker = self._marker(name, Marker.LINE_STRIP, width, colour)
         marker.points = [Point(x=float(x), y=float(y)) for x, y in points]
         return marker
 
     def ball(self, name: str, centre: Array, colour: tuple[float, ...], diameter: float = CENTRE_DIAMETER) -> Marker:
+        """A sphere."""
         return self._at(centre, self._marker(name, Marker.SPHERE, diameter, colour))
 
     def disc(self, name: str, centre: Array, radius: float, colour: tuple[float, ...]) -> Marker:
+        """A flat cylinder."""
         marker = self._at(centre, self._marker(name, Marker.CYLINDER, 2.0 * radius, colour))
         marker.scale.z = DISC_HEIGHT
         return marker
 
     def arrow(self, name: str, tail: Array, head: Array, colour: tuple[float, ...]) -> Marker:
+        """An arrow from tail to head."""
         marker = self._marker(name, Marker.ARROW, 0.0, colour)
         marker.scale.x, marker.scale.y, marker.scale.z = ARROW_WIDTHS
         marker.points = [Point(x=float(x), y=float(y)) for x, y in (tail, head)]
         return marker
 
     def text(self, name: str, place: Array, text: str, colour: tuple[float, ...]) -> Marker:
+        """Text that faces the viewer."""
         marker = self._at(place, self._marker(name, Marker.TEXT_VIEW_FACING, LABEL_HEIGHT, colour))
         marker.text = text
         return marker
@@ -80,88 +88,70 @@ class _Sheet:
 
 
 def prediction_markers(
+    sheet: Sheet,
     rig_outline_vertices: Array,
     slider_start: Array,
     predicted_pose: Array,
     covariance_world_xy: Array,
     observed_pose: Array,
-    frame_id: str,
-    stamp: int,
-) -> MarkerArray:
+) -> list[Marker]:
     """Outlines at the start, predicted and observed; 95 % ellipse of the predicted centre; observed centre.
 
     rig_outline_vertices: (V, 2), m, body frame. slider_start, predicted_pose, observed_pose: (3,) x, y (m), heading
-    (rad) in `frame_id`. covariance_world_xy: (2, 2) of the predicted centre along that frame's axes, m^2. stamp: ns.
-    Each marker has a namespace of its own and id 0, so a window replaces the one before.
+    (rad) in the sheet's frame. covariance_world_xy: (2, 2) of the predicted centre along that frame's axes, m^2.
     """
-    sheet = _Sheet(frame_id, stamp)
     closed = np.vstack([rig_outline_vertices, rig_outline_vertices[:1]])
-    return MarkerArray(
-        markers=[
-            sheet.line("start_outline", to_world(closed, slider_start), GREY),
-            sheet.line("predicted_outline", to_world(closed, predicted_pose), BLUE),
-            sheet.line(
-                "predicted_ellipse", confidence_ellipse(predicted_pose[:2], covariance_world_xy), BLUE, FINE_WIDTH
-            ),
-            sheet.line("observed_outline", to_world(closed, observed_pose), ORANGE),
-            sheet.ball("observed_centre", observed_pose, ORANGE),
-        ]
-    )
+    ellipse = confidence_ellipse(predicted_pose[:2], covariance_world_xy)
+    return [
+        sheet.line("start_outline", to_world(closed, slider_start), GREY),
+        sheet.line("predicted_outline", to_world(closed, predicted_pose), BLUE),
+        sheet.line("predicted_ellipse", ellipse, BLUE, FINE_WIDTH),
+        sheet.line("observed_outline", to_world(closed, observed_pose), ORANGE),
+        sheet.ball("observed_centre", observed_pose, ORANGE),
+    ]
 
 
-def push_markers(tip: Array, radius: float, heading: float, frame_id: str, stamp: int) -> MarkerArray:
+def push_markers(sheet: Sheet, tip: Array, radius: float, heading: float) -> list[Marker]:
     """The pusher as a disc, and an arrow that ends at its back and points in the push direction.
 
-    tip: (2,) centre of the disc, m; radius m; heading of the push in `frame_id`, rad; stamp: ns. The arrow's length
-    has no meaning.
+    tip: (2,) centre of the disc, m; radius m; heading of the push, rad. The arrow's length has no meaning.
     """
-    sheet, ahead = _Sheet(frame_id, stamp), np.array([np.cos(heading), np.sin(heading)])
+    ahead = np.array([np.cos(heading), np.sin(heading)])
     back = tip - radius * ahead
-    return MarkerArray(
-        markers=[
-            sheet.disc("pusher", tip, radius, WHITE),
-            sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
-        ]
-    )
+    return [
+        sheet.disc("pusher", tip, radius, WHITE),
+        sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
+    ]
 
 
 def magnified_markers(
-    predicted_pose: Array,
-    covariance_world: Array,
-    observed_pose: Array,
-    reach: float,
-    ahead: float,
-    frame_id: str,
-    stamp: int,
-) -> MarkerArray:
+    sheet: Sheet, predicted_pose: Array, covariance_world: Array, observed_pose: Array, reach: float, ahead: float
+) -> list[Marker]:
     """The outcome relative to the prediction, MAGNIFICATION times enlarged.
 
     Around the predicted centre its 95 % ellipse, and a dot for the observed centre. Outside the outline a dial: its
     middle, in the direction `ahead` (rad), is the predicted heading, its band the 95 % interval of the heading, a
     stroke the observed heading. predicted_pose, observed_pose (3,): x, y m, heading rad; covariance_world (3, 3) of
-    x, y, heading along the axes of `frame_id`; reach: the outline's largest distance from its centre, m; stamp: ns.
+    x, y, heading along the axes of the sheet's frame; reach: the outline's largest distance from its centre, m.
     """
-    sheet, centre = _Sheet(frame_id, stamp), predicted_pose[:2]
+    centre = predicted_pose[:2]
     ellipse = confidence_ellipse(centre, MAGNIFICATION**2 * covariance_world[:2, :2])
     observed = centre + MAGNIFICATION * (observed_pose[:2] - centre)
     spread = min(MAGNIFICATION * NORMAL_95 * float(np.sqrt(max(covariance_world[2, 2], 0.0))), np.pi)
     turned = ahead + np.clip(MAGNIFICATION * wrap_angle(observed_pose[2] - predicted_pose[2]), -np.pi, np.pi)
     low, high, begin, end = reach * np.array(DIAL)
     stroke = _polar(centre, np.array([begin, end]), np.array([turned, turned]))
-    return MarkerArray(
-        markers=[
-            sheet.line("magnified_ellipse", ellipse, BLUE),
-            sheet.ball("magnified_observed", observed, ORANGE, MAGNIFIED_DIAMETER),
-            sheet.line("magnified_heading", _band(centre, low, high, ahead, spread), BLUE),
-            sheet.line("magnified_observed_heading", stroke, ORANGE),
-        ]
-    )
+    return [
+        sheet.line("magnified_ellipse", ellipse, BLUE),
+        sheet.ball("magnified_observed", observed, ORANGE, MAGNIFIED_DIAMETER),
+        sheet.line("magnified_heading", _band(centre, low, high, ahead, spread), BLUE),
+        sheet.line("magnified_observed_heading", stroke, ORANGE),
+    ]
 
 
-def label_marker(text: str, centre: Array, reach: float, outside: bool, frame_id: str, stamp: int) -> MarkerArray:
+def label_marker(sheet: Sheet, text: str, centre: Array, reach: float, outside: bool) -> Marker:
     """Text above a slider at centre (2,) whose outline has this reach (m); red if the outcome lies outside."""
-    place = centre + np.array([0.0, LABEL_PLACE * reach])
-    return MarkerArray(markers=[_Sheet(frame_id, stamp).text("label", place, text, RED if outside else WHITE)])
+    return sheet.text("label", centre + np.array([0.0, LABEL_PLACE * reach]), text, RED if outside else WHITE)
 
 
 def confidence_ellipse(centre: Array, covariance: Array) -> Array:

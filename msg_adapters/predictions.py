@@ -1,23 +1,27 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""PredictPush and PredictPushBatch, client and server side: pushes <-> request, prediction <-> response."""
+"""PredictPush, PredictPushBatch and SuggestPushes: pushes and limits <-> requests, results <-> responses."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from push_predictor.design.limits import Interval, Limits
 from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import CovariateError, PushPredictorError, RequestError
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
 from push_predictor.types import Array
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
+
+if TYPE_CHECKING:
+    from push_predictor.design.batch import Suggested
 
 
 class RefusedError(PushPredictorError):
@@ -112,9 +116,28 @@ def extend_batch_response(response: PredictPushBatch.Response, prediction: Predi
     response.in_domain.extend(prediction.in_domain.tolist())
 
 
+def limits_from_request(request: Any) -> Limits:
+    """The robot's limits in a SuggestPushes request. Raises RequestError for one that is not accepted."""
+    speed, angle = (next(iter(_intervals(name, getattr(request, name), 2)), None) for name in ("speed", "angle"))
+    excluded = _intervals("excluded", request.excluded, None)
+    return Limits(speed, angle, request.travel, excluded, request.transfer_speed or None)
+
+
+def fill_suggest_response(response: Any, suggested: Suggested) -> None:
+    """Write the suggested pushes into a response."""
+    columns = (*suggested.inputs.T, suggested.duration, suggested.variance_left)
+    for name, column in zip(("velocity", "contact", "angle", "duration", "variance_left"), columns, strict=True):
+        setattr(response, name, doubles(column))
+    response.success = True
+
+
 def refuse(response: Any, reason: str, code: ErrorCode) -> Any:
-    """A new response of the same kind without numbers: success false, the reason and its code."""
-    return type(response)(success=False, message=reason, error_code=int(code))
+    """A new response of the same kind without numbers: success false, the reason and its code, as far as it has them.
+
+    Types of rosbag2 have no message, and some no `success`.
+    """
+    fields = {"success": False, "message": reason, "error_code": int(code)}
+    return type(response)(**{name: value for name, value in fields.items() if hasattr(response, name)})
 
 
 def prediction_from_response(response: Any) -> Prediction:
@@ -162,3 +185,11 @@ def doubles(values: Array) -> array[float]:
 
 def _push_by_push(covariates: Mapping[str, Array]) -> Array:
     return np.column_stack(list(covariates.values())) if covariates else np.empty((0, 0))
+
+
+def _intervals(name: str, values: Sequence[float], most: int | None) -> tuple[Interval, ...]:
+    """Pairs of successive values; most: length, None for any. Raises RequestError for another number of values."""
+    if len(values) % 2 or (most is not None and len(values) > most):
+        accepted = "an even number of values" if most is None else f"{most} values, or none"
+        raise RequestError(f"{name} length", len(values), accepted)
+    return tuple(zip(values[::2], values[1::2], strict=True))

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from msg_adapters import MessageError
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import MessageError, ns_to_stamp
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
@@ -16,11 +15,12 @@ from push_predictor_interfaces.msg import PushAlarm, PushResidual
 
 
 def residual_to_message(
-    model: str, window: PushWindow, mean: Array, covariance: Array, in_domain: bool, frame_id: str = "world"
+    model: str, window: PushWindow, mean: Array, covariance: Array, in_domain: bool, frame_id: str
 ) -> PushResidual:
     """The message of a window and a model's prediction (3,), (3, 3) of it, made in or out of the model's domain.
 
-    standardised: L^-1 (observed - predicted), with L L' = covariance. Raises MessageError if there is no such L.
+    frame_id: of the poses. standardised: L^-1 (observed - predicted), with L L' = covariance. Raises MessageError if
+    there is no such L.
     """
     try:
         factor = np.linalg.cholesky(covariance)
@@ -40,7 +40,7 @@ def _flat(values: Array) -> Array:
     return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)
 
 
-def alarm_to_message(state: AlarmState, model: str, stamp_ns: int, frame_id: str = "world") -> PushAlarm:
+def alarm_to_message(state: AlarmState, model: str, stamp_ns: int, frame_id: str) -> PushAlarm:
     """The message of an alarm about a model. stamp_ns: end of the push at which it fired.
 
     Raises MessageError if it has not fired.

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading, add_recording
+from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading
 from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
-from push_predictor.commands.common.progress import JobProgress, progress
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.watch import Watch, part_of, watched
 
@@ -55,7 +55,8 @@ def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) 
         VALIDATION_EXAMPLE,
     )
     add_model(parser, "*", note="; the report compares the others with the first")
-    add_recording(parser, "give one that was not used for training")
+    meaning = "a recording; give one that was not used for training"
+    parser.add_argument("--recording", type=Path, metavar="RECORDING", help=meaning)
     _add_common(parser)
     add_reading(parser)
     parser.set_defaults(run=_validation)
@@ -109,10 +110,9 @@ def _paper(options: argparse.Namespace) -> None:
         raise RequestError("--data", str(options.data), "a folder that exists")
     plan = QUICK if options.quick else FULL
     with _parallel(options.cluster), progress("report paper") as watch:
-        bar = JobProgress(watch)
-        work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
+        work = Work(options.out.resolve() / "work", options.jobs or -1)
         keep = None if options.recordings is None else options.recordings.resolve()
-        page, content = report_paper(plan, work, options.out, options.data, keep, bar)
+        page, content = report_paper(plan, work, options.out, options.data, keep, watch)
     if not write_json(options, {"report": str(page), **content}):
         print(page)
 

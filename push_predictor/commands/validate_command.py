@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.report.summary import opening_sentences
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
-    from push_predictor.online.window_log import write_window_log
+    from push_predictor.online.live_validation import write_window_log
     from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows, force=options.force)

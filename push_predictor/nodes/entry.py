@@ -11,30 +11,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from functools import partial
 from importlib import import_module
 
 from push_predictor.blas_threads import limit_process
 from push_predictor.errors import NotCompiledError
-
-
-def predict_server() -> int:
-    """Run the node predict_server; returns the exit status."""
-    return _run("predict_server")
-
-
-def push_recorder() -> int:
-    """Run the node push_recorder; returns the exit status."""
-    return _run("push_recorder")
-
-
-def push_replay() -> int:
-    """Run the node push_replay; returns the exit status."""
-    return _run("push_replay")
-
-
-def push_validator() -> int:
-    """Run the node push_validator; returns the exit status."""
-    return _run("push_validator")
 
 
 def install_handlers() -> None:
@@ -46,7 +27,8 @@ def install_handlers() -> None:
         signal.signal(number, _end)
 
 
-def _run(node: str) -> int:
+def run(node: str) -> int:
+    """Run a node; returns the exit status."""
     install_handlers()
     limit_process()
     try:
@@ -60,3 +42,9 @@ def _run(node: str) -> int:
 
 def _end(number: int, frame: object) -> None:
     os._exit(0)  # nothing to clean up: neither a node nor a child process exists yet
+
+
+predict_server = partial(run, "predict_server")
+push_recorder = partial(run, "push_recorder")
+push_replay = partial(run, "push_replay")
+push_validator = partial(run, "push_validator")

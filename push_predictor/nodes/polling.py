@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Polled topics: a node takes their messages itself, at a tenth of the cost of one executor turn for each of them."""
+"""Polled topics and services: a node takes what has arrived itself, at a tenth of the cost of an executor's turn."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from time import time_ns
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -51,6 +53,13 @@ def take_all(subscription: Subscription) -> Iterator[Taken]:
             message, info = taken
             number, sent = info["publication_sequence_number"], info["source_timestamp"]
             yield Taken(message, number, sent, info["received_timestamp"])
+
+
+def take_request(service: Service) -> tuple[Any, Any]:
+    """The next request of a service, and the header to answer it by; None and None if there is none."""
+    with service.handle:
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+    return request, header
 
 
 class FollowingSubscription:
@@ -113,8 +122,8 @@ class FollowingSubscription:
                 qos_overriding_options=self._overriding,
                 raw=True,
             )
-        except RuntimeError:
-            return  # of rcl: another stream still has one of another type. Try again at the next call
+        except rclpy_implementation.RCLError:
+            return  # another stream still has one of another type. Try again at the next call
         self._profile = wanted
 
     def taken(self) -> Iterator[Taken]:

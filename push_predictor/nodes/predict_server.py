@@ -30,6 +30,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, qos_profile_system_default
+from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
@@ -37,10 +38,10 @@ from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import InactiveError, PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.nodes.parameter_tables import PREDICT_SERVER
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.server.guarded_action import GuardedAction
-from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
 from push_predictor.nodes.server.services import (
     RequestFrames,
     handle_list_models,
@@ -69,6 +70,11 @@ SERVICE_QOS = QoSProfile(depth=1000)  # the default, 10, loses requests of a cli
 SIMULATED = "the default model was trained on a simulated square on ABS: set the parameter 'models' to one of your rig"
 CLOSE_TIMEOUT = 5.0  # s in which long requests end and their answers are sent when the node ends
 NICENESS = 10  # of 19, for the tables of models: what answers requests comes first
+INTROSPECTION = {
+    "disabled": ServiceIntrospectionState.OFF,
+    "metadata": ServiceIntrospectionState.METADATA,
+    "contents": ServiceIntrospectionState.CONTENTS,
+}
 Handler: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
 
 
@@ -82,7 +88,7 @@ class PredictServer(LifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("push_predictor")
-        declare(self, PARAMETERS)
+        declare(self, PREDICT_SERVER)
         self._registry, self._statistics = ModelRegistry(), RequestStatistics()
         self._problems: list[str] = []
         self._closing, self._closing_until = Event(), 0.0
@@ -350,7 +356,7 @@ class PredictServer(LifecycleNode):
 
     def value(self, name: str) -> Any:
         """The present value of a parameter."""
-        return values_of(self, PARAMETERS)[name]
+        return values_of(self, PREDICT_SERVER)[name]
 
     def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         for parameter in changed:
@@ -379,4 +385,4 @@ class PredictServer(LifecycleNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit status."""
-    return run("predict_server", lambda stop: PredictServer(), args, start=PredictServer.start)
+    return run("predict_server", lambda stop: PredictServer(), args)

@@ -20,34 +20,36 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from msg_adapters.rigs import rig_to_message
-from push_predictor.errors import RecordingError, RigError
+from push_predictor.errors import RecordingError, RequestError, RigError
+from push_predictor.nodes.parameter_tables import PUSH_REPLAY
+from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
 from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.parameters import ReplayOptions, read_options
-from push_predictor.nodes.replay.topics import ReplayTopics
+from push_predictor.nodes.replay.topics import ReplayTopics, check_filter, is_played, listed
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics, load_topics, topics_of
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
-from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
 from push_predictor.replay.report import ReplayReport
 from push_predictor.replay.source import BagSource, missing_poses, push_topics
 from push_predictor.resources import share_path
 from push_predictor_interfaces.msg import PushRig, ReplayStatus
 
 STATES = {"playing": ReplayStatus.PLAYING, "paused": ReplayStatus.PAUSED, "finished": ReplayStatus.FINISHED}
+RANGE = ("start_offset", "playback_duration", "playback_until_timestamp")
 LARGEST_CHECKED = 300_000_000  # bytes: a check reads the whole recording into memory
 
 
@@ -63,9 +65,14 @@ class PushReplay(Node):
         super().__init__("push_replay")
         self._stop = stop
         self._ending = threading.Event()
-        self._options = options = read_options(self)
-        self._given_rig = None if options.rig is None else load_rig(options.rig)
-        bag = open_bag(options.recording)
+        declare(self, PUSH_REPLAY)
+        self._values = values = values_of(self, PUSH_REPLAY)
+        if not values["recording"]:
+            raise RequestError("recording", "", "the path of a recording (docs/reference/recordings.md)")
+        check_filter(values)
+        self._recording, self._given_topics = Path(values["recording"]).expanduser(), topics_of(values)
+        self._given_rig = load_rig(Path(values["rig"]).expanduser()) if values["rig"] else None
+        bag = open_bag(self._recording)
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
         self._status = self.create_publisher(ReplayStatus, "replay_status", LATCHED)
@@ -73,9 +80,9 @@ class PushReplay(Node):
         self._rig = self.create_publisher(PushRig, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
-        self._checks = CheckProcess(options.strict)
+        self._checks = CheckProcess(values["strict"])
         self._streams = self._stream_topics()
-        self._player = self._make_player(options)
+        self._player = self._make_player()
         self._check(bag)
         self._start_reporting()
         ReplayControls(self, self._player)
@@ -96,7 +103,7 @@ class PushReplay(Node):
             self.get_logger().info(report.summary)
 
     def _open_topics(self, bag: Bag) -> ReplayTopics:
-        chosen = {topic: kind for topic, kind in bag.topics.items() if self._options.filter.accepts(topic)}
+        chosen = {topic: kind for topic, kind in bag.topics.items() if is_played(topic, self._values)}
         topics = ReplayTopics(self, chosen, bag.qos, self._ending.is_set)
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")
@@ -115,10 +122,10 @@ class PushReplay(Node):
     def _stream_topics(self) -> Topics:
         """The topics of slider, pusher and wrench: given, or saved next to the recording; the others are not named."""
         try:
-            return self._options.topics.over(load_topics(self._options.recording))
+            return self._given_topics.over(load_topics(self._recording))
         except RecordingError as error:  # of NAME.recording.yaml, which playing does not need
             self.get_logger().warning(str(error))
-            return self._options.topics
+            return self._given_topics
 
     def _check(self, bag: Bag) -> None:
         """Begin the check of the recording, in a process of its own; one without a rig or poses is not checked."""
@@ -132,7 +139,7 @@ class PushReplay(Node):
         elif (size := _size(bag.path)) > LARGEST_CHECKED:
             self._checks.skip(f"{size / 1e6:.0f} MB. Run `push_predictor check`.")
         else:
-            self._checks.start(self._options.recording, self._given_rig, self._options.topics)
+            self._checks.start(self._recording, self._given_rig, self._given_topics)
 
     def _report_regularly(self) -> None:
         checked = not self._checks.busy
@@ -143,15 +150,18 @@ class PushReplay(Node):
                 self.get_logger().warning(problem)
         self._publish_report(self._report())
 
-    def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
-        wall = SystemClock()
-        clock = PlayerClock(wall, options.rate, options.start_paused)
+    def _make_player(self) -> ReplayPlayer:
+        wall, values = SystemClock(), self._values
+        clock = PlayerClock(wall, values["play.rate"], values["play.start_paused"])
         output = PlayerOutput(self._prepare, self._settle, self._announce)
-        return ReplayPlayer(self._source, clock, wall, output, options.window, options.loop, options.delay)
+        window, loop, delay = (values[f"play.{name}"] for name in ("read_ahead_queue_size", "loop", "delay"))
+        return ReplayPlayer(self._source, clock, wall, output, window, loop, _ns(delay))
 
     def _prepare(self, message: RawMessage) -> Callable[[], bool]:
         self._topics.make_room(message.topic)
-        if self._options.triggers_clock(message.topic) or message.topic in self._topics.untimed:
+        triggers = self._values["play.clock_trigger_topics"]  # empty for all
+        with_clock = self._values["play.clock_publish_on_topic_publish"]
+        if message.topic in self._topics.untimed or (with_clock and (not triggers or listed(message.topic, triggers))):
             return partial(self._publish_with_clock, message)
         return partial(self._topics.publish, message)
 
@@ -161,7 +171,7 @@ class PushReplay(Node):
 
     def _settle(self) -> None:
         """Wait for acknowledgements, so that no subscriber receives `finished` before the last message."""
-        timeout, begin = self._options.acked_timeout, time.perf_counter_ns()
+        timeout, begin = _ns(self._values["play.wait_acked_timeout"]), time.perf_counter_ns()
         while timeout >= 0 and not self._ending.is_set():
             if self._topics.acknowledged():
                 break
@@ -176,19 +186,21 @@ class PushReplay(Node):
             report = self._report()
             self._publish_report(report)
             self.get_logger().info(report.summary)
-            if self._options.exit_when_finished:
+            if self._values["exit_when_finished"]:
                 self._stop.request()
 
     def _play(self) -> None:
         self._wait_for_subscribers()
-        self._player.play(self._options.range)
+        offset, *ends = (_ns(self._values[f"play.{name}"]) for name in RANGE)
+        duration, until = (None if end < 0 else end for end in ends)
+        self._player.play(PlayRange(offset, duration, until))
         self._player.run()
 
     def _wait_for_subscribers(self) -> None:
         publishers = self._topics.publishers
         needed = push_topics(publishers, self._streams)
         wanted = [each for topic, each in publishers.items() if topic in needed] or list(publishers.values())
-        deadline = time.perf_counter_ns() + self._options.wait_for_subscribers
+        deadline = time.perf_counter_ns() + _ns(self._values["wait_for_subscribers"])
         while time.perf_counter_ns() < deadline and not self._ending.is_set():
             if all(each.get_subscription_count() for each in wanted) and self._rig_received():
                 return
@@ -201,7 +213,7 @@ class PushReplay(Node):
 
     def _publish_time(self) -> None:
         """Publish /clock at its frequency; an executor's timer would cost more and be less regular."""
-        frequency = self._options.clock_frequency
+        frequency = self._values["play.clock_publish_frequency"]
         period, begin, ticks = (1.0 / frequency if frequency else 0.0), time.perf_counter(), 0
         while frequency and not self._ending.wait(max(0.0, begin + ticks * period - time.perf_counter())):
             ticks = max(ticks + 1, int((time.perf_counter() - begin) / period))
@@ -223,7 +235,7 @@ class PushReplay(Node):
 
     def _report(self) -> ReplayReport:
         return ReplayReport(
-            recording=str(self._options.recording),
+            recording=str(self._recording),
             state=self._player.state,
             rate=self._player.rate,
             published=self._player.published,
@@ -239,9 +251,15 @@ class PushReplay(Node):
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
-        level = Level.ERROR if self._checks.failed else Level.WARN if report.warnings else Level.OK
+        level = (
+            DiagnosticStatus.ERROR
+            if self._checks.failed
+            else DiagnosticStatus.WARN
+            if report.warnings
+            else DiagnosticStatus.OK
+        )
         message = "; ".join(report.warnings) or report.state
-        name, recording = self.get_fully_qualified_name(), self._options.recording.name
+        name, recording = self.get_fully_qualified_name(), self._recording.name
         status = diagnostic_status(name, "replay", level, message, report.values, recording)
         self._diagnostics.publish(diagnostic_array(time.time_ns(), status))
 
@@ -256,3 +274,7 @@ def main() -> int:
 def _size(path: Path) -> int:
     """Bytes of a recording."""
     return sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]))
+
+
+def _ns(seconds: float) -> int:
+    return round(seconds * SECOND)

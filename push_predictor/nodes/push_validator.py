@@ -20,13 +20,13 @@ from rclpy.node import Node
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
+from push_predictor.nodes.parameter_tables import PUSH_VALIDATOR
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
 from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.parameters import PARAMETERS
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.publishers import ResultPublishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
@@ -50,10 +50,10 @@ class PushValidator(Node):
 
     def __init__(self) -> None:
         super().__init__("push_validator")
-        declare(self, PARAMETERS)
-        values = values_of(self, PARAMETERS)
+        declare(self, PUSH_VALIDATOR)
+        values = values_of(self, PUSH_VALIDATOR)
         self._closing = self._closed = False
-        self._results = ResultPublishers(self, lambda: self._sensors.world)
+        self._results = ResultPublishers(self, self._world)
         self._alarm = AlarmProcess(checked_rate(values["false_alarm_rate"]), self._on_alarm)
         self._models = ModelSource(self, [values["model"], *values["compare"]])
         self._rigs = RigSource(self, values["rig"])
@@ -75,10 +75,10 @@ class PushValidator(Node):
     def finish(self) -> bool:
         """Write the results; whether that is done."""
         self._closing = True
-        return self._closed and self._finish.sent
+        return self._closed
 
     def close(self) -> None:
-        """End what runs. Raises PushPredictorError if the results could not be written."""
+        """End what runs, answer the last callers. Raises PushPredictorError if the results could not be written."""
         self._writer.close()
         self._alarm.stop()
         if self._run is None:
@@ -86,8 +86,14 @@ class PushValidator(Node):
         else:
             self._run.checks.check.stop()
         self._sensors.close()
+        self._finish.work()  # of calls since the last turn
+        self._finish.answer()
         if self._session.failure:
             raise PushPredictorError(self._session.failure)
+
+    def _world(self) -> str:
+        """The frame in which the poses are."""
+        return self._sensors.world
 
     def _on_replay_status(self, message: ReplayStatus) -> None:
         self._sensors.drain()
@@ -125,7 +131,7 @@ class PushValidator(Node):
         if not self._session.active:
             self._open()
         if self._session.state is State.OPEN and self._run is not None:
-            other_rig = self._rigs.differs_from(self._run.rig)
+            other_rig = self._rigs.rig is not self._run.rig
             if not other_rig:
                 self._feed(self._run)
             if self._session.drain_if_due(monotonic(), self._finish.requested, other_rig):
@@ -146,8 +152,8 @@ class PushValidator(Node):
             if self._run is not None:
                 self._run.checks.check.stop()
             self._sensors.begin(rig)
-            publish, strict = self._results.publish, self._strict
-            self._run = ValidationRun(rig, models, self._client, publish, self._alarm, output, scalars, strict)
+            results = self._results.publish, self._world
+            self._run = ValidationRun(rig, models, self._client, *results, self._alarm, output, scalars, self._strict)
             self._session.open(monotonic())
 
     def _feed(self, current: ValidationRun) -> None:

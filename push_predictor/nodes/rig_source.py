@@ -22,7 +22,10 @@ VOLATILE = "Topic rig has a publisher that is not transient local: nothing is re
 
 
 class RigSource:
-    """The rig of the file `path`, or, if that is empty, the latest on topic rig. Raises RigError for a bad file."""
+    """The rig of the file `path`, or, if that is empty, the latest on topic rig. Raises RigError for a bad file.
+
+    rig: the same object until another one is published.
+    """
 
     def __init__(self, node: Node, path: str) -> None:
         self._node, self._from_file = node, bool(path)
@@ -45,16 +48,15 @@ class RigSource:
         """In words, why there is no rig, empty if there is one."""
         return self.problem if self.rig is None else ""
 
-    def differs_from(self, earlier: Rig) -> bool:
-        """Whether the rig is known and differs from an earlier one."""
-        return self.rig is not None and self.rig is not earlier and self.rig.to_record() != earlier.to_record()
-
     def work(self) -> None:
         """Take what was published since the last call, before the samples that came after it."""
         for message, *_ in take_all(self._subscription):
             if self._from_file:
                 continue
             try:
-                self.rig, self._refusal = rig_from_message(message, "topic rig"), ""
+                rig, self._refusal = rig_from_message(message, "topic rig"), ""
             except RigError as error:
                 self._refusal = str(error)
+                continue
+            if self.rig is None or rig.to_record() != self.rig.to_record():
+                self.rig = rig

@@ -11,7 +11,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import rclpy
 from rclpy.context import Context
@@ -31,21 +31,7 @@ LONGEST = 3.0  # s in which a callback of an executor with one thread may: less 
 _GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
 
 
-class Closable(Protocol):
-    """A node with a method close(), which is called when it no longer spins, while the graph is still available.
-
-    If it has them: a method finish() is called before, in turns with the executor, until it returns True; `threads` is
-    the number of threads of the executor; abandons_callbacks is whether one runs for which the process will not wait.
-    """
-
-    def close(self) -> None:
-        """End its threads, write and publish its last results."""
-
-    def destroy_node(self) -> None:
-        """As rclpy's Node has it."""
-
-
-MakeNode: TypeAlias = Callable[["Stop"], Closable]
+MakeNode: TypeAlias = Callable[["Stop"], Any]
 
 
 class Stop:
@@ -65,19 +51,20 @@ class Stop:
         self.requested = True
 
 
-def run(
-    name: str, make_node: MakeNode, args: Sequence[str] | None = None, start: Callable[[Any], None] | None = None
-) -> int:
+def run(name: str, make_node: MakeNode, args: Sequence[str] | None = None) -> int:
     """Create a node, start it, spin it until a signal or Stop, close it; returns the exit status.
 
-    make_node: returns a rclpy Node that is Closable; its PushPredictorError becomes one line on stderr and status 1.
-    start: called with the node before it spins; what takes longer than a tenth of a second belongs here.
+    make_node: returns a rclpy Node; its PushPredictorError becomes one line on stderr and status 1. Its method close()
+    is called when it no longer spins, while the graph is still available. If it has them: start() is called before it
+    spins, for what takes longer than a tenth of a second; finish() before close(), in turns with the executor, until it
+    returns True; `threads` is the number of threads of the executor; abandons_callbacks is whether one runs for which
+    the process will not wait.
     Discovery is limited to this machine unless the environment states otherwise. The node is not created without the
     security that the environment requires, for --help and --version, nor with an unknown argument (SystemExit).
     """
     _parse(name, args)
     stop = Stop()
-    life = Life(name, make_node, stop, args, start)
+    life = Life(name, make_node, stop, args)
     _handle_signals(stop, life)
     life.spin()
     signal.signal(signal.SIGALRM, signal.SIG_IGN)  # the end is not interrupted
@@ -98,10 +85,9 @@ class Life:
         make_node: MakeNode,
         stop: Stop,
         args: Sequence[str] | None,
-        start: Callable[[Any], None] | None,
         context: Context | None = None,
     ) -> None:
-        self._name, self._make_node, self._stop, self._args, self._start = name, make_node, stop, args, start
+        self._name, self._make_node, self._stop, self._args = name, make_node, stop, args
         self._context = context
         self._node: Any = None
         self._executor: Executor | None = None
@@ -111,8 +97,7 @@ class Life:
         """Create the node, start it, and spin it until the end is requested."""
         try:
             self._node = self._made()
-            if self._start is not None:
-                self._start(self._node)
+            getattr(self._node, "start", lambda: None)()
             threads = getattr(self._node, "threads", 1)
             several = partial(MultiThreadedExecutor, threads)
             self._executor = (several if threads > 1 else SingleThreadedExecutor)(context=self._context)
@@ -157,7 +142,7 @@ class Life:
             self._stop.fail(error)
         self.leaves_threads |= getattr(self._node, "abandons_callbacks", False)
 
-    def _made(self) -> Closable:
+    def _made(self) -> Any:
         limited = limit_discovery()
         require_security()
         # rclpy's own handlers shut the context down at once, before the last diagnostics are published.

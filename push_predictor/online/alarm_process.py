@@ -8,13 +8,9 @@ Scoring a push takes tenths of a second, calibrating on the training pushes seco
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +19,10 @@ from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.child_process import start_child
+from push_predictor.online.child_process import Child
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array
-
-NICENESS = 5  # a sensor's queue must not wait for the alarm
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +46,7 @@ class AlarmProcess:
     def __init__(self, rate: float, fire: Callable[[AlarmState, int], None]) -> None:
         self._rate, self._fire = rate, fire
         self._model: PushModel | None = None
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
+        self._child: Child | None = None
         self._waiting: list[CompletedPush] = []
         self._asked = False
         self._run = 0
@@ -64,7 +57,7 @@ class AlarmProcess:
     @property
     def busy(self) -> bool:
         """Whether pushes are waiting to be scored."""
-        return bool(self._waiting or self._asked) and self._process is not None
+        return bool(self._waiting or self._asked) and self._child is not None
 
     @property
     def json(self) -> dict[str, object]:
@@ -77,9 +70,7 @@ class AlarmProcess:
             return
         self.stop()
         self._model = model
-        self._connection, theirs = multiprocessing.Pipe()
-        self._process = start_child(_work, (theirs, model, self._rate), "alarm")
-        theirs.close()
+        self._child = Child("alarm", _work, model, self._rate)
         self._asked = True  # the process speaks first
 
     def begin(self) -> None:
@@ -89,17 +80,17 @@ class AlarmProcess:
 
     def add(self, push: CompletedPush) -> None:
         """Take a push of which every window was predicted or refused."""
-        if self._process is not None:
+        if self._child is not None:
             self._waiting.append(push)
 
     def work(self) -> None:
         """Send the pushes that wait, take the replies."""
         try:
-            while self._connection is not None and self._connection.poll():
+            while self._child is not None and (reply := self._child.received()) is not None:
                 self._asked = False
-                self._take(self._connection.recv())
-            if self._connection is not None and self._waiting and not self._asked:
-                self._connection.send((self._run, self._waiting))
+                self._take(reply)
+            if self._child is not None and self._waiting and not self._asked:
+                self._child.send((self._run, self._waiting))
                 self._waiting, self._asked = [], True
         except (EOFError, OSError):
             self.stop()
@@ -107,10 +98,9 @@ class AlarmProcess:
 
     def stop(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.terminate()
-            self._process.join()
-        self._process, self._connection, self._asked, self._waiting = None, None, False, []
+        if self._child is not None:
+            self._child.stop()
+        self._child, self._asked, self._waiting = None, False, []
 
     def _take(self, reply: _Reply) -> None:
         self.off = reply.off
@@ -124,9 +114,8 @@ class AlarmProcess:
             self._fire(self.state, reply.fired)
 
 
-def _work(connection: Connection, model: PushModel, rate: float) -> None:
+def _work(connection: Any, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
-    os.nice(NICENESS)
     try:
         calibration = calibrate(model)
     except RequestError as error:
@@ -166,7 +155,6 @@ class CompletedPush:
 class _OpenPush:
     """A push: its predicted windows by number, and the numbers that are neither predicted nor refused yet."""
 
-    push_id: str
     predicted: dict[int, tuple[PushWindow, Prediction]] = field(default_factory=dict)
     missing: set[int] = field(default_factory=set)
 
@@ -175,21 +163,15 @@ class CompletedPushes:
     """Collects the windows of the main model until their push is complete."""
 
     def __init__(self) -> None:
-        self._open: deque[_OpenPush] = deque()
-        self._push_of: dict[int, _OpenPush] = {}
+        self._open: dict[str, _OpenPush] = {}  # by name, in order
 
     def found(self, number: int, window: PushWindow) -> None:
         """Note that a window was found."""
-        if not self._open or self._open[-1].push_id != window.push_id:
-            self._open.append(_OpenPush(window.push_id))
-        self._open[-1].missing.add(number)
-        self._push_of[number] = self._open[-1]
+        self._open.setdefault(window.push_id, _OpenPush()).missing.add(number)
 
     def answered(self, number: int, window: PushWindow, prediction: Prediction | None) -> None:
-        """Note that a window was predicted, or (None) refused."""
-        push = self._push_of.pop(number, None)
-        if push is None:
-            return  # too late: the push has left without it
+        """Note that a window was predicted, or (None) refused; without effect if its push was taken without it."""
+        push = self._open.get(window.push_id, _OpenPush())
         push.missing.discard(number)
         if prediction is not None:
             push.predicted[number] = (window, prediction)
@@ -197,10 +179,8 @@ class CompletedPushes:
     def take(self, last: bool = False) -> list[CompletedPush]:
         """Remove and return the complete pushes: another was found since. last: neither windows nor answers follow."""
         done = []
-        while self._open and (last or (len(self._open) > 1 and not self._open[0].missing)):
-            push = self._open.popleft()
-            for number in push.missing:
-                self._push_of.pop(number, None)
+        while self._open and (last or (len(self._open) > 1 and not next(iter(self._open.values())).missing)):
+            push = self._open.pop(next(iter(self._open)))
             if push.predicted:
                 done.append(_completed(push))
         return done

@@ -8,15 +8,11 @@ While a recording is made, the samples so far are checked again each time that t
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Sequence
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.online.child_process import start_child
+from push_predictor.online.child_process import Child
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
@@ -24,7 +20,6 @@ from push_predictor.recordings.streams import Recording, joined
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.clock_set import set_back
 
-NICENESS = 5  # the samples come first; on a busy machine a lower priority would never be served
 PENDING = "not checked yet"
 FIRST = 1000  # samples of the slider's pose before the first check
 MOST = 50_000  # samples of a stream that are kept: 200 s at 250 Hz, 2 MB
@@ -39,15 +34,14 @@ class CheckProcess:
 
     def __init__(self, strict: bool = False) -> None:
         self._failing = ("refused", "warning") if strict else ("refused",)
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
+        self._child: Child | None = None
         self.findings: tuple[Finding, ...] = ()
         self.result, self.failure = PENDING, ""
 
     @property
     def busy(self) -> bool:
         """Whether a check runs."""
-        return self._process is not None
+        return self._child is not None
 
     @property
     def failed(self) -> bool:
@@ -61,20 +55,17 @@ class CheckProcess:
 
     def start(self, data: Recording | Path, rig: Rig | None, topics: Topics = Topics()) -> None:
         """Check a recording, or that of a path and its topics, if no check runs. rig: None for the recorded one."""
-        if self.busy:
-            return
-        self._connection, theirs = multiprocessing.Pipe()
-        self._process = start_child(_check, (theirs, data, rig, topics), "check")
-        theirs.close()
+        if not self.busy:
+            self._child = Child("check", _check, data, rig, topics)
 
     def work(self) -> None:
         """Take the result if it is there."""
-        if self._connection is None or not self._connection.poll():
-            return
         try:
-            reply: Sequence[Finding] | str = self._connection.recv()
+            reply = None if self._child is None else self._child.received()
         except (EOFError, OSError):
             reply = "the process of the check ended"
+        if reply is None:
+            return
         self.stop()
         if isinstance(reply, str):
             self.skip(reply)
@@ -89,16 +80,12 @@ class CheckProcess:
 
     def stop(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.terminate()
-            self._process.join()
-        if self._connection is not None:
-            self._connection.close()
-        self._process, self._connection = None, None
+        if self._child is not None:
+            self._child.stop()
+        self._child = None
 
 
-def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
-    os.nice(NICENESS)
+def _check(connection: Any, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.read import read_recording, require_rig
 

@@ -5,32 +5,58 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from multiprocessing.process import BaseProcess
+    from multiprocessing.connection import Connection
+
+NICENESS = 5  # samples and predictions come first; on a busy machine a lower priority would never be served
 
 
-def start_child(target: Callable[..., None], arguments: Sequence[Any], name: str) -> BaseProcess:
-    """Start a process that ends with this one and that no SIGINT reaches: the node ends it.
+class Child:
+    """A process that ends with this one and that no SIGINT reaches: the node ends it.
 
-    Ctrl-C reaches the whole process group. A child that is still importing would print a traceback.
+    work: called there with its end of a pipe and the arguments. Ctrl-C reaches the whole process group; a child that is
+    still importing would print a traceback.
     """
-    import multiprocessing
-    from multiprocessing import resource_tracker
 
-    context = multiprocessing.get_context("spawn")  # a fork would inherit the locks of the middleware's threads
-    process = context.Process(target=target, args=tuple(arguments), daemon=True, name=name)
-    resource_tracker.ensure_running()  # the start of its process would unblock the signal
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a child inherits it
-    try:
-        process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    return process
+    def __init__(self, name: str, work: Callable[..., None], *arguments: Any) -> None:
+        import multiprocessing
+        from multiprocessing import resource_tracker
+
+        self._pipe, theirs = multiprocessing.Pipe()
+        context = multiprocessing.get_context("spawn")  # a fork would inherit the locks of the middleware's threads
+        self.process = context.Process(target=_begin, args=(work, theirs, *arguments), daemon=True, name=name)
+        resource_tracker.ensure_running()  # the start of its process would unblock the signal
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a child inherits it
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        theirs.close()
+
+    def send(self, message: Any) -> None:
+        """Send a message. Raises OSError if the process has ended."""
+        self._pipe.send(message)
+
+    def received(self, patience: float = 0.0) -> Any:
+        """The next message, None if none comes within so many s. Raises EOFError or OSError if the process ended."""
+        return self._pipe.recv() if self._pipe.poll(patience) else None
+
+    def stop(self, at_once: bool = False) -> None:
+        """End the process; at_once: by SIGKILL."""
+        (self.process.kill if at_once else self.process.terminate)()
+        self.process.join()
+        self._pipe.close()
+
+
+def _begin(work: Callable[..., None], pipe: Connection, *arguments: Any) -> None:
+    os.nice(NICENESS)
+    work(pipe, *arguments)
 
 
 def kill_children() -> None:

@@ -6,32 +6,38 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
-from push_predictor.online.live_bag import LiveBag
-from push_predictor.online.recorder_findings import NANOSECOND, Findings
-from push_predictor.online.recorder_progress import Progress
+from push_predictor.errors import RecordingError
+from push_predictor.online.recorder_findings import Findings
+from push_predictor.online.recorder_progress import NANOSECOND, Progress
+from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.metadata import TopicInfo
-from push_predictor.recordings.decoder.sources import sources_of, topics_to_record
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.bag.writer import BagWriter
+from push_predictor.recordings.decoder.sources import POSES, sources_of, topics_to_record
+from push_predictor.recordings.rig import RECORD_NAME, Rig
+from push_predictor.recordings.topics import Topics, save_topics
 
 NO_RIG = "No rig. Give --rig FILE.yaml (of the node: the parameter rig), or publish it on topic rig."
 OTHER_RIG = "Topic rig now has another rig. The bag contains the first one."
 
 
 class LiveRecording:
-    """Writes messages into a bag, and finds windows in them.
+    """Writes messages into a bag and its topics next to it, and finds windows in the messages.
 
-    path, topics: see LiveBag; topics have full names. wanted: the topics to subscribe to. Times `now` are of one
-    monotonic clock, in s. with_wrench: whether its absence is a problem. Raises RecordingError if path exists and is no
-    bag.
+    path: a folder or FILE.mcap, which the first message creates or replaces; the bag grows under that name. topics:
+    with full names; wanted: those to subscribe to. Times `now` are of one monotonic clock, in s. with_wrench: whether
+    its absence is a problem. Raises RecordingError if path exists and is no bag.
     """
 
     def __init__(self, path: Path, topics: Topics, now: float, with_wrench: bool = True) -> None:
-        self.wanted = topics_to_record(topics, with_wrench)
+        self.topics, self.wanted = topics, topics_to_record(topics, with_wrench)
         self._texts = {source.text: source.topic for _, source in sources_of(topics)}
-        self._bag = LiveBag(path, topics)
+        self._writer, self._open = BagWriter(path, live=True), False
+        self.path = self._writer.path
+        self._declared: dict[str, tuple[TopicInfo, str]] = {}  # with the definition of the type, '' if it is unknown
+        self._messages: Counter[str] = Counter()
         self._findings = Findings(topics, now)
         self._rig: Rig | None = None
         self._first: int | None = None  # log times, ns
@@ -42,18 +48,27 @@ class LiveRecording:
 
     def type_of(self, topic: str) -> str:
         """The type with which a topic is recorded, '' as long as it is unknown."""
-        return self._bag.type_of(topic)
+        return self._declared[topic][0].type if topic in self._declared else ""
 
     def add_topic(self, topic: TopicInfo) -> None:
         """Declare the type and QoS of a topic, once."""
-        self.note(f"{topic.name} definition", self._bag.add_topic(topic))
-        self._findings.add_topic(topic.name, topic.type, self._bag.schemas[topic.type])
+        try:
+            schema, problem = definition_text(topic.type), ""
+        except (RecordingError, OSError, UnicodeDecodeError) as error:
+            schema, problem = "", f"{topic.name} is recorded without the definition of its type: {error}."
+        self.note(f"{topic.name} definition", problem)
+        self._declared[topic.name] = topic, schema
+        if self._open:
+            self._declare(topic, schema)
+            self._save_topics()
+        self._findings.add_topic(topic.name, topic.type, schema)
 
     def set_rig(self, rig: Rig) -> None:
         """Record the rig, and find windows with it. The first one counts; another one becomes a problem."""
         if self._rig is None:
             self._rig = rig
-            self._bag.set_rig(rig)
+            if self._open:
+                self._writer.add_metadata(RECORD_NAME, rig.to_record())
             self._findings.set_rig(rig)
         elif rig is not self._rig and rig.to_record() != self._rig.to_record():
             self.note("rig", OTHER_RIG)
@@ -73,7 +88,10 @@ class LiveRecording:
 
         Raises RecordingError that names the bag if it cannot be written.
         """
-        self._bag.write(topic, log_time, data)
+        if not self._open:
+            self._begin()
+        self._writer.write(topic, log_time, data)
+        self._messages[topic] += 1
         self._lost[topic] += lost
         self._first = log_time if self._first is None else min(self._first, log_time)
         self._last = max(self._last, log_time)
@@ -81,12 +99,15 @@ class LiveRecording:
 
     def work(self, now: float) -> None:
         """Hand what was written to the disk, and find windows. Call it once a second. Raises RecordingError."""
-        self._bag.flush()
+        if self._open:
+            self._writer.flush()
         self._findings.work(now)
 
     def close(self, now: float) -> Progress:
         """Complete the bag; returns the summary. Raises RecordingError that names the bag if it cannot be written."""
-        self._bag.close()
+        if self._open:
+            self._open = False
+            self._writer.__exit__(None, None, None)
         self._findings.work(now, last=True)
         return self.progress(now, ended=True)
 
@@ -99,15 +120,46 @@ class LiveRecording:
         """The figures of this moment; after the end only a stream without any message is called silent."""
         found, rig = self._findings, self._rig is not None
         return Progress(
-            path=str(self._bag.path),
+            path=str(self.path),
             seconds=self.seconds,
-            messages={topic.name: self._bag.messages[topic.name] for topic in self.wanted},
-            streams=found.figures,
+            messages={topic.name: self._messages[topic.name] for topic in self.wanted},
+            streams=found.paces,
             windows=found.windows if rig else None,
             pushes=found.pushes,
             contact=found.contact,
             problems=self._problems(now, ended),
         )
+
+    def _begin(self) -> None:
+        self._writer.__enter__()
+        self._open = True
+        if self._rig is not None:
+            self._writer.add_metadata(RECORD_NAME, self._rig.to_record())
+        for topic, schema in self._declared.values():
+            self._declare(topic, schema)
+        self._save_topics()
+
+    def _declare(self, topic: TopicInfo, schema: str) -> None:
+        self._writer.add_topic(
+            topic.name,
+            topic.type,
+            schema,
+            type_hash=topic.type_hash,
+            depth=topic.depth,
+            durability=topic.durability,
+            reliability=topic.reliability,
+        )
+
+    def _save_topics(self) -> None:
+        """Save the topics of slider and pusher, and of the other streams that are in the bag."""
+        topics = self.topics
+        present = [s.text for name, s in sources_of(topics) if name in POSES or s.topic in self._declared]
+        wrench = topics.wrench if topics.wrench in present else ""
+        covariates = tuple(text for text in topics.covariates if text in present)
+        try:
+            save_topics(self.path, replace(topics, wrench=wrench, covariates=covariates))
+        except OSError as error:
+            raise RecordingError(f"{error.filename}: cannot be written ({error.strerror})") from None
 
     def _problems(self, now: float, ended: bool) -> dict[str, str]:
         found = {} if self._rig is not None else {"rig": NO_RIG}
@@ -121,7 +173,7 @@ class LiveRecording:
 
     def _silent(self, now: float) -> dict[str, str]:
         """The topics without publisher and the streams without messages, except those that nobody expects."""
-        heard = self._bag.messages
+        heard = self._messages
         missed = {t.name for t in self.wanted if (t.expected or heard[t.name]) and not t.static}
         found = {topic: f"No publisher of {topic}." for topic in sorted(missed & self._unpublished)}
         known = found.keys() | self._noted.keys()
@@ -132,6 +184,6 @@ class LiveRecording:
 
     def _never_heard(self) -> dict[str, str]:
         """The expected topics without any message."""
-        silent = [t.name for t in self.wanted if t.expected and not self._bag.messages[t.name]]
+        silent = [t.name for t in self.wanted if t.expected and not self._messages[t.name]]
         why = {topic: "No publisher of" if topic in self._unpublished else "No message on" for topic in silent}
         return {topic: f"{why[topic]} {topic}." for topic in silent if topic not in self._noted}

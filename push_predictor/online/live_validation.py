@@ -7,29 +7,26 @@ from __future__ import annotations
 
 import json
 import re
-import struct
 from array import array
-from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from hashlib import blake2b
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple, overload
+from typing import NamedTuple, TypeAlias, overload
 
 import numpy as np
 
-from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, standardised
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.tails import Tails, half_widths
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.window_log import Refusal, write_window_log
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array, BoolArray, IntArray
 
 MAIN_RESULT = "validation.json"
-_FIXED = struct.Struct("<3q14d2H")  # the last two: number of the covariates' names, length of the push's id
+_Row: TypeAlias = tuple[str, int, int, int, tuple[str, ...], bytes]  # names of covariates; all other numbers
 
 
 class Residual(NamedTuple):
@@ -40,6 +37,15 @@ class Residual(NamedTuple):
     mean: Array
     covariance: Array
     in_domain: bool
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A window that the server refused to predict, and its reason."""
+
+    push_id: str
+    window: int
+    reason: str
 
 
 class LiveValidation:
@@ -114,23 +120,24 @@ class LiveValidation:
 
 
 class WindowRows(Sequence[PushWindow]):
-    """Windows packed into some 200 bytes each, so that those of a day fit into memory; indexing creates them again."""
+    """Windows packed into some 400 bytes each, so that those of a day fit into memory; indexing creates them again."""
 
     def __init__(self) -> None:
-        self._rows: list[bytes] = []
-        self._names: list[tuple[str, ...]] = []  # of the covariates, as sets of them occurred
+        self._rows: list[_Row] = []
+        self._names: dict[tuple[str, ...], tuple[str, ...]] = {}  # of the covariates: one object for equal ones
 
     def append(self, window: PushWindow) -> None:
         """Append a window."""
-        names = tuple(window.covariates)
-        if names not in self._names:
-            self._names.append(names)
-        self._rows.append(_packed(window, self._names.index(names)))
+        w, names = window, tuple(window.covariates)
+        numbers = [w.velocity, w.contact, w.angle, w.duration, w.push_heading]
+        numbers += [*w.displacement, *w.slider_start, *w.slider_end, *w.covariates.values()]
+        known = self._names.setdefault(names, names)
+        self._rows.append((w.push_id, w.index, w.start, w.end, known, array("d", numbers).tobytes()))
 
     def take(self, numbers: Iterable[int]) -> WindowRows:
         """Some of the windows, in the order of the numbers."""
         chosen = WindowRows()
-        chosen._rows, chosen._names = [self._rows[number] for number in numbers], self._names.copy()
+        chosen._rows = [self._rows[number] for number in numbers]
         return chosen
 
     def __len__(self) -> int:
@@ -143,7 +150,13 @@ class WindowRows(Sequence[PushWindow]):
     def __getitem__(self, number: int | slice) -> PushWindow | WindowRows:
         if isinstance(number, slice):
             return self.take(range(*number.indices(len(self))))
-        return _unpacked(self._rows[number], self._names)
+        push_id, index, start, end, names, packed = self._rows[number]
+        numbers = array("d", packed)
+        velocity, contact, angle, duration, heading = numbers[:5]
+        poses = np.array(numbers[5:14]).reshape(3, 3)
+        covariates = dict(zip(names, numbers[14:], strict=True))
+        push = (velocity, contact, angle, duration)
+        return PushWindow(push_id, index, start, end, *push, poses[0], poses[1], poses[2], heading, covariates)
 
 
 class _Answers:
@@ -167,34 +180,6 @@ class _Answers:
         return numbers[order], values[:, :3], values[:, 3:12].reshape(-1, 3, 3), values[:, 12] > 0.0
 
 
-def _packed(w: PushWindow, names: int) -> bytes:
-    poses, push = (*w.displacement, *w.slider_start, *w.slider_end), w.push_id.encode()
-    numbers = (w.velocity, w.contact, w.angle, w.duration, *poses, w.push_heading)
-    fixed = _FIXED.pack(w.index, w.start, w.end, *numbers, names, len(push))
-    return fixed + push + struct.pack(f"<{len(w.covariates)}d", *w.covariates.values())
-
-
-def _unpacked(data: bytes, known: Sequence[tuple[str, ...]]) -> PushWindow:
-    index, start, end, velocity, contact, angle, duration, *poses, heading, number, length = _FIXED.unpack_from(data)
-    displacement, slider_start, slider_end = np.array(poses).reshape(3, 3)
-    names, rest = known[number], _FIXED.size + length
-    return PushWindow(
-        data[_FIXED.size : rest].decode(),
-        index,
-        start,
-        end,
-        velocity,
-        contact,
-        angle,
-        duration,
-        displacement,
-        slider_start,
-        slider_end,
-        heading,
-        dict(zip(names, struct.unpack_from(f"<{len(names)}d", data, rest), strict=True)),
-    )
-
-
 def _file_name(name: str) -> str:
     """A model's name as part of a file name: a server may give its models any name."""
     return re.sub(r"[^\w.-]", "_", name)
@@ -210,7 +195,7 @@ class RunningScore:
         self.windows = 0
         self._training_mean = training_mean
         self._half_widths = [half_widths(tails, level) for level in COVERAGE_LEVELS]
-        self._pushes = array("q")  # digests of their names, in order: a set would take ten times as much
+        self._pushes: set[str] = set()
         self._error, self._spread, self._nlpd = np.zeros(3), np.zeros(3), np.zeros(3)
         self._covered = np.zeros((len(COVERAGE_LEVELS), 3))
 
@@ -223,17 +208,11 @@ class RunningScore:
         """Add a window: predicted mean (3,) and covariance (3, 3), observed outcome (3,)."""
         predicted, variance, outcome = mean[None], np.diagonal(covariance)[None], observed[None]
         self.windows += 1
-        self._count_push(push_id)
+        self._pushes.add(push_id)
         self._error += (observed - mean) ** 2
         self._spread += (observed - self._training_mean) ** 2
         self._nlpd += gaussian_nlpd(predicted, variance, outcome)[0]
         self._covered += [coverage(predicted, variance, outcome, half) for half in self._half_widths]
-
-    def _count_push(self, push_id: str) -> None:
-        digest = int.from_bytes(blake2b(push_id.encode(), digest_size=8).digest(), "little", signed=True)
-        place = bisect_left(self._pushes, digest)
-        if place == len(self._pushes) or self._pushes[place] != digest:
-            self._pushes.insert(place, digest)
 
     def values(self) -> dict[str, int | float | None]:
         """The totals of `metrics_json` and the coverage of each output, by name; None where undefined."""
@@ -245,3 +224,49 @@ class RunningScore:
             shares = (float(c) / self.windows if self.windows else None for c in covered)
             found |= {f"coverage {level} {name}": share for name, share in zip(OUTPUTS, shares, strict=True)}
         return found
+
+
+def write_window_log(
+    path: Path,
+    windows: Sequence[PushWindow],
+    comparison: Comparison,
+    refused: Sequence[Refusal] = (),
+    unanswered: int = 0,
+) -> None:
+    """Write {"model", "windows", "refused", "unanswered"}; an older file is replaced when the new one is complete.
+
+    windows: one for each row of the comparison. refused: further windows. unanswered: how many more there were.
+    Raises OSError that names the path.
+    """
+    write_whole(path, (line.encode() for line in _lines(windows, comparison, refused, unanswered)))
+
+
+def _lines(
+    windows: Sequence[PushWindow], comparison: Comparison, refused: Sequence[Refusal], unanswered: int
+) -> Iterator[str]:
+    """The text entry by entry: as one string a day's windows would take a gigabyte."""
+    yield f'{{"model": {json.dumps(comparison.model)}, "windows": ['
+    for k, entry in enumerate(window_log(windows, comparison)):
+        yield ("," if k else "") + "\n" + json.dumps(entry, allow_nan=False)
+    rest = json.dumps([asdict(refusal) for refusal in refused])
+    yield f'],\n"refused": {rest}, "unanswered": {unanswered}}}\n'
+
+
+def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> Iterator[dict[str, object]]:
+    """One entry for each window, in the fields and units of PushResidual; stamps in ns."""
+    z = standardised(comparison.mean, comparison.covariance, comparison.observed)
+    for k, window in enumerate(windows):
+        yield {
+            "push_id": window.push_id,
+            "window": window.index,
+            "start": window.start,
+            "end": window.end,
+            "velocity": window.velocity,
+            "contact": window.contact,
+            "angle": window.angle,
+            "duration": window.duration,
+            "predicted": comparison.mean[k].tolist(),
+            "covariance": comparison.covariance[k].ravel().tolist(),
+            "observed": comparison.observed[k].tolist(),
+            "standardised": z[k].tolist(),
+        }

@@ -10,27 +10,23 @@ from collections import deque
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.online.recorder_progress import StreamFigures
+from push_predictor.online.recorder_progress import Pace
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STREAMS, sources_of
-from push_predictor.recordings.fields.sources import Source
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.types import IntArray
 
 EARLY = 30  # portions that wait for the rig and for the first sample of slider and pusher
-SILENCE = 3.0  # s without a sample after which a stream is called silent
-SILENT_PERIODS = 4.0  # mean periods; a stream slower than once in a second may be silent for longer
-NANOSECOND = 1e-9
 
 
 class Findings:
     """Takes messages as they are recorded.
 
-    topics: with full names; now: the time (s) from which on messages are expected; windows: number of them so far.
+    topics: with full names; now: the time (s) from which on messages are expected; windows: number of them so far;
+    paces: of all streams, also of one without samples.
     """
 
     def __init__(self, topics: Topics, now: float) -> None:
@@ -39,7 +35,10 @@ class Findings:
         self._refused: dict[str, str] = {}
         self._types: dict[str, str] = {}
         self._waiting: dict[str, tuple[list[int], list[bytes]]] = {}
-        self._paces = [(name, source, Pace(now)) for name, source in sources_of(topics)]
+        self.paces = tuple(
+            Pace(now, source.text if name == COVARIATE else name, source.text, source.topic)
+            for name, source in sources_of(topics)
+        )
         self._finder: WindowFinder | None = None
         self._early: deque[Samples] = deque(maxlen=EARLY)
         self._pushes: set[str] = set()
@@ -77,9 +76,9 @@ class Findings:
         self._waiting = {}
         samples = self._decoder.take(last)
         stamps = {"slider": samples.slider.stamp, "pusher": samples.pusher.stamp, "wrench": samples.wrench.stamp}
-        for name, source, pace in self._paces:
-            of_topic = logged.get(source.topic, np.empty(0, np.int64))
-            pace.add(of_topic if name == COVARIATE else stamps[name], now)
+        for pace in self.paces:
+            of_topic = logged.get(pace.topic, np.empty(0, np.int64))
+            pace.add(stamps.get(pace.name, of_topic), now)
         self._early.append(samples)
         if self._finder is not None:
             self._feed(self._finder)
@@ -94,14 +93,6 @@ class Findings:
     def contact(self) -> float | None:
         """Share of the slider's samples in which the tip touches it, None before the first and without a rig."""
         return None if self._finder is None else self._finder.contact_share
-
-    @property
-    def figures(self) -> tuple[StreamFigures, ...]:
-        """The figures of all streams; one without samples is included."""
-        return tuple(
-            StreamFigures(_label(name, source), source.text, pace.samples, pace.rate, pace.largest_gap)
-            for name, source, pace in self._paces
-        )
 
     @property
     def problems(self) -> dict[str, str]:
@@ -120,12 +111,12 @@ class Findings:
 
     def silent(self, now: float) -> dict[str, float]:
         """{stream as it was named: for how long (s)} of those that are silent."""
-        found = {source.text: pace.silent(now) for _, source, pace in self._paces}
+        found = {pace.source: pace.silent(now) for pace in self.paces}
         return {text: quiet for text, quiet in found.items() if quiet}
 
     def _feed(self, finder: WindowFinder) -> None:
         """Hand the samples to the finder once slider and pusher have been seen; until then it would keep them all."""
-        if not all(pace.samples for name, _, pace in self._paces if name in POSES):
+        if not all(pace.samples for pace in self.paces if pace.name in POSES):
             return
         while self._early:
             samples = self._early.popleft()
@@ -136,43 +127,3 @@ class Findings:
     def _count(self, windows: list[PushWindow]) -> None:
         self.windows += len(windows)
         self._pushes.update(window.push_id for window in windows)
-
-
-def _label(name: str, source: Source) -> str:
-    return source.text if name == COVARIATE else name
-
-
-class Pace:
-    """Number, rate and largest gap of a stream's samples. since: time (s) from which on samples are expected.
-
-    largest_gap: s, between two consecutive stamps.
-    """
-
-    def __init__(self, since: float) -> None:
-        self.samples = 0
-        self.largest_gap = 0.0
-        self._first = self._last = 0  # ns
-        self._heard = since
-
-    def add(self, stamp: IntArray, now: float) -> None:
-        """Add samples with stamps (n,) in ns that arrived by now (s); now is of the clock of `since`."""
-        if not len(stamp):
-            return
-        if not self.samples:
-            self._first = self._last = int(stamp[0])
-        gaps = np.diff(stamp, prepend=self._last) * NANOSECOND
-        self.largest_gap = max(self.largest_gap, float(gaps.max()))
-        self.samples += len(stamp)
-        self._last, self._heard = int(stamp[-1]), now
-
-    @property
-    def rate(self) -> float:
-        """Samples per second, 0 for fewer than two."""
-        span = (self._last - self._first) * NANOSECOND
-        return (self.samples - 1) / span if span > 0.0 else 0.0
-
-    def silent(self, now: float) -> float:
-        """For how long (s) there has been no sample; 0 while that is not unusual."""
-        period = 1.0 / self.rate if self.rate else 0.0
-        quiet = now - self._heard
-        return quiet if quiet >= max(SILENCE, SILENT_PERIODS * period) else 0.0

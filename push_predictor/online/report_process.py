@@ -8,7 +8,6 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Mapping
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.offline import report_windows
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.child_process import start_child
+from push_predictor.online.child_process import Child
 from push_predictor.online.live_validation import LiveValidation, WindowRows
 
 
@@ -25,17 +24,17 @@ class ReportWriter:
     """Writes one report at a time."""
 
     def __init__(self) -> None:
-        self._process: BaseProcess | None = None
+        self._child: Child | None = None
 
     @property
     def busy(self) -> bool:
         """Whether a report is being written."""
-        return self._process is not None and self._process.is_alive()
+        return self._child is not None and self._child.process.is_alive()
 
     @property
     def failed(self) -> bool:
         """Whether the last report failed."""
-        return self._process is not None and self._process.exitcode not in (None, 0)
+        return self._child is not None and self._child.process.exitcode not in (None, 0)
 
     def start(self, validation: LiveValidation, folder: Path, alarm: Mapping[str, object] | None = None) -> None:
         """Write FOLDER/report.html about the models that have predicted the same windows as the main one.
@@ -46,16 +45,16 @@ class ReportWriter:
         comparisons = [validation.comparison(k) for k in range(len(validation.models))]
         whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
         models, shown = [validation.models[k] for k in whole], [comparisons[k] for k in whole]
-        self._process = start_child(_write, (models, validation.predicted(), shown, folder, alarm), "report")
+        self._child = Child("report", _write, models, validation.predicted(), shown, folder, alarm)
 
     def stop(self) -> None:
         """End a report that is being written; its unfinished files are removed."""
-        if self._process is not None and self._process.is_alive():
-            self._process.terminate()
-            self._process.join()
+        if self._child is not None and self.busy:
+            self._child.stop()
 
 
 def _write(
+    pipe: object,
     models: list[PushModel],
     windows: WindowRows,
     comparisons: list[Comparison],

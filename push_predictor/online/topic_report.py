@@ -17,24 +17,10 @@ SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another c
 
 
 @dataclass(frozen=True)
-class StampFigures:
-    """Of recent messages: rate in Hz; jitter: standard deviation of a stamp, s; latency from stamp to receipt, s.
-
-    latency is None if it is not known, and other_clock is set if the stamps are of another clock than that of this
-    machine, as in a replay.
-    """
-
-    rate: float
-    jitter: float
-    latency: float | None = None
-    other_clock: bool = False
-
-
-@dataclass(frozen=True)
 class TopicReport:
     """What is known of a topic. stream: slider, pusher or wrench; kind: the message type; reliability: '' without one.
 
-    refused: whether the topic cannot be used as it is. figures: None before enough messages came.
+    refused: whether the topic cannot be used as it is. figures: in words, empty before enough messages came.
     """
 
     stream: str
@@ -42,7 +28,7 @@ class TopicReport:
     kind: str
     reliability: str
     frames: tuple[str, ...] = ()
-    figures: StampFigures | None = None
+    figures: str = ""
     problem: str = ""
     refused: bool = False
     note: str = ""
@@ -50,33 +36,32 @@ class TopicReport:
     @property
     def key(self) -> tuple[object, ...]:
         """What has to change for the line to be logged again: not its figures."""
-        return self.topic, self.kind, self.reliability, self.frames, self.problem, self.note, self.figures is None
+        return self.topic, self.kind, self.reliability, self.frames, self.problem, self.note, bool(self.figures)
 
     @property
     def line(self) -> str:
         """The report in one line."""
         parts = [self.topic, self.kind, self.reliability]
         parts += [f"frame_id {' and '.join(map(repr, self.frames))}"] if self.frames else []
-        if self.figures is not None:
-            parts += [f"{self.figures.rate:.1f} Hz", f"stamp jitter {1e3 * self.figures.jitter:.2g} ms"]
-            parts += [_latency(self.figures)]
-        text = f"{self.stream}: {', '.join(filter(None, parts))}"
+        text = f"{self.stream}: {', '.join(filter(None, [*parts, self.figures]))}"
         return " ".join([f"{text}.", *filter(None, (self.problem, self.note))])
 
 
-def stamp_figures(stamp: IntArray, received: IntArray | None) -> StampFigures | None:
-    """The figures of stamps (n,) and times of receipt (n,) in ns of messages, in order; None for too few.
+def stamp_figures(stamp: IntArray, received: IntArray | None) -> str:
+    """Rate, jitter (standard deviation of a stamp) and latency of messages, in words; empty for too few.
 
-    received: None if it is not known.
+    stamp (n,), received (n,): in ns, in order; received: None if it is not known. A great latency means that the stamps
+    are of another clock than that of this machine, as in a replay.
     """
     if (noise := stamp_noise(stamp)) is None:
-        return None
-    rate, jitter = 1.0 / noise.period, noise.jitter
+        return ""
+    found = f"{1.0 / noise.period:.1f} Hz, stamp jitter {1e3 * noise.jitter:.2g} ms"
     if received is None:
-        return StampFigures(rate, jitter)
+        return found
     latency = 1e-9 * float(np.median(received - stamp))
-    other = abs(latency) > SAME_CLOCK
-    return StampFigures(rate, jitter, None if other else latency, other)
+    return f"{found}, " + (
+        "stamps of another clock" if abs(latency) > SAME_CLOCK else f"latency {1e3 * latency:.2g} ms"
+    )
 
 
 class ReportLog:
@@ -99,9 +84,3 @@ class ReportLog:
                 self._logged[report.stream] = report.key
                 found.append(report)
         return found
-
-
-def _latency(figures: StampFigures) -> str:
-    if figures.other_clock:
-        return "stamps of another clock"
-    return "" if figures.latency is None else f"latency {1e3 * figures.latency:.2g} ms"

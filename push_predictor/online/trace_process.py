@@ -9,7 +9,6 @@ It reports to the node through a pipe. When the node has died, it ends and delet
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,20 +17,17 @@ from typing import TYPE_CHECKING
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
-from push_predictor.online.child_process import start_child
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import HOW_TO_GIVE
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
-    from multiprocessing.process import BaseProcess
 
     from push_predictor.residuals.outcome import Trace
 
 REPORT, VERDICT, EXTENDED = "trace.html", "trace.json", "extended.pushmodel"
 RESULTS = (EXTENDED, REPORT, VERDICT)
 COPIES = "evidence"
-NICENESS = 5  # a trace must not delay predictions
 NOT_TRACED = ("residuals",)  # a validator's bag of push_residual contains no sensor streams
 
 
@@ -71,14 +67,14 @@ class Failed:
     code: ErrorCode
 
 
-def start_trace(task: TraceTask) -> tuple[BaseProcess, Connection]:
-    """Start the process. Its pipe delivers Stage messages, then Traced or Failed."""
-    import multiprocessing
-
-    receiver, sender = multiprocessing.Pipe(duplex=False)
-    process = start_child(_run, (sender, task), "trace")
-    sender.close()
-    return process, receiver
+def run_trace(connection: Connection, task: TraceTask) -> None:
+    """Send Stage messages, then Traced or Failed; a Child runs this."""
+    try:
+        connection.send(_traced(connection, task))
+    except (BrokenPipeError, ConnectionResetError):
+        shutil.rmtree(task.folder, ignore_errors=True)  # the node has died and cannot do it
+    except (PushPredictorError, OSError) as error:
+        connection.send(Failed(_for_client(str(error), task), error_code(error)))
 
 
 def evidence_in(folder: Path) -> tuple[Path, ...]:
@@ -101,16 +97,6 @@ def _is_bag(path: Path) -> bool:
     from push_predictor.recordings.bag.metadata import METADATA_FILE
 
     return (path / METADATA_FILE).is_file() and path.name not in NOT_TRACED
-
-
-def _run(connection: Connection, task: TraceTask) -> None:
-    os.nice(NICENESS)
-    try:
-        connection.send(_traced(connection, task))
-    except (BrokenPipeError, ConnectionResetError):
-        shutil.rmtree(task.folder, ignore_errors=True)  # the node has died and cannot do it
-    except (PushPredictorError, OSError) as error:
-        connection.send(Failed(_for_client(str(error), task), error_code(error)))
 
 
 def _for_client(text: str, task: TraceTask) -> str:

@@ -7,27 +7,13 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Protocol
 
 SECOND = 1_000_000_000
 COARSE = 20_000_000  # ns: a longer sleep waits on a condition that a control notifies; the rest is one plain sleep
 
 
-class SteadyClock(Protocol):
-    """Wall time, ns; tests replace it by a fake."""
-
-    def now(self) -> int:
-        """Steady time, ns."""
-
-    def sleep(self, duration: int) -> None:
-        """Sleep for so many ns."""
-
-    def wait(self, condition: threading.Condition, duration: int | None) -> None:
-        """Wait on a locked condition, at most so many ns."""
-
-
 class SystemClock:
-    """The machine's steady clock, the one of perf_counter."""
+    """The machine's steady clock, the one of perf_counter; tests replace it by a fake."""
 
     def now(self) -> int:
         """Steady time, ns."""
@@ -50,7 +36,7 @@ class PlayerClock:
     and any later control wakes it.
     """
 
-    def __init__(self, wall: SteadyClock, rate: float = 1.0, paused: bool = False) -> None:
+    def __init__(self, wall: SystemClock, rate: float = 1.0, paused: bool = False) -> None:
         self._wall = wall
         self._rate = rate
         self._paused = paused

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.clock import PlayerClock, SteadyClock
+from push_predictor.replay.clock import PlayerClock, SystemClock
 from push_predictor.replay.report import Lateness
-from push_predictor.replay.source import MessageSource, ReadAhead
+from push_predictor.replay.source import BagSource, ReadAhead
 
 _READING = 300_000  # ns: nothing is read ahead in less time than this before a deadline
 
@@ -65,9 +65,9 @@ class ReplayPlayer:
 
     def __init__(
         self,
-        source: MessageSource,
+        source: BagSource,
         clock: PlayerClock,
-        wall: SteadyClock,
+        wall: SystemClock,
         output: PlayerOutput,
         window: int,
         loop: bool,

@@ -7,23 +7,11 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Collection, Iterator
-from typing import Protocol
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import Bag, RawMessage
 from push_predictor.recordings.decoder.sources import POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.topics import Topics
-
-
-class MessageSource(Protocol):
-    """Messages to play."""
-
-    @property
-    def start(self) -> int:
-        """Log time of the first message, ns."""
-
-    def messages(self, start: int) -> Iterator[RawMessage]:
-        """Messages with a log time of at least start, roughly in order."""
 
 
 class BagSource:

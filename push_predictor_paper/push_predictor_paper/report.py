@@ -10,7 +10,7 @@ import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy
@@ -18,6 +18,7 @@ import scipy
 from push_predictor import __version__
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
+from push_predictor.watch import Watch, no_watch
 from push_predictor_paper.claims import data
 from push_predictor_paper.claims.calibration import section as calibration
 from push_predictor_paper.claims.comparison import mean_gain, speed_error
@@ -74,15 +75,8 @@ COUNTS = "Number of verdicts. Each claim and its number are in the tables below.
 Files = Mapping[str, Sequence[Mapping[str, str]]]
 
 
-class Stages(Protocol):
-    """Shows which part of the report is being computed."""
-
-    def stage(self, number: int, of: int, title: str) -> None:
-        """Show that part `number` of `of` begins."""
-
-
 def report_paper(
-    plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None, stages: Stages
+    plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None, watch: Watch = no_watch
 ) -> tuple[Path, dict[str, Any]]:
     """Compute all claims; write out/paper.html, out/paper.json and out/tables. Returns the page and the JSON's content.
 
@@ -90,11 +84,17 @@ def report_paper(
     """
     out.mkdir(parents=True, exist_ok=True)
     begun, count = time.monotonic(), len(CLAIMS) + 1
-    stages.stage(1, count, "recordings")
+
+    def begin(number: int, title: str) -> None:
+        stage = f"{number}/{count} {title}"
+        work.watch = lambda doing, done: watch(f"{stage}: {doing}", (number - 1 + done) / count)
+        watch(stage, (number - 1) / count)
+
+    begin(1, "recordings")
     study = gather(plan, work, out, measured, keep)
     sections = []
     for number, (title, section) in enumerate(CLAIMS.items(), 2):
-        stages.stage(number, count, title)
+        begin(number, title)
         sections.append(section(study))
     content, files = _content(plan, sections, time.monotonic() - begun), write_tables(out, sections)
     write_whole(out / "paper.json", (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())

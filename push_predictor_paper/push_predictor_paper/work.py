@@ -17,13 +17,14 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import FrameType
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import joblib
 import numpy as np
 import scipy
 
 import push_predictor
+from push_predictor.watch import Watch, no_watch
 
 Result = TypeVar("Result")
 LOOKS = (  # modules that change how results look, not what they are
@@ -45,32 +46,23 @@ NO_RESULTS = (  # folders on which no cached result depends
 )
 
 
-class Watch(Protocol):
-    """Shows the progress of the work."""
-
-    def begin(self, doing: str, count: int) -> None:
-        """Show that a batch of `count` calls begins."""
-
-    def advance(self) -> None:
-        """Show that one call of the batch is done."""
-
-
 class Work:
     """A cache of calls, and the processes that fill it. A call made before, also by another process, is read from disk.
 
-    folder: of the cache; cores: calls at the same time, -1 for one per core. With `joblib.parallel_config` another back
-    end (dask, say) runs the calls; its workers must see the folder.
+    folder: of the cache; cores: calls at the same time, -1 for one per core. watch: sees each call. With
+    `joblib.parallel_config` another back end (dask, say) runs the calls; its workers must see the folder.
     """
 
-    def __init__(self, folder: Path, cores: int = -1, watch: Watch | None = None) -> None:
-        self._cores, self._watch = cores, watch
+    def __init__(self, folder: Path, cores: int = -1) -> None:
+        self._cores = cores
+        self.watch: Watch = no_watch
         self.folder = folder / fingerprint()
         self._memory = joblib.Memory(self.folder, verbose=0)
 
     def run(self, doing: str, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> list[Result]:
         """Results of function(*arguments) for each call, in order. The function is one at the top of a module."""
-        if self._watch is not None:
-            self._watch.begin(doing, len(calls))
+        count = len(calls)
+        self.watch(f"{doing} 0 of {count}", 0.0)
         kept = self._memory.cache(function)
         parallel = joblib.Parallel(n_jobs=self._cores, return_as="generator_unordered", batch_size=1)
         results: dict[int, Result] = {}
@@ -78,11 +70,10 @@ class Work:
         with _interruption() as interrupted:
             for i, result in parallel(pieces):
                 results[i] = result
-                if self._watch is not None:
-                    self._watch.advance()
+                self.watch(f"{doing} {len(results)} of {count}", len(results) / count)
                 if interrupted:
                     raise KeyboardInterrupt
-        return [results[i] for i in range(len(calls))]
+        return [results[i] for i in range(count)]
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from repository import REPOSITORY
 
 from push_predictor.cli import main
 from push_predictor.commands.common import progress as module
-from push_predictor.commands.common.progress import Course, JobProgress, progress
+from push_predictor.commands.common.progress import Course, progress
 from push_predictor.errors import RequestError
 from push_predictor.watch import Watch, part_of, watched
 
@@ -62,23 +62,6 @@ def test_no_time_left_is_shown_of_a_start(monkeypatch: pytest.MonkeyPatch) -> No
     clock[0] = 110.0
     course.watch("first file", 0.01)
     assert course.text(110.0) == "10 s, 1 %, first file"
-
-
-def test_stages_with_batches_of_jobs_give_one_fraction() -> None:
-    seen: list[tuple[str, float]] = []
-    jobs = JobProgress(lambda stage, fraction: seen.append((stage, fraction)))
-    jobs.stage(1, 2, "recordings")
-    jobs.begin("simulate", 2)
-    jobs.advance()
-    jobs.advance()
-    jobs.stage(2, 2, "noise")
-    assert seen == [
-        ("1/2 recordings", 0.0),
-        ("1/2 recordings: simulate 0 of 2", 0.0),
-        ("1/2 recordings: simulate 1 of 2", 0.25),
-        ("1/2 recordings: simulate 2 of 2", 0.5),
-        ("2/2 noise", 0.5),
-    ]
 
 
 def test_items_in_turn_report_their_share_of_a_part_of_the_work() -> None:

@@ -223,13 +223,12 @@ def test_a_trace_reports_which_result_could_not_be_written(
     monkeypatch.setattr(
         "push_predictor.residuals.trace.trace_data", lambda *_, **__: made_up_trace(slippery(0.1), count=30)
     )
-    monkeypatch.setattr(trace_process.os, "nice", lambda _: None)
     place = tmp_path / "result" / ".trace-x"
     place.mkdir(parents=True)
     task = trace_process.TraceTask((tmp_path / "bag",), tmp_path / "m", (), 0.01, place)
     pipe = Pipe()
     with full_disk():
-        trace_process._run(pipe, task)  # type: ignore[arg-type]  # a pipe that records what it sends
+        trace_process.run_trace(pipe, task)  # type: ignore[arg-type]  # a pipe that records what it sends
     reason = f"[Errno 27] File too large: '{tmp_path}/result/trace.json'"
     assert pipe.sent[-1] == trace_process.Failed(reason, ErrorCode.INVALID_FILE)
     assert not list(place.iterdir())

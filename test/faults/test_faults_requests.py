@@ -34,20 +34,17 @@ from push_predictor.models.request import FARTHEST, PushRequest, check_request, 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import recorder_parameters
+from push_predictor.nodes import parameter_tables
 from push_predictor.nodes.parameters import Param, declare
-from push_predictor.nodes.replay import parameters as replay_parameters
-from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.server.services import handle_predict_push, handle_predict_push_batch
-from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes
 
 NAN, INF = math.nan, math.inf
 TABLES = {
-    "predict_server": server_parameters.PARAMETERS,
-    "push_validator": validator_parameters.PARAMETERS,
-    "push_recorder": recorder_parameters.PARAMETERS,
-    "push_replay": replay_parameters.PARAMETERS,
+    "predict_server": parameter_tables.PREDICT_SERVER,
+    "push_validator": parameter_tables.PUSH_VALIDATOR,
+    "push_recorder": parameter_tables.PUSH_RECORDER,
+    "push_replay": parameter_tables.PUSH_REPLAY,
 }
 
 

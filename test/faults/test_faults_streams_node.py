@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from synthetic import START, Push, rows, square_pushes, square_rig, translating_push, wrench_rows
 from validator_bench import Status, hosting_validator
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.online import stream_sync

@@ -15,7 +15,7 @@ from scipy.stats import chi2, f, norm, t
 from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
-from msg_adapters.markers import CHI2_95_OF_TWO, MAGNIFICATION, NORMAL_95, magnified_markers
+from msg_adapters.markers import CHI2_95_OF_TWO, MAGNIFICATION, NORMAL_95, Sheet, magnified_markers
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import displaced
@@ -165,8 +165,8 @@ def test_rotating_the_world_rotates_everything_but_the_label():
 
 def test_an_unknown_heading_fills_the_dial_once():
     wide = np.diag([1e-8, 1e-8, 9.0])
-    array = magnified_markers(np.zeros(3), wide, np.array([0.0, 0.0, 6.2]), 0.06, 0.0, "world", 0)
-    band = next(points(marker) for marker in array.markers if marker.ns == "magnified_heading")
+    array = magnified_markers(Sheet("world", 0), np.zeros(3), wide, np.array([0.0, 0.0, 6.2]), 0.06, 0.0)
+    band = next(points(marker) for marker in array if marker.ns == "magnified_heading")
     swept = np.unwrap(np.arctan2(band[:49, 1], band[:49, 0]))
     assert swept[-1] - swept[0] == pytest.approx(2 * np.pi)
 

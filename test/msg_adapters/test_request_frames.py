@@ -26,14 +26,14 @@ from std_msgs.msg import Header
 from synthetic import square_pushes
 
 from msg_adapters import MessageError
-from msg_adapters.slider_poses import FLAT, fill_slider_response, query_from_slider_request, world_push
+from msg_adapters.slider_poses import FLAT, fill_slider_response, world_push, world_slider
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.services import RequestFrames, handle_predict_slider_pose
-from push_predictor.planning.slider_pose import SliderAfter, slider_after
+from push_predictor.planning.slider_pose import SliderAfter, WorldPush, slider_after
 from push_predictor_interfaces.srv import PredictSliderPose
 
 COVARIANCE = np.array([[4e-8, 1e-8, 3e-7], [1e-8, 1e-8, 2e-7], [3e-7, 2e-7, 3e-5]])
@@ -67,8 +67,12 @@ def slider_request(frame_id: str = "world", **change: Any) -> PredictSliderPose.
 
 def seen_from(frame: SpatialPose, request: PredictSliderPose.Request, frame_id: str) -> PredictSliderPose.Request:
     """The same request in another frame."""
-    query, there = query_from_slider_request(request), frame.inverse
-    slider, pusher, velocity = there @ query.slider, there.point(query.pusher), there.vector(query.velocity)
+    there, tip, motion = frame.inverse, request.pusher, request.pusher_velocity
+    slider = there @ world_slider("slider", request.slider, SAME_FRAME).pose
+    pusher, velocity = (
+        there.point(np.array([tip.x, tip.y, tip.z])),
+        there.vector(np.array([motion.x, motion.y, motion.z])),
+    )
     request = slider_request(frame_id)
     request.slider = Pose(position=Point(**axes(slider.position)), orientation=Quaternion(**axes(slider.quaternion)))
     request.pusher, request.pusher_velocity = Point(**axes(pusher)), Vector3(**axes(velocity))
@@ -137,9 +141,13 @@ def test_a_covariance_is_that_of_samples_in_the_other_frame() -> None:
 # --- messages ---------------------------------------------------------------------------------------------------
 
 
+def pushed(request: Any, frame: SpatialPose = SAME_FRAME) -> WorldPush:
+    return world_push(request, world_slider("slider", request.slider, frame), frame, request.duration)
+
+
 def answered(request: Any, after: SliderAfter, frame: SpatialPose = SAME_FRAME) -> PredictSliderPose.Response:
-    response, query = PredictSliderPose.Response(), query_from_slider_request(request)
-    fill_slider_response(response, request.header, query, frame, world_push(query, frame), after)
+    response, slider = PredictSliderPose.Response(), world_slider("slider", request.slider, frame)
+    fill_slider_response(response, request.header, frame, slider, request.duration, after)
     return deserialize_message(serialize_message(response), PredictSliderPose.Response)
 
 
@@ -149,7 +157,7 @@ def test_a_request_becomes_a_push_in_the_world() -> None:
         covariate_names=["elapsed_time", "topic:/warmth"],
         covariate_values=[3.0, 21.5],
     )
-    push = world_push(query_from_slider_request(request), SAME_FRAME)
+    push = pushed(request)
     np.testing.assert_allclose(push.slider, [0.3, 0.1, 0.7], atol=1e-15)
     np.testing.assert_array_equal(push.pusher, [0.3 - 0.045 - 0.00475, 0.11])
     np.testing.assert_array_equal(push.velocity, [0.02, 0.004])
@@ -206,7 +214,7 @@ def test_a_small_tilt_does_not_change() -> None:
 )
 def test_rejects_numbers_that_are_not_finite_by_field(field: str, shown: str, bad: float) -> None:
     with pytest.raises(RequestError, match=f"^{shown}: {bad!r} is not accepted, give a finite number"):
-        query_from_slider_request(slider_request(**{field: bad}))
+        pushed(slider_request(**{field: bad}))
 
 
 @pytest.mark.parametrize(
@@ -226,22 +234,14 @@ def test_rejects_numbers_that_are_not_finite_by_field(field: str, shown: str, ba
 )
 def test_rejects_a_push_out_of_the_plane_by_field(change: dict[str, Any], begins: str) -> None:
     with pytest.raises(RequestError) as caught:
-        world_push(query_from_slider_request(slider_request(**change)), SAME_FRAME)
+        pushed(slider_request(**change))
     assert str(caught.value).startswith(begins)
 
 
 def test_accepts_the_errors_of_a_tracker_out_of_the_plane() -> None:
     half = 0.45 * FLAT
-    world_push(
-        query_from_slider_request(
-            slider_request(
-                slider__orientation=Quaternion(y=math.sin(half), w=math.cos(half)),
-                pusher_velocity__z=0.0015,
-                pusher__z=0.0,
-            )
-        ),
-        SAME_FRAME,
-    )
+    orientation = Quaternion(y=math.sin(half), w=math.cos(half))
+    pushed(slider_request(slider__orientation=orientation, pusher_velocity__z=0.0015, pusher__z=0.0))
 
 
 # --- other frames -----------------------------------------------------------------------------------------------
@@ -250,8 +250,8 @@ def test_accepts_the_errors_of_a_tracker_out_of_the_plane() -> None:
 @pytest.mark.parametrize("frame", [TABLE_TOP, CAMERA], ids=["table_top", "camera"])
 def test_a_request_in_another_frame_is_the_same_push_with_the_same_response(frame: SpatialPose) -> None:
     asked, elsewhere = slider_request(), seen_from(frame, slider_request(), "elsewhere")
-    here = world_push(query_from_slider_request(asked), SAME_FRAME)
-    there = world_push(query_from_slider_request(elsewhere), frame)
+    here = pushed(asked)
+    there = pushed(elsewhere, frame)
     for name in ("slider", "pusher", "velocity"):
         np.testing.assert_allclose(getattr(there, name), getattr(here, name), atol=1e-12)
     after = SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True)
@@ -276,16 +276,15 @@ def test_a_flat_frame_gets_a_flat_response() -> None:
 
 def test_rejects_a_slider_that_is_flat_only_in_its_own_frame() -> None:
     with pytest.raises(RequestError, match=r"slider\.orientation tilt"):
-        world_push(query_from_slider_request(slider_request("camera")), CAMERA)
+        pushed(slider_request("camera"), CAMERA)
 
 
 @settings(max_examples=30, deadline=None)
 @given(POSES)
 def test_every_frame_in_space_gives_the_same_prediction(frame: SpatialPose) -> None:
     model = analytical()
-    here = slider_after(model, world_push(query_from_slider_request(slider_request()), SAME_FRAME))
-    elsewhere = query_from_slider_request(seen_from(frame, slider_request(), "elsewhere"))
-    there = slider_after(model, world_push(elsewhere, frame))
+    here = slider_after(model, pushed(slider_request()))
+    there = slider_after(model, pushed(seen_from(frame, slider_request(), "elsewhere"), frame))
     np.testing.assert_allclose(there.pose, here.pose, atol=1e-9)
     np.testing.assert_allclose(there.covariance, here.covariance, rtol=1e-6, atol=1e-16)
 

@@ -17,28 +17,30 @@ from push_predictor.online.session import Session
 
 
 class Service:
-    """Calls the node's callback as an executor does, and holds the responses."""
+    """Holds calls until the node takes them, and the responses."""
+
+    srv_type = Trigger
 
     def __init__(self) -> None:
         self.responses: list[tuple[str, Trigger.Response]] = []
-        self.callback: Any = None
-        self._waiting: list[tuple[str, Any]] = []
+        self._waiting: list[str] = []
+        self.handle = self
 
-    def create(self, kind: type, name: str, callback: Any, callback_group: object) -> None:
-        self.callback = callback
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def create(self, kind: type, name: str, callback: object, callback_group: object) -> Service:
+        return self
 
     def call(self, *callers: str) -> None:
-        self._waiting += [(caller, self.callback(Trigger.Request(), Trigger.Response())) for caller in callers]
-        self.turn()
+        self._waiting += callers
 
-    def turn(self) -> None:
-        """Resume all callbacks that wait, as each turn of an executor does."""
-        for caller, callback in [*self._waiting]:
-            try:
-                callback.send(None)
-            except StopIteration as end:
-                self._waiting.remove((caller, callback))
-                self.responses.append((caller, end.value))
+    def service_take_request(self, kind: type) -> tuple[Trigger.Request | None, str | None]:
+        return (Trigger.Request(), self._waiting.pop(0)) if self._waiting else (None, None)
+
+    def send_response(self, response: Trigger.Response, caller: str) -> None:
+        self.responses.append((caller, response))
 
 
 def finish_service(service: Service, session: Session, missing: str = "") -> FinishService:
@@ -57,18 +59,13 @@ def test_a_call_that_arrives_within_a_turn_waits_for_the_end_of_its_run() -> Non
     assert not session.drain_if_due(0.0, finish.requested, rig_changed=False)
     service.call("caller")
     finish.answer()
-    service.turn()
     assert not service.responses
     finish.work()
     assert session.drain_if_due(0.1, finish.requested, rig_changed=False)
     finish.answer()
-    service.turn()
     assert not service.responses, "the run is draining"
     session.written()
     finish.answer()
-    assert not finish.sent, "the executor has had no turn since"
-    service.turn()
-    assert finish.sent
     ((caller, response),) = service.responses
     assert (caller, response.success, response.message) == ("caller", True, "result")
     assert not finish.requested
@@ -92,18 +89,14 @@ def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() 
     session.written()
     report.busy = True
     finish.answer()
-    service.turn()
     assert not service.responses and not finish.requested, "nobody waits for the end of the next run"
     session.open(0.2)
     assert not session.drain_if_due(0.3, finish.requested, rig_changed=False)
     finish.answer()
-    service.turn()
     assert not service.responses
     report.busy = False
     finish.answer()
-    service.turn()
     finish.answer()
-    service.turn()
     assert [caller for caller, _ in service.responses] == ["first"]
     service.call("second")
     finish.work()
@@ -120,15 +113,12 @@ def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
         ended_run(session, finish)
         session.written()
         finish.answer()
-        service.turn()
     service.call("third")
     finish.work()
     finish.answer()
-    service.turn()
     assert not service.responses
     report.busy = False
     finish.answer()
-    service.turn()
     assert sorted(caller for caller, _ in service.responses) == ["first", "second", "third"]
 
 
@@ -141,12 +131,10 @@ def test_a_caller_gets_the_failure_of_its_own_run() -> None:
     ended_run(session, finish)
     session.failed("disk full")
     finish.answer()
-    service.turn()
     session.drain_if_due(0.2, finish_requested=True, rig_changed=False)
     session.written()
     report.busy = False
     finish.answer()
-    service.turn()
     assert [(r.success, r.message) for _, r in service.responses] == [(False, "disk full")]
 
 
@@ -156,7 +144,6 @@ def test_all_callers_get_the_reason_why_no_run_can_begin() -> None:
     service.call("first", "second")
     finish.work()
     finish.answer()
-    service.turn()
     assert {caller for caller, _ in service.responses} == {"first", "second"}
     assert {(response.success, response.message) for _, response in service.responses} == {(False, "no model")}
 
@@ -172,7 +159,6 @@ def test_callers_of_two_turns_wait_for_the_same_run() -> None:
     finish.ending()
     session.written()
     finish.answer()
-    service.turn()
     assert sorted(caller for caller, _ in service.responses) == ["first", "second"]
 
 
@@ -182,7 +168,6 @@ def test_without_samples_there_is_nothing_to_write() -> None:
     service.call("caller")
     finish.work()
     finish.answer()
-    service.turn()
     assert not service.responses[0][1].success and "No sample" in service.responses[0][1].message
 
 
@@ -196,15 +181,27 @@ def test_the_end_of_the_node_answers_those_who_wait_for_a_report() -> None:
     ended_run(session, finish)
     session.written()
     finish.answer()
-    service.turn()
     assert not service.responses
     idle = SimpleNamespace(**dict.fromkeys(("look", "drain", "work", "models", "publish"), lambda *_: None))
     parts = {"_session": session, "_finish": finish, "_writer": writer, "_advance": lambda: None, "_run": None}
     others = dict.fromkeys(("_sensors", "_models", "_alarm", "_rigs", "_status"), idle)
     node: Any = SimpleNamespace(_closing=True, _closed=False, **parts, **others)
     PushValidator._work(node)
-    assert node._closed and not finish.sent
-    service.turn()
-    assert finish.sent
+    assert node._closed
     ((caller, response),) = service.responses
     assert caller == "caller" and not response.success and "report failed" in response.message
+
+
+def test_a_call_after_the_last_turn_is_answered_at_the_end() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=True)
+    finish = finish_service(service, session)
+    finish._writer.close = lambda: None
+    service.call("caller")
+    idle = SimpleNamespace(stop=lambda: None, close=lambda: None, why_nothing=lambda: "", warning=lambda _: None)
+    parts = dict.fromkeys(("_alarm", "_sensors", "_status"), idle)
+    node: Any = SimpleNamespace(
+        _session=session, _finish=finish, _writer=finish._writer, _run=None, get_logger=lambda: idle, **parts
+    )
+    PushValidator.close(node)
+    ((caller, response),) = service.responses
+    assert caller == "caller" and not response.success and "No sample" in response.message

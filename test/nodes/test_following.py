@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 
 pytest.importorskip("rclpy")
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
 from push_predictor.nodes import polling
 from push_predictor.nodes.polling import FollowingSubscription, Taken
 
@@ -108,3 +110,22 @@ def test_no_message_is_lost_when_another_publisher_comes_between_two_looks(topic
     topic.publishers = 2
     topic.send(200)
     assert topic.lost() == 0
+
+
+def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hidden() -> None:
+    """As while another stream of the node still has a subscription of another type."""
+    outcomes: list[Any] = [rclpy_implementation.RCLError("incompatible type"), RuntimeError("a bug"), SimpleNamespace()]
+
+    def create(*_: object, **__: object) -> Any:
+        if isinstance(outcome := outcomes.pop(0), Exception):
+            raise outcome
+        return outcome
+
+    node: Any = SimpleNamespace(resolve_topic_name=str, create_subscription=create)
+    subscription = FollowingSubscription(node, "/slider/pose")
+    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    with pytest.raises(RuntimeError, match="a bug"):
+        subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    assert not outcomes, "once it exists, it is kept"

@@ -15,7 +15,7 @@ from fake_launch import FakeAction, actions, install_fake_launch, install_fake_r
 from repository import REPOSITORY
 
 from push_predictor.nodes.launch_exit import end_launch
-from push_predictor.nodes.validator.parameters import PARAMETERS
+from push_predictor.nodes.parameter_tables import PUSH_VALIDATOR
 
 MAIN = REPOSITORY / "launch" / "push_predictor.launch.py"
 RECORD = REPOSITORY / "launch" / "record.launch.py"
@@ -115,7 +115,7 @@ def validator(monkeypatch: pytest.MonkeyPatch, *words: str) -> dict[str, Any]:
 def test_covariates_are_a_list_of_topics(monkeypatch: pytest.MonkeyPatch) -> None:
     given = validator(monkeypatch, "covariate_topics:=surface/temperature, /room/humidity,")
     assert given == {"covariate_topics": ["surface/temperature", "/room/humidity"]}
-    (row,) = (row for row in PARAMETERS if row.name == "covariate_topics")
+    (row,) = (row for row in PUSH_VALIDATOR if row.name == "covariate_topics")
     assert row.allows(given["covariate_topics"])
     assert validator(monkeypatch) == {}
 

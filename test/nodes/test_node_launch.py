@@ -16,18 +16,16 @@ import pytest
 from fake_launch import actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from ros_harness import REPOSITORY
 
-from push_predictor.nodes import predict_server, recorder_parameters
-from push_predictor.nodes.replay import parameters as replay_parameters
-from push_predictor.nodes.validator import parameters as validator_parameters
+from push_predictor.nodes import parameter_tables
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 
 FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
 RECORD = REPOSITORY / "launch" / "record.launch.py"
 PARAMETERS = {
-    "predict_server": predict_server.PARAMETERS,
-    "push_recorder": recorder_parameters.PARAMETERS,
-    "push_replay": replay_parameters.PARAMETERS,
-    "push_validator": validator_parameters.PARAMETERS,
+    "predict_server": parameter_tables.PREDICT_SERVER,
+    "push_recorder": parameter_tables.PUSH_RECORDER,
+    "push_replay": parameter_tables.PUSH_REPLAY,
+    "push_validator": parameter_tables.PUSH_VALIDATOR,
 }
 
 

@@ -27,9 +27,10 @@ from std_msgs.msg import Float32, Float64, String
 from validator_bench import HEXAGON, Status, beginning, hosting_replay
 
 from push_predictor.errors import RequestError
+from push_predictor.nodes.parameter_tables import PUSH_RECORDER
+from push_predictor.nodes.parameters import declare, values_of
+from push_predictor.nodes.push_recorder import RecorderSubscriptions, new_recording
 from push_predictor.nodes.qos import DEPTH
-from push_predictor.nodes.recorder_parameters import PARAMETERS, RecorderOptions, read_options
-from push_predictor.nodes.recorder_subscriptions import RecorderSubscriptions
 from push_predictor.online.live_recording import LiveRecording
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_rig_for
@@ -176,29 +177,37 @@ def test_a_full_disk_ends_the_node_with_an_error_that_names_the_bag(tmp_path: Pa
 # --- parameters ------------------------------------------------------------------------------------------------------
 
 
-def options_of(**values: object) -> RecorderOptions:
+def recording_of(**values: object) -> LiveRecording:
     with ros_context(free_domain(), namespace="cell") as node:
         overrides = {name.replace("__", "."): value for name, value in values.items()}
         node._parameter_overrides = {name: Parameter(name, value=value) for name, value in overrides.items()}
-        return read_options(node)
+        declare(node, PUSH_RECORDER)
+        return new_recording(node, values_of(node, PUSH_RECORDER))
+
+
+def wanted(recording: LiveRecording) -> dict[str, bool]:
+    """Whether each topic is expected."""
+    return {topic.name: topic.expected for topic in recording.wanted}
 
 
 def test_names_are_resolved_in_the_namespace_of_the_node(tmp_path: Path) -> None:
-    found = options_of(bag=str(tmp_path / "a"), pusher_topic="/tf:tool0", covariate_topics=["driver.currents[2]"])
+    found = recording_of(bag=str(tmp_path / "a"), pusher_topic="/tf:tool0", covariate_topics=["driver.currents[2]"])
     expected = Topics("/cell/slider/pose", "/tf:tool0", "/cell/pusher/wrench", ("/cell/driver.currents[2]",))
-    assert found.topics == expected and not found.with_wrench and found.bag == tmp_path / "a"
+    assert found.topics == expected and found.path == tmp_path / "a"
+    assert not wanted(found)["/cell/pusher/wrench"]
 
 
 def test_topics_saved_next_to_an_earlier_bag_are_used_again(tmp_path: Path) -> None:
     (tmp_path / "a.recording.yaml").write_text("slider_topic: /block\nwrench_topic: /netft\n")
-    found = options_of(bag=str(tmp_path / "a"), slider_topic="/other")
-    assert (found.topics.slider, found.topics.wrench, found.with_wrench) == ("/other", "/netft", True)
+    found = recording_of(bag=str(tmp_path / "a"), slider_topic="/other")
+    assert (found.topics.slider, found.topics.wrench) == ("/other", "/netft") and wanted(found)["/netft"]
 
 
 def test_an_existing_bag_is_replaced_only_with_force(tmp_path: Path) -> None:
+    (bag := tmp_path / "a.mcap").touch()
     with pytest.raises(RequestError, match=r"bag: .* is not accepted, give a path that does not exist, or force"):
-        options_of(bag=str(tmp_path))
-    assert options_of(bag=str(tmp_path), force=True).bag == tmp_path
+        recording_of(bag=str(bag))
+    assert recording_of(bag=str(bag), force=True).path == bag
 
 
 @pytest.mark.parametrize(
@@ -212,12 +221,12 @@ def test_an_existing_bag_is_replaced_only_with_force(tmp_path: Path) -> None:
 )
 def test_bad_parameters_are_refused_by_name_and_value(values: dict[str, Any], problem: str) -> None:
     with pytest.raises(RequestError) as caught:
-        options_of(**values)
+        recording_of(**values)
     assert problem in str(caught.value)
 
 
 def test_every_default_is_accepted() -> None:
-    assert all(row.allows(row.default) for row in PARAMETERS)
+    assert all(row.allows(row.default) for row in PUSH_RECORDER)
 
 
 # --- subscriptions alone ---------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hosted_nodes import HostedNode, hosted_node, refused_start
+from made_up_windows import made_up_windows
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -38,7 +39,7 @@ from ros_harness import (
 )
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
-from synthetic import rows, wrench_rows
+from synthetic import rows, square_rig, wrench_rows
 from validator_bench import (
     CIRCLE,
     HEXAGON,
@@ -57,8 +58,8 @@ from validator_bench import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
+from msg_adapters import ns_to_stamp
 from msg_adapters.rigs import rig_to_message
-from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
@@ -233,13 +234,28 @@ def test_our_reader_and_rosbags_read_the_bag_of_residuals(watched):
     assert [m.predicted.tolist() for m in theirs] == [list(m.predicted) for m in ours]
 
 
+def test_residuals_name_the_frame_of_the_poses(models: dict[str, Path], tmp_path: Path):
+    used, shown = {"analytical": load_model(models["analytical"])}, list[tuple[Any, ...]]()
+    run = ValidationRun(square_rig(), used, SimpleNamespace(), lambda *each: shown.append(each), lambda: "lab")
+    number = run.validation.add(window := made_up_windows(1)[0])
+    response = PredictPush.Response(success=True, mean=window.displacement, covariance=np.eye(3).ravel())
+    run._take(0, number, response)
+    assert shown[0][-1].header.frame_id == "lab"
+    run.write(tmp_path)
+    messages = open_bag(tmp_path / "residuals").messages()
+    (kept,) = [deserialize_message(message.data, PushResidual) for message in messages]
+    assert kept == shown[0][-1]
+
+
 def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[str, Path], tmp_path: Path):
     """At rate 100 a minute passes in 0.6 s, a delay that the middleware may have on a busy machine."""
     recording = read_recording(beginning(REPOSITORY / "bags" / "square_abs_test", 75.0, tmp_path / "bag"))
     assert recording.rig is not None and recording.wrench is not None
     asked: list[PredictPush.Request] = []
     client = SimpleNamespace(ask=lambda request, on_answer: asked.append(request))
-    run = ValidationRun(recording.rig, {"analytical": load_model(models["analytical"])}, client, lambda *shown: None)
+    run = ValidationRun(
+        recording.rig, {"analytical": load_model(models["analytical"])}, client, lambda *shown: None, lambda: "world"
+    )
     stamps = [stream.stamp for stream in (recording.slider, recording.pusher, recording.wrench)]
     early, late = stamps[0][0] + 70 * 10**9, stamps[0][0] + 10 * 10**9
 

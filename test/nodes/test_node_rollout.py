@@ -16,7 +16,7 @@ from geometry_msgs.msg import PoseWithCovariance
 from hosted_nodes import hosted_node
 from synthetic import square_pushes
 
-from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
+from msg_adapters.slider_poses import fill_rollout_response, steps_from_request, world_start
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import quaternion_of_yaw, yaw_of_quaternion
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
@@ -24,7 +24,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
-from push_predictor.planning.rollout import PARTICLES, rollout
+from push_predictor.planning.rollout import FARTHEST, PARTICLES, rollout
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import RolloutPushes
@@ -153,15 +153,21 @@ def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quatern
 def test_rejects_slider_that_does_not_lie_flat() -> None:
     tilted = SpatialPose(np.zeros(3), np.array([np.sin(0.1), 0.0, 0.0, np.cos(0.1)]))
     with pytest.raises(RequestError, match=r"orientation tilt: 0\.2 .*flat within 0\.1 rad"):
-        world_slider(query_from_rollout_request(request()), tilted)
+        world_start(request(), tilted)
+
+
+def test_rejects_slider_too_far_away() -> None:
+    message = request()
+    message.slider.pose.position.x = -2.0 * FARTHEST
+    with pytest.raises(RequestError, match=r"slider\.pose\.position: .* give a place within"):
+        world_start(message, SAME_FRAME)
 
 
 def answered(model: PushModel, message: RolloutPushes.Request, frame: SpatialPose) -> RolloutPushes.Response:
     """The response to a request whose frame has the pose `frame` in the world."""
-    response, query = RolloutPushes.Response(), query_from_rollout_request(message)
-    slider = world_slider(query, frame)
-    rolled = rollout(model, slider.planar, slider.covariance, query.steps, 200, query.seed)
-    fill_rollout_response(response, frame, slider, rolled, query.samples)
+    response, (slider, covariance) = RolloutPushes.Response(), world_start(message, frame)
+    rolled = rollout(model, slider.planar, covariance, steps_from_request(message)[0], 200, message.seed)
+    fill_rollout_response(response, frame, slider, rolled, message.particles)
     return response
 
 

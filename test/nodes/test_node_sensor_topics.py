@@ -25,7 +25,7 @@ from ros_harness import free_domain, ros_context, wait_until
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 from push_predictor.errors import RequestError
 from push_predictor.nodes.validator import sensor_subscriber
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber

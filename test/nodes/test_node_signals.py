@@ -131,7 +131,7 @@ def test_a_second_signal_ends_a_node_that_is_ending(tmp_path: Path) -> None:
         "import sys, time; sys.path.insert(0, 'test/support'); import busy_node\n"
         "from push_predictor.nodes.runtime import run\n"
         "busy_node.BusyNode.close = lambda self: (print('closing', flush=True), time.sleep(1000.0))\n"
-        "run('busy', lambda stop: busy_node.BusyNode('none'), [], start=busy_node.BusyNode.begin)\n"
+        "run('busy', lambda stop: busy_node.BusyNode('none'), [])\n"
     )
     process = begun(["-c", code], tmp_path)
     assert process.stdout is not None and process.stdout.readline() == b"started\n"

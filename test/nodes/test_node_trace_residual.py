@@ -154,14 +154,13 @@ def test_process_of_a_trace_reports_the_reason(
 ) -> None:
     """In this process, whose priority is kept."""
     given, words = BAD_DATA[case]
-    monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
     given.get("change", lambda folder: None)(drifting)
     (folder := drifting / ".trace-work").mkdir()
     task = TraceTask(
         (drifting / "pushes.csv",), place / "deployed.pushmodel", given.get("covariates", ()), 0.01, folder
     )
     sent: list[Any] = []
-    trace_process._run(SimpleNamespace(send=sent.append), task)
+    trace_process.run_trace(SimpleNamespace(send=sent.append), task)
     assert isinstance(sent[-1], Failed) and ".trace-" not in sent[-1].reason
     assert all(word in sent[-1].reason for word in words), sent[-1].reason
     assert {path.name for path in folder.iterdir()} <= {COPIES}
@@ -170,7 +169,6 @@ def test_process_of_a_trace_reports_the_reason(
 def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     place: Path, drifting: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
     monkeypatch.setattr(trace_process, "_report", lambda path, trace: [])
     found = made_up_trace(slippery(0.1), count=30)
     monkeypatch.setattr("push_predictor.residuals.trace.trace", lambda *_, **__: found)
@@ -179,7 +177,7 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     (folder := drifting / ".trace-work").mkdir()
     sent: list[Any] = []
     task = TraceTask((drifting / "pushes.csv",), place / "deployed.pushmodel", (), 0.01, folder)
-    trace_process._run(SimpleNamespace(send=sent.append), task)
+    trace_process.run_trace(SimpleNamespace(send=sent.append), task)
     assert f"Warning: {drifting}/pushes.csv: The push angles span" in sent[-1].message
 
 

@@ -26,7 +26,7 @@ class Bench:
         self.logged: list[str] = []
         self.started: list[tuple[Any, ...]] = []
         monkeypatch.setattr(CheckProcess, "start", lambda _, *what: self.started.append(what))
-        self._options = SimpleNamespace(recording=recording, topics=topics)
+        self._recording, self._given_topics = recording, topics
         self._given_rig = None
         self._rig_warning, self._checks = "", CheckProcess()
 
@@ -37,7 +37,7 @@ class Bench:
         """Begin the check as the node does; returns its result so far."""
         self._streams = PushReplay._stream_topics(self)  # type: ignore[arg-type]  # a stand-in for the node
         self._rig_warning = rig_warning
-        bag = SimpleNamespace(path=self._options.recording, topics=LAB)
+        bag = SimpleNamespace(path=self._recording, topics=LAB)
         PushReplay._check(self, bag)  # type: ignore[arg-type]  # stand-ins for the node and the bag
         return self._checks.result
 

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 from multiprocessing.connection import Connection
 
 import pytest
 
-from push_predictor.online.child_process import kill_children, start_child
+from push_predictor.online.child_process import Child, kill_children
 
 
 def report(connection: Connection) -> None:
@@ -24,11 +23,12 @@ def report(connection: Connection) -> None:
 @pytest.mark.slow
 def test_no_sigint_reaches_a_child_and_the_parent_still_gets_it() -> None:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    ours, theirs = multiprocessing.Pipe()
-    child = start_child(report, (theirs,), "report")
+    child = Child("report", report)
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
-    assert child.daemon and child.name == "report"
-    assert ours.recv() == (True, False, os.environ["OPENBLAS_NUM_THREADS"])
+    assert child.process.daemon and child.process.name == "report"
+    assert child.received(60.0) == (True, False, os.environ["OPENBLAS_NUM_THREADS"])
     kill_children()
-    child.join(60.0)
-    assert child.exitcode == -signal.SIGKILL
+    child.process.join(60.0)
+    assert child.process.exitcode == -signal.SIGKILL
+    with pytest.raises(EOFError):
+        child.received()

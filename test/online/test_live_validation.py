@@ -26,8 +26,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.predictors.tails import STEPS, Tails
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.online.live_validation import LiveValidation, RunningScore, WindowRows
-from push_predictor.online.window_log import write_window_log
+from push_predictor.online.live_validation import LiveValidation, RunningScore, WindowRows, write_window_log
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from push_predictor.online.recorder_findings import Pace
-from push_predictor.online.recorder_progress import LOG_PERIOD, LiveLine, Progress, StreamFigures
+from push_predictor.online.recorder_progress import LOG_PERIOD, LiveLine, Pace, Progress
 
 
 def stamps(*seconds: float) -> np.ndarray:
@@ -37,13 +38,18 @@ def test_a_slow_stream_may_be_silent_for_four_periods() -> None:
     assert slow.silent(9.9) == 0.0 and slow.silent(10.0) == pytest.approx(8.0)
 
 
+def stream(name: str, source: str, samples: int, rate: float, largest_gap: float) -> Any:
+    """In place of a Pace."""
+    return SimpleNamespace(name=name, source=source, samples=samples, rate=rate, largest_gap=largest_gap)
+
+
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
 
 
 def test_a_slow_covariate_is_no_gap_of_the_streams(progress: Callable[..., Progress]) -> None:
-    slow = StreamFigures("/warmth", "/warmth", 3, 0.5, 2.0)
+    slow = stream("/warmth", "/warmth", 3, 0.5, 2.0)
     whole = replace(progress(), streams=(*progress().streams, slow))
     assert "largest gap 21 ms (slider)" in whole.to_line()
     assert "\n  /warmth: 3 samples, 0.5 Hz, largest gap 2 s" in whole.to_text()
@@ -52,7 +58,7 @@ def test_a_slow_covariate_is_no_gap_of_the_streams(progress: Callable[..., Progr
 @pytest.fixture
 def progress() -> Callable[..., Progress]:
     def made(**problems: str) -> Progress:
-        figures = (StreamFigures("slider", "/a", 250, 99.96, 0.021), StreamFigures("pusher", "/b", 500, 200.0, 0.011))
+        figures = (stream("slider", "/a", 250, 99.96, 0.021), stream("pusher", "/b", 500, 200.0, 0.011))
         return Progress("monday", 2.5, {"/a": 250, "/b": 500}, figures, 12, 3, 0.416, problems)
 
     return made

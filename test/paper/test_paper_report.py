@@ -41,20 +41,11 @@ SMALL = replace(
 CELL = re.compile(r'<th scope="row">(.*?)</th>|<td[^>]*>(.*?)(?:<span class="interval">(.*?)</span>)?</td>')
 
 
-class Stages:
-    """The titles of the stages, in order."""
-
-    def __init__(self) -> None:
-        self.titles: list[str] = []
-
-    def stage(self, number: int, of: int, title: str) -> None:
-        self.titles.append(title)
-
-
-def report(out: Path, cache: Path) -> Stages:
-    stages = Stages()
+def report(out: Path, cache: Path) -> list[tuple[str, float]]:
+    """Make the report; returns the stages with the share of the work before each."""
+    stages: list[tuple[str, float]] = []
     # One process: test_paper_work shows that several do the same work, and each would first import the packages.
-    report_paper(SMALL, Work(cache, cores=1), out, None, None, stages)
+    report_paper(SMALL, Work(cache, cores=1), out, None, None, lambda *stage: stages.append(stage))
     return stages
 
 
@@ -70,7 +61,11 @@ def small() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper")
-    assert report(out, out / "work").titles[0] == "recordings"
+    stages = report(out, out / "work")
+    (first, begin), (second, same) = stages[:2]
+    assert first.endswith(" recordings") and second.startswith(f"{first}: ") and begin == same == 0.0
+    begins = [share for stage, share in stages if ": " not in stage]
+    assert len(begins) > 5 and begins == sorted({*begins}) and begins[-1] < 1.0
     return out
 
 

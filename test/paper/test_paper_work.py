@@ -60,19 +60,6 @@ def pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     del sys.modules["pieces_of_work"]
 
 
-class Seen:
-    """A watch that writes down what it sees."""
-
-    def __init__(self) -> None:
-        self.events: list[object] = []
-
-    def begin(self, doing: str, count: int) -> None:
-        self.events.append((doing, count))
-
-    def advance(self) -> None:
-        self.events.append("one")
-
-
 def lines(log: Path) -> list[int]:
     return sorted(int(line) for line in log.read_text().split()) if log.exists() else []
 
@@ -104,10 +91,12 @@ def test_another_folder_has_a_separate_cache(pieces, tmp_path: Path) -> None:
 
 def test_the_watch_sees_the_start_and_every_job_cached_ones_too(pieces, tmp_path: Path) -> None:
     for _ in range(2):
-        seen = Seen()
-        calls = [(n, str(tmp_path / "log")) for n in range(3)]
-        Work(tmp_path / "kept", cores=1, watch=seen).run("squares", pieces.squared, calls)
-        assert seen.events == [("squares", 3), "one", "one", "one"]
+        seen: list[tuple[str, float]] = []
+        calls = [(n, str(tmp_path / "log")) for n in range(4)]
+        work = Work(tmp_path / "kept", cores=1)
+        work.watch = lambda doing, done, seen=seen: seen.append((doing, done))
+        work.run("squares", pieces.squared, calls)
+        assert seen == [(f"squares {k} of 4", k / 4) for k in range(5)]
 
 
 @pytest.mark.slow

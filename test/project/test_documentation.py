@@ -21,21 +21,18 @@ from ros_harness import REPOSITORY
 import push_predictor
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.geometry.shapes import SHAPES, shape_outline
-from push_predictor.nodes import recorder_parameters
+from push_predictor.nodes import parameter_tables
 from push_predictor.nodes.parameters import Param
-from push_predictor.nodes.replay import parameters as replay_parameters
-from push_predictor.nodes.server import parameters as server_parameters
-from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.nodes.validator.scalar_topics import CLOCK
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.topics import DEFAULT_TOPICS
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
-    "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
-    "push_recorder": ("push_recorder", tuple(recorder_parameters.PARAMETERS)),
-    "push_replay": ("push_replay", tuple(replay_parameters.PARAMETERS)),
-    "push_validator": ("push_validator", tuple(validator_parameters.PARAMETERS)),
+    "predict_server": ("push_predictor", parameter_tables.PREDICT_SERVER),
+    "push_recorder": ("push_recorder", parameter_tables.PUSH_RECORDER),
+    "push_replay": ("push_replay", parameter_tables.PUSH_REPLAY),
+    "push_validator": ("push_validator", parameter_tables.PUSH_VALIDATOR),
 }
 DOCS = REPOSITORY / "docs"
 REFERENCE = DOCS / "reference"
@@ -101,7 +98,7 @@ def test_every_parameter_has_a_description_and_accepts_its_default(node: str):
 def test_the_table_of_the_validators_parameters_is_that_of_the_code():
     rows = table(REFERENCE / "push_validator.md", "Parameters")
     written = {name.strip("`"): (yaml.safe_load(value.strip("`")), text) for name, value, text in rows}
-    assert written == {row.name: (row.default, row.description) for row in validator_parameters.PARAMETERS}
+    assert written == {row.name: (row.default, row.description) for row in parameter_tables.PUSH_VALIDATOR}
 
 
 @pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay"])

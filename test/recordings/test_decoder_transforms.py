@@ -148,6 +148,15 @@ def test_a_clock_that_is_set_back_begins_anew() -> None:
     assert waiting.rejected("tip")[SET_BACK] == 25, "they waited for the cart"
 
 
+def test_samples_before_a_clock_that_is_set_back_in_the_first_second_are_counted() -> None:
+    buffer = TransformBuffer(["tip"], "world")
+    for first, last in ((10_000, 10_500), (0, 1101)):
+        put(buffer, cart(every(20, first, last), every(4, first, last)).in_order())
+        taken_now, _ = buffer.take("tip")
+    assert len(taken_now) > 200
+    assert buffer.rejected("tip")[SET_BACK] == len(every(4, 10_000, 10_500))
+
+
 def test_among_equal_transforms_the_nearest_to_the_frame_gives_the_stamps() -> None:
     messages = cart(every(10, 0, 501), every(10, 3, 501)).in_order()
     stamp, _ = taken(TransformBuffer(["tip"], "world"), messages, "tip", portion=1)

@@ -27,7 +27,7 @@ class BusyNode(Node):
             work()
         self.create_timer(0.01, work if moment == "callback" else lambda: None)
 
-    def begin(self) -> None:
+    def start(self) -> None:
         if self._moment == "start":
             work()
         if self._moment == "blocked":
@@ -58,4 +58,4 @@ def make(stop: Stop) -> BusyNode:
 
 if __name__ == "__main__":
     install_handlers()
-    sys.exit(run("busy", make, sys.argv[2:], start=BusyNode.begin))
+    sys.exit(run("busy", make, sys.argv[2:]))

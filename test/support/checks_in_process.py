@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -13,11 +13,20 @@ from unittest.mock import patch
 from push_predictor.online import check_process
 
 
+class Here:
+    """A Child that works at once, in this process."""
+
+    def __init__(self, name: str, work: Callable[..., None], *arguments: object) -> None:
+        self._sent: list[object] = []
+        work(SimpleNamespace(send=self._sent.append), *arguments)
+
+    def received(self) -> object:
+        return self._sent.pop(0)
+
+    def stop(self) -> None: ...
+
+
 @contextmanager
 def checking_in_this_process() -> Iterator[None]:
-    def start(target: Callable[..., None], arguments: Sequence[object], name: str) -> object:
-        target(*arguments)
-        return SimpleNamespace(terminate=lambda: None, join=lambda: None)
-
-    with patch.object(check_process, "start_child", start), patch.object(check_process.os, "nice", lambda more: None):
+    with patch.object(check_process, "Child", Here):
         yield

@@ -33,11 +33,11 @@ from push_predictor.resources import share_path
 
 # As main() of a replay. Fast DDS reads it once: it counts only where no other node came first in this process.
 PROFILES = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(share_path("config", "fastdds_replay.xml"))}
-NODES: dict[str, tuple[Any, Callable[[Any], None] | None, Mapping[str, str]]] = {
-    "predict_server": (lambda stop: PredictServer(), PredictServer.start, {}),
-    "push_recorder": (PushRecorder, None, {}),
-    "push_replay": (PushReplay, None, PROFILES),
-    "push_validator": (lambda stop: PushValidator(), None, {}),
+NODES: dict[str, tuple[Any, Mapping[str, str]]] = {
+    "predict_server": (lambda stop: PredictServer(), {}),
+    "push_recorder": (PushRecorder, {}),
+    "push_replay": (PushReplay, PROFILES),
+    "push_validator": (lambda stop: PushValidator(), {}),
 }
 _LOGS: list[Path] = []  # of the nodes hosted now; one that is hosted meanwhile logs where the other does
 
@@ -80,14 +80,14 @@ def hosted_node(
     executable: str, *ros_args: str, domain: int, namespace: str | None = None, params: Mapping[str, Any] | None = None
 ) -> Iterator[HostedNode]:
     """As `node_process`. Leaving ends the node, and raises what made it fail. It is ready when the block begins."""
-    make_node, start, environment = NODES[executable]
+    make_node, environment = NODES[executable]
     if executable == "predict_server":
         keep_tables(params)
     environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **environment}
     stop, arguments = Stop(), ["--ros-args", *node_arguments(*ros_args, namespace=namespace, params=params)]
     with _stderr_in_file() as log, patch.dict(os.environ, environment):
         context = Context()
-        node = HostedNode(Life(executable, make_node, stop, arguments, start, context), stop, log, context)
+        node = HostedNode(Life(executable, make_node, stop, arguments, context), stop, log, context)
         try:
             yield node
         finally:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 
-from msg_adapters.stamps import ns_to_stamp
+from msg_adapters import ns_to_stamp
 from push_predictor.geometry.frames import quaternion_of_yaw
 
 

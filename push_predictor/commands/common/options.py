@@ -57,11 +57,6 @@ def add_out(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--out", required=True, type=Path, metavar="PATH", help=f"output: {what}")
 
 
-def add_recording(parser: argparse.ArgumentParser, note: str) -> None:
-    """Add the option --recording; note: what the command does without it, or needs of it."""
-    parser.add_argument("--recording", type=Path, metavar="RECORDING", help=f"a recording; {note}")
-
-
 def add_seed(parser: argparse.ArgumentParser, of: str) -> None:
     """Add the option --seed; of: what it makes random."""
     meaning = f"random seed: of {of} (default %(default)s)"

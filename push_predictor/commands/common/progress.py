@@ -72,32 +72,3 @@ def _report(course: Course, done: threading.Event) -> None:
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
     if terminal and shown:
         print(CLEAR, end="", file=sys.stderr, flush=True)
-
-
-class JobProgress:
-    """Progress of stages with batches of jobs; implements the paper's protocols Watch and Stages."""
-
-    def __init__(self, watch: Watch) -> None:
-        self._watch = watch
-        self._stage, self._number, self._stages = "", 1, 1
-        self._doing, self._done, self._count = "", 0, 0
-
-    def stage(self, number: int, of: int, title: str) -> None:
-        """Start a stage."""
-        self._stage, self._number, self._stages = f"{number}/{of} {title}", number, of
-        self.begin("", 0)
-
-    def begin(self, doing: str, count: int) -> None:
-        """Start a batch of jobs."""
-        self._doing, self._done, self._count = doing, 0, count
-        self._notify()
-
-    def advance(self) -> None:
-        """Count one finished job."""
-        self._done += 1
-        self._notify()
-
-    def _notify(self) -> None:
-        share = self._done / self._count if self._count else 0.0
-        jobs = f": {self._doing} {self._done} of {self._count}" if self._doing else ""
-        self._watch(self._stage + jobs, (self._number - 1 + share) / self._stages)

@@ -17,6 +17,7 @@ from builtin_interfaces.msg import Duration, Time
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
+from msg_adapters.predictions import refuse
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
 from push_predictor.replay.clock import SECOND
@@ -63,11 +64,11 @@ class ReplayControls:
             return response
         except PushPredictorError as error:
             self._node.get_logger().warning(str(error))
-            return _refusal(response, str(error), error_code(error))
+            return refuse(response, str(error), error_code(error))
         except Exception as error:
             self._node.get_logger().error(traceback.format_exc())
             reason = f"internal error, see the log of the node: {error!r}"
-            return _refusal(response, reason, ErrorCode.INTERNAL_ERROR)
+            return refuse(response, reason, ErrorCode.INTERNAL_ERROR)
 
     def _set_rate(self, request: Any, response: Any) -> None:
         if not self._player.set_rate(request.rate):
@@ -98,12 +99,6 @@ def _imported_rosbag2() -> ModuleType | None:
         return importlib.import_module("rosbag2_interfaces.srv")
     except ImportError:
         return None
-
-
-def _refusal(response: Any, reason: str, code: ErrorCode) -> Any:
-    """A new response of the same kind; rosbag2's types have no message, and some types have no `success`."""
-    fields = {"success": False, "message": reason, "error_code": int(code)}
-    return type(response)(**{name: value for name, value in fields.items() if hasattr(response, name)})
 
 
 def _nanoseconds(time: Time | Duration) -> int:

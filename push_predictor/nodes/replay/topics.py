@@ -5,17 +5,20 @@
 
 from __future__ import annotations
 
+import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
-from push_predictor.errors import PushPredictorError
+from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.qos import message_class, replay_profile
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.fields.sources import SCALAR_FIELDS, TF_TYPES
@@ -118,8 +121,33 @@ class ReplayTopics:
         try:
             options = QoSOverridingOptions.with_default_policies()
             return self._node.create_publisher(found, name, profile, qos_overriding_options=options)
+        except rclpy_implementation.RCLError:  # a RuntimeError too, but not about an override
+            raise
         except (InvalidQosOverridesError, ParameterException, RuntimeError, TypeError) as error:
             raise PushPredictorError(f"qos_overrides.{topic}.publisher: {error}, give a QoS policy") from None
+
+
+def check_filter(values: Mapping[str, Any]) -> None:
+    """Raise RequestError for a parameter that is no regular expression."""
+    for name in ("play.regex_to_filter", "play.exclude_regex_to_filter"):
+        try:
+            re.compile(values[name])
+        except re.error as error:
+            raise RequestError(name, values[name], f"a regular expression ({error})") from None
+
+
+def is_played(topic: str, values: Mapping[str, Any]) -> bool:
+    """Whether a topic is played: listed or matched (all, if there is no list and no expression), not excluded."""
+    regex, names = values["play.regex_to_filter"], values["play.topics_to_filter"]
+    excluded = values["play.exclude_regex_to_filter"]
+    if listed(topic, values["play.exclude_topics_to_filter"]) or (excluded and re.fullmatch(excluded, topic)):
+        return False
+    return not (names or regex) or listed(topic, names) or bool(regex and re.fullmatch(regex, topic))
+
+
+def listed(topic: str, names: Sequence[str]) -> bool:
+    """Whether a topic is among names with or without the leading slash."""
+    return topic.strip("/") in {name.strip("/") for name in names}
 
 
 def _acknowledged(publisher: Publisher) -> bool:

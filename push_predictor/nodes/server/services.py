@@ -21,16 +21,25 @@ from rclpy.time import Time
 
 from msg_adapters.predictions import (
     PushQuery,
+    covariates_of_push,
     extend_batch_response,
     fill_response,
+    fill_suggest_response,
+    limits_from_request,
     push_from_request,
     query_from_batch_request,
     residual_from_request,
 )
 from msg_adapters.rigs import model_to_info
-from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
-from msg_adapters.slider_poses import fill_slider_response, pose_of_transform, query_from_slider_request, world_push
-from msg_adapters.suggestions import fill_suggest_response, query_from_suggest_request
+from msg_adapters.slider_poses import (
+    fill_rollout_response,
+    fill_slider_response,
+    pose_of_transform,
+    steps_from_request,
+    world_push,
+    world_slider,
+    world_start,
+)
 from push_predictor.design.batch import suggest_pushes
 from push_predictor.errors import FrameError, PredictionError, RequestError, TooLargeError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
@@ -144,12 +153,10 @@ def handle_predict_push_batch(
 
 def handle_predict_slider_pose(frames: RequestFrames, registry: ModelRegistry, request: Any, response: Any) -> None:
     """Fill the response to PredictSliderPose, in the frame of the request. Raises RequestError."""
-    asked = query_from_slider_request(request)
-    tabulated = registry.get(asked.model)
-    query = replace(asked, duration=own_window(tabulated.model, asked.duration))
-    frame = frames.pose_in_world(request.header)
-    push = world_push(query, frame)
-    fill_slider_response(response, request.header, query, frame, push, slider_after(tabulated, push))
+    tabulated, frame = registry.get(request.model), frames.pose_in_world(request.header)
+    slider, duration = world_slider("slider", request.slider, frame), own_window(tabulated.model, request.duration)
+    after = slider_after(tabulated, world_push(request, slider, frame, duration))
+    fill_slider_response(response, request.header, frame, slider, duration, after)
 
 
 def handle_rollout_pushes(
@@ -160,36 +167,33 @@ def handle_rollout_pushes(
     At least PARTICLES particles are used, so that the poses do not depend on the number of samples requested.
     check_cancelled: called before each window. Raises RequestError.
     """
-    query = query_from_rollout_request(request)
-    tabulated = registry.get(query.model)
-    steps = query.steps.copy()
+    steps, covariates = steps_from_request(request)
+    tabulated, frame = registry.get(request.model), frames.pose_in_world(request.header)
     steps[steps[:, 3] == 0.0, 3] = own_window(tabulated.model, 0.0)
-    frame = frames.pose_in_world(request.header)
-    slider = world_slider(query, frame)
+    slider, covariance = world_start(request, frame)
     rolled = rollout(
         tabulated,
         slider.planar,
-        slider.covariance,
+        covariance,
         steps,
-        max(PARTICLES, query.samples),
-        query.seed,
-        covariates=query.covariates,
+        max(PARTICLES, request.particles),
+        request.seed,
+        covariates=covariates,
         check_cancelled=check_cancelled,
     )
-    fill_rollout_response(response, frame, slider, rolled, query.samples)
+    fill_rollout_response(response, frame, slider, rolled, request.particles)
 
 
 def handle_suggest_pushes(
     check_cancelled: Callable[[], None], registry: ModelRegistry, request: Any, response: Any
 ) -> None:
     """Fill the result of SuggestPushes. check_cancelled: called before each push. Raises RequestError."""
-    query = query_from_suggest_request(request)
     suggested = suggest_pushes(
-        registry.get(query.model).model,
-        query.count,
-        query.limits,
-        covariates=query.covariates,
-        seed=query.seed,
+        registry.get(request.model).model,
+        request.count,
+        limits_from_request(request),
+        covariates=covariates_of_push(request),
+        seed=request.seed,
         check_cancelled=check_cancelled,
     )
     fill_suggest_response(response, suggested)

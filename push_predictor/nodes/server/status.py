@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from msg_adapters.diagnostics import Level, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_status
 from push_predictor.models.store.model_registry import ModelRegistry
 
 NO_MODEL = "no model is loaded: set the parameter 'models' or call load_model"
@@ -35,16 +35,16 @@ def server_status(
     return diagnostic_status(node_name, "predictions", level, message, values, registry.default)
 
 
-def _health(state: str, registry: ModelRegistry, problems: Sequence[str]) -> tuple[Level, str]:
+def _health(state: str, registry: ModelRegistry, problems: Sequence[str]) -> tuple[bytes, str]:
     if not registry.names:
-        return Level.ERROR, NO_MODEL
+        return DiagnosticStatus.ERROR, NO_MODEL
     if state != "active":
-        return Level.WARN, f"the node is {state}"
+        return DiagnosticStatus.WARN, f"the node is {state}"
     if registry.default not in registry.names:
-        return Level.WARN, f"default_model {registry.default!r} is not loaded"
+        return DiagnosticStatus.WARN, f"default_model {registry.default!r} is not loaded"
     if problems:
-        return Level.WARN, f"models that could not be loaded: {len(problems)}, listed under problems"
-    return Level.OK, f"models loaded: {len(registry.names)}"
+        return DiagnosticStatus.WARN, f"models that could not be loaded: {len(problems)}, listed under problems"
+    return DiagnosticStatus.OK, f"models loaded: {len(registry.names)}"
 
 
 class RequestStatistics:

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
-from push_predictor.nodes.polling import NoExecutor
+from push_predictor.nodes.polling import NoExecutor, take_request
 
 JOIN_TIMEOUT = 5.0  # s
 RETRY_DELAY = 0.1  # s after an error
@@ -83,7 +83,7 @@ class ThreadedService:
 
     def _answer(self) -> bool:
         """Answer one request; False if none has arrived."""
-        request, header = self.service.handle.service_take_request(self.service.srv_type.Request)
+        request, header = take_request(self.service)
         if header is None:
             return False
         response = self.service.callback(request, self.service.srv_type.Response())

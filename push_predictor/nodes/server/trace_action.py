@@ -11,7 +11,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.node import Node
 
@@ -20,6 +20,7 @@ from push_predictor.errors import RecordingError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.nodes.server.guarded_action import GuardedAction
+from push_predictor.online.child_process import Child
 from push_predictor.online.trace_process import (
     EXTENDED,
     RESULTS,
@@ -28,13 +29,9 @@ from push_predictor.online.trace_process import (
     Traced,
     TraceTask,
     evidence_in,
-    start_trace,
+    run_trace,
 )
 from push_predictor_interfaces.action import TraceResidual
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
-    from multiprocessing.process import BaseProcess
 
 POLL_PERIOD = 0.05  # s between two looks at whether the goal is still wanted
 EVIDENCE = "pushes.csv as push_validator writes it, push tables or recordings"
@@ -74,7 +71,7 @@ class TraceAction:
             save_model(model, deployed)  # the model in use; its original file may have changed since
             self._log.info(f"tracing {model.name} on {', '.join(map(str, evidence))}")
             task = TraceTask(evidence, deployed, tuple(request.covariates), self._alpha(), folder)
-            ended = _watched(goal, check, *start_trace(task))
+            ended = _watched(goal, check, Child("trace", run_trace, task))
             if isinstance(ended, Failed):
                 return TraceResidual.Result(success=False, message=ended.reason, error_code=int(ended.code))
             for name in RESULTS:
@@ -94,24 +91,21 @@ def _evidence(field: str, given: str) -> tuple[Path, ...]:
     return found
 
 
-def _watched(goal: Any, check: Callable[[], None], process: BaseProcess, pipe: Connection) -> Traced | Failed:
+def _watched(goal: Any, check: Callable[[], None], child: Child) -> Traced | Failed:
     """The last message of the process; its stages become feedback. Raises what `check` raises, after its end."""
     try:
         while True:
             check()
-            if not pipe.poll(POLL_PERIOD):
-                continue
             try:
-                received: Stage | Traced | Failed = pipe.recv()
+                received: Stage | Traced | Failed | None = child.received(POLL_PERIOD)
             except (EOFError, OSError):
-                return Failed(_exit_reason(process), ErrorCode.INTERNAL_ERROR)
-            if not isinstance(received, Stage):
+                return Failed(_exit_reason(child), ErrorCode.INTERNAL_ERROR)
+            if isinstance(received, Stage):
+                _publish(goal, received)
+            elif received is not None:
                 return received
-            _publish(goal, received)
     finally:
-        process.kill()
-        process.join()
-        pipe.close()
+        child.stop(at_once=True)
 
 
 def _publish(goal: Any, stage: Stage) -> None:
@@ -127,9 +121,9 @@ def _result(traced: Traced, extended: Path) -> TraceResidual.Result:
     return result
 
 
-def _exit_reason(process: BaseProcess) -> str:
+def _exit_reason(child: Child) -> str:
     """In words, how a process ended that sent no result."""
-    process.join(5.0)
-    code = process.exitcode
+    child.process.join(5.0)
+    code = child.process.exitcode
     how = f"signal {-code}" if code is not None and code < 0 else f"status {code}"
     return f"the process of the trace ended with {how} and no result, see the log of the node"

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from rclpy.callback_groups import ReentrantCallbackGroup
+from typing import Any
+
 from rclpy.node import Node
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from push_predictor.nodes.polling import NoExecutor, take_request
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.result_writer import ResultWriter
@@ -17,7 +18,7 @@ from push_predictor.online.session import Session, State
 
 
 class FinishService:
-    """Offers ~/finish; callers wait while the executor does other work.
+    """Offers ~/finish; the node takes its calls itself, and answers them when there is something to state.
 
     Samples that come while a result is written, or its report is drawn, belong to the next run: it is not ended by the
     same call.
@@ -26,37 +27,21 @@ class FinishService:
     def __init__(
         self, node: Node, session: Session, models: ModelSource, rigs: RigSource, writer: ResultWriter
     ) -> None:
-        self._arrived: list[Future] = []  # since the last turn
-        self._callers: list[Future] = []  # of the run that is open, or comes next
-        self._served: list[Future] = []  # of the run that has ended
+        self._callers: list[Any] = []  # of the run that is open, or comes next
+        self._served: list[Any] = []  # of the run that has ended
         self._failure: str | None = None  # why its result could not be written; None until that is known
-        self._unsent = 0
         self._session, self._models, self._rigs, self._writer = session, models, rigs, writer
-        node.create_service(Trigger, "~/finish", self._on_call, callback_group=ReentrantCallbackGroup())
+        self._service = node.create_service(Trigger, "~/finish", _not_called, callback_group=NoExecutor())
 
     @property
     def requested(self) -> bool:
         """Whether a caller waits for the end of a run."""
         return bool(self._callers)
 
-    @property
-    def sent(self) -> bool:
-        """Whether the executor has sent all answers."""
-        return not self._unsent
-
-    async def _on_call(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._arrived.append(answer := Future())
-        response = await answer  # its own turn of the executor, which sends it
-        self._unsent -= 1
-        return response
-
     def work(self) -> None:
-        """Take the calls since the last time.
-
-        Once a turn: a call that arrived between the end of a run and `answer` would be answered without a result.
-        """
-        self._callers += self._arrived
-        self._arrived = []
+        """Take the calls since the last time."""
+        while (caller := take_request(self._service)[1]) is not None:
+            self._callers.append(caller)
 
     def ending(self) -> None:
         """Note that a run ends: its result is what all present callers wait for."""
@@ -72,10 +57,9 @@ class FinishService:
         if self._callers and not draining and not busy:
             self._send(self._response(self._session.failure), self._callers)
 
-    def _send(self, response: Trigger.Response, callers: list[Future]) -> None:
-        self._unsent += len(callers)
+    def _send(self, response: Trigger.Response, callers: list[Any]) -> None:
         while callers:
-            callers.pop().set_result(response)
+            self._service.send_response(response, callers.pop())
 
     def _response(self, failure: str) -> Trigger.Response:
         output = self._writer.folder
@@ -89,3 +73,8 @@ class FinishService:
             return Trigger.Response(success=False, message=text)
         text = str(output or "The parameter output is empty: nothing was written.")
         return Trigger.Response(success=True, message=text)
+
+
+def _not_called(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    """The callback that a service must have: `work` takes the calls instead."""
+    return response

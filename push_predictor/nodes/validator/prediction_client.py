@@ -36,14 +36,6 @@ class _Pending:
     futures: list[Future] = field(default_factory=list)
 
 
-@dataclass
-class _Silence:
-    """Since when the server has not answered (monotonic), and how often requests were sent again."""
-
-    since: float
-    sent_again: int = 0
-
-
 class PredictionClient:
     """Queues of requests to predict_push, one for each model.
 
@@ -58,7 +50,8 @@ class PredictionClient:
         self._waiting: dict[str, deque[_Pending]] = {}
         self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
         self._sent: list[_Pending] = []
-        self._silence: _Silence | None = None
+        self._silent_since: float | None = None
+        self._sent_again = 0  # since then
         self.timeouts = 0
 
     @property
@@ -74,7 +67,7 @@ class PredictionClient:
     @property
     def problems(self) -> list[str]:
         """In words, that the server does not answer, and why it refuses some models."""
-        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silence else []
+        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silent_since else []
         return [f"predict_push: {reason}" for reason in [*silent, *(reason for _, reason in self._blocked.values())]]
 
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
@@ -101,22 +94,22 @@ class PredictionClient:
         self._sent.clear()
         self._waiting.clear()
         self._blocked.clear()
-        self._silence = None
+        self._silent_since = None
 
     def _note_silence(self, now: float) -> None:
         self.timeouts += 1
-        if self._silence is None:
-            self._silence = _Silence(now - self._timeout)
+        if self._silent_since is None:
+            self._silent_since, self._sent_again = now - self._timeout, 0
             text = f"predict_push: no answer within {self._timeout:g} s, requests are sent again"
             self._log.warning(text, throttle_duration_sec=LOG_PERIOD)
-        self._silence.sent_again += 1
+        self._sent_again += 1
 
     def _note_answer(self) -> None:
-        if (silence := self._silence) is not None:
-            self._silence = None
+        if (since := self._silent_since) is not None:
+            self._silent_since = None
             self._log.warning(
-                f"predict_push answers again after {monotonic() - silence.since:.1f} s. Requests sent again: "
-                f"{silence.sent_again}; waiting: {self.open}; given up: 0.",
+                f"predict_push answers again after {monotonic() - since:.1f} s. Requests sent again: "
+                f"{self._sent_again}; waiting: {self.open}; given up: 0.",
                 throttle_duration_sec=LOG_PERIOD,
             )
 

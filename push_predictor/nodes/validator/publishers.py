@@ -11,7 +11,7 @@ import numpy as np
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers, prediction_markers, push_markers
+from msg_adapters.markers import MAGNIFICATION, Sheet, label_marker, magnified_markers, prediction_markers, push_markers
 from msg_adapters.residuals import alarm_to_message
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json, alarm_sentence
 from push_predictor.geometry.frames import to_world
@@ -49,24 +49,26 @@ class ResultPublishers:
 
 
 def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
-    """Pusher, push, outlines, 95 % ellipse, observed pose and label in frame_id; prediction: of n = 1.
-
-    Each marker has a namespace of its own and id 0, so a window replaces the one before.
-    """
-    heading = np.array([window.push_heading])
-    predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
+    """Pusher, push, outlines, 95 % ellipse, observed pose and label in frame_id; prediction: of n = 1."""
+    heading, sheet, start, end = (
+        window.push_heading,
+        Sheet(frame_id, window.end),
+        window.slider_start,
+        window.slider_end,
+    )
+    predicted = displaced(start[None], np.array([heading]), prediction.mean)[0]
     wider = _wider(prediction.tails)
-    covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, heading)[0]
-    start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
+    covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, np.array([heading]))[0]
     distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
     reach = rig.outline.reach
-    parts = (
-        push_markers(tip_of(rig, window), rig.pusher_radius, window.push_heading, *where),
-        prediction_markers(rig.outline.vertices, start, predicted, covariance[:2, :2], end, *where),
-        magnified_markers(predicted, covariance, end, reach, window.push_heading, *where),
-        label_marker(_label(window, distance, limit), start[:2], reach, distance > limit, *where),
+    return MarkerArray(
+        markers=[
+            *push_markers(sheet, tip_of(rig, window), rig.pusher_radius, heading),
+            *prediction_markers(sheet, rig.outline.vertices, start, predicted, covariance[:2, :2], end),
+            *magnified_markers(sheet, predicted, covariance, end, reach, heading),
+            label_marker(sheet, _label(window, distance, limit), start[:2], reach, distance > limit),
+        ]
     )
-    return MarkerArray(markers=[marker for part in parts for marker in part.markers])
 
 
 def _wider(tails: Tails | None) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from rclpy.node import Node
 
 from push_predictor.nodes.polling import FollowingSubscription, Taken
-from push_predictor.nodes.validator.topic_stream import TopicStream, as_messages
+from push_predictor.nodes.validator.live_streams import TopicStream, as_messages
 from push_predictor.recordings.decoder.topic_input import LIMIT, TopicInput
 
 CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"

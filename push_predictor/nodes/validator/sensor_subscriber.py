@@ -15,9 +15,8 @@ from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.validator.frame_stream import FrameStream, TransformTopics
+from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream, TransformTopics
 from push_predictor.nodes.validator.scalar_topics import ScalarTopics
-from push_predictor.nodes.validator.topic_stream import TopicStream
 from push_predictor.online.topic_report import ReportLog, TopicReport
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic

@@ -11,7 +11,7 @@ from time import monotonic
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.rig_source import RigSource
@@ -22,7 +22,6 @@ from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.stream_faults import describe_faults
 
 SILENT = f"No usable sample for {SILENCE:g} s. Call `~/finish` to write the results."
@@ -55,9 +54,7 @@ class StatusPublisher:
             self._logged = problems
             for problem in problems:
                 self._node.get_logger().warning(problem)
-        name, failure = self._node.get_fully_qualified_name(), self._session.failure
-        rig = self._rigs.rig
-        status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure, rig)
+        status = self._status(run, problems)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
     def why_nothing(self) -> str:
@@ -82,41 +79,29 @@ class StatusPublisher:
         found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
         return [*filter(None, dict.fromkeys(found))]
 
+    def _status(self, run: ValidationRun | None, problems: Sequence[str]) -> DiagnosticStatus:
+        """ERROR for a failure, a refused topic or refused samples, WARN for a problem."""
+        sensors, client, rig, failure = self._sensors, self._client, self._rigs.rig, self._session.failure
+        warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
+        if not client.server_available:
+            warnings.append(NO_SERVER)
+        wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
+        level = DiagnosticStatus.ERROR if wrong else DiagnosticStatus.WARN if warnings else DiagnosticStatus.OK
+        state = self._activity()
+        values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
+        values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
+        if run is not None:
+            values |= _stream_figures(run, sensors) | _scores(run) | _checks(run)
+            values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
+        message, name = _paragraph([failure, *warnings]) or state, self._node.get_fully_qualified_name()
+        return diagnostic_status(name, "validation", level, message, values, rig.shape if rig else "")
+
     def _activity(self) -> str:
         if self._session.state is State.DRAINING:
             return "waiting for the last answers"
         if self._writer.report.busy:
             return "writing the report"
         return "validating" if self._session.active else "waiting for samples"
-
-
-def validator_status(
-    node_name: str,
-    state: str,
-    run: ValidationRun | None,
-    sensors: SensorSubscriber,
-    client: PredictionClient,
-    problems: Sequence[str],
-    failure: str,
-    rig: Rig | None,
-) -> DiagnosticStatus:
-    """The status of a validator: ERROR for a failure, a refused topic or refused samples, WARN for a problem.
-
-    run: the present one or the last. problems: with models and rig, in words. failure: why a result could not be
-    written, empty if it could.
-    """
-    warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
-    if not client.server_available:
-        warnings.append(NO_SERVER)
-    wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
-    level = Level.ERROR if wrong else Level.WARN if warnings else Level.OK
-    values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
-    values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
-    if run is not None:
-        values |= _stream_figures(run, sensors) | _scores(run) | _checks(run)
-        values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
-    message = _paragraph([failure, *warnings]) or state
-    return diagnostic_status(node_name, "validation", level, message, values, rig.shape if rig else "")
 
 
 def _paragraph(texts: Sequence[str]) -> str:

@@ -46,9 +46,9 @@ class ValidationRun:
     """Takes samples, requests a prediction for every window from the client, and scores the answers.
 
     models: by the name to request, the main one first. publish: called for every prediction, with rig and number of
-    the model. alarm: of the main model. output: folder in which windows and residuals are saved as they arrive; None:
-    they are not saved. scalars: the topics that may be published in addition to the sensors. strict: a warning about
-    the samples is an error.
+    the model. world: returns the frame in which the poses are. alarm: of the main model. output: folder in which
+    windows and residuals are saved as they arrive; None: they are not saved. scalars: the topics that may be published
+    in addition to the sensors. strict: a warning about the samples is an error.
     """
 
     def __init__(
@@ -57,6 +57,7 @@ class ValidationRun:
         models: Mapping[str, PushModel],
         client: PredictionClient,
         publish: Callable[[Rig, int, PushWindow, Prediction, PushResidual], None],
+        world: Callable[[], str],
         alarm: AlarmProcess | None = None,
         output: Path | None = None,
         scalars: Sequence[str] = (),
@@ -76,7 +77,7 @@ class ValidationRun:
         self._pushes = CompletedPushes()
         self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
-        self._publish = publish
+        self._publish, self._world = publish, world
         self._first: dict[str, float] = {}  # value of each scalar, by the name of its covariate
         if alarm is not None:
             alarm.begin()
@@ -115,7 +116,7 @@ class ValidationRun:
 
     def write(self, folder: Path) -> list[Path]:
         """Write the JSON, the main model's with the alarm, and the residuals. Raises OSError or RecordingError."""
-        written = [*self.validation.write(folder), write_residuals(self.validation, folder)]
+        written = [*self.validation.write(folder), write_residuals(self.validation, folder, self._world())]
         if self.alarm is not None:
             path = folder / MAIN_RESULT
             write_whole(path, with_alarm(path.read_text(), self.alarm.json).encode())
@@ -164,7 +165,7 @@ class ValidationRun:
         try:
             prediction = _finite(prediction_from_response(response))
             mean, covariance, in_domain = prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
-            residual = residual_to_message(name, window, mean, covariance, in_domain)
+            residual = residual_to_message(name, window, mean, covariance, in_domain, self._world())
         except (RefusedError, MessageError) as error:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
@@ -183,16 +184,17 @@ class ValidationRun:
             self._pass_to_alarm()
 
 
-def write_residuals(validation: LiveValidation, folder: Path) -> Path:
+def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> Path:
     """Write FOLDER/residuals, a rosbag2 folder, and remove the journal of the same residuals.
 
-    One push_residual for each prediction of each model, at the window's end. Raises RecordingError.
+    One push_residual for each prediction of each model, at the window's end. frame_id: of the poses. Raises
+    RecordingError.
     """
     path = folder / BAG
     with BagWriter(path) as bag:
         bag.add_topic(TOPIC, TYPE, definition_text(TYPE))
         for residual in validation.residuals():
-            bag.write(TOPIC, residual.window.end, serialize_message(residual_to_message(*residual)))
+            bag.write(TOPIC, residual.window.end, serialize_message(residual_to_message(*residual, frame_id)))
     (folder / JOURNAL).unlink(missing_ok=True)
     return path
 

@@ -27,16 +27,22 @@ SETTLING = 1_000_000_000  # ns of all transforms of a frame that decide which of
 
 @dataclass
 class _History:
-    """The samples of an edge that are kept; first: number of the first of them, counted from the beginning."""
+    """The samples of an edge that are kept; first: number of the first of them, counted from the beginning.
+
+    set_back: how many were dropped because the clock was set back.
+    """
 
     edge: Edge
     first: int = 0
+    set_back: int = 0
 
     def add(self, child: str, later: Edge) -> bool:
         """Add samples; whether the clock was set back: those before that are dropped. Raises TransformError."""
         self.edge = joined(child, self.edge, later)
         jumps = np.flatnonzero(np.diff(self.edge.stamp) < -CLOCK_SET)
-        self.drop(int(jumps[-1]) + 1 if len(jumps) else 0)
+        old = int(jumps[-1]) + 1 if len(jumps) else 0
+        self.set_back += old
+        self.drop(old)
         return len(jumps) > 0
 
     def drop(self, count: int) -> None:
@@ -200,6 +206,8 @@ class TransformBuffer:
     def _lead(self, progress: _Progress, leader: str) -> None:
         """Take the stamps of another edge from now on, from the first that is newer than the last pose."""
         history = self._histories[leader]
+        if not progress.leader and history.set_back:  # before it was known whose stamps count
+            progress.rejected[SET_BACK] += history.set_back
         done = 0 if progress.newest is None else int(np.sum(history.edge.stamp <= progress.newest))
         progress.leader, progress.done = leader, history.first + done
 
