@@ -31,6 +31,8 @@ LOOKS = (  # modules that change how results look, not what they are
     "push_predictor/evaluation/report/tables.py",
     "push_predictor_paper/report.py",
     "push_predictor_paper/section.py",
+    "push_predictor_paper/claims.py",
+    "push_predictor_paper/verdict.py",
 )
 NO_RESULTS = (  # folders on which no cached result depends
     "reporting",
@@ -39,8 +41,8 @@ NO_RESULTS = (  # folders on which no cached result depends
     "replay",
     "online",
     "commands",
-    "claims",
-    "presentation",
+    "sections",
+    "painters",
     "residuals",
 )
 

@@ -11,24 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.repeated_pushes import modality
-from push_predictor_paper.claims.repeated_pushes.modality import section
-from push_predictor_paper.claims.repeated_pushes.modality_rules import (
-    good_gaussian,
-    mean_over_pushes,
-    model_loss,
-    not_gaussian,
-    some_modes,
-)
+from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, verdict_on
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.figures.histograms import moments
 from push_predictor_paper.fits.fit import Fit, trained
-from push_predictor_paper.section import Section
+from push_predictor_paper.painters.histograms import moments
+from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.sections import modality
+from push_predictor_paper.sections.modality import mean_over_pushes, model_loss, section
 from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
-from push_predictor_paper.statistics.grid_maps import place_text
 
 from push_predictor.models.pushes import Push
 from push_predictor.reporting.canvas import Picture
@@ -60,18 +51,17 @@ def with_modes(tmp_path_factory: pytest.TempPathFactory) -> Section:
 
 @pytest.mark.slow
 def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
-    assert with_modes.findings[0].verdict == "holds"
-    assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
-    cell = grid_with_modes().cells[SPLIT]
-    assert with_modes.tables[2].rows[0][0] == f"{place_text((cell.fraction, cell.angle))}: rotation"
+    assert verdict_on("modality", "modes", with_modes.evidence["modes"]) == "holds"
+    assert with_modes.evidence["modes"].figures[0].text == f"1 of {len(grid_with_modes().seen)}"
+    assert with_modes.evidence["gaussian_good"].figures[0].name == "with several modes"
+    assert with_modes.tables[0].rows[2][1] == 1  # rotation
 
 
 def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(modality, "_picture", lambda *_: Picture(tmp_path, "", ""))
     made = made_up_section(tmp_path, made_up_grid(SHOWN))
-    assert made.findings[0].verdict in ("does not hold", "not decided")
-    assert made.findings[2].verdict == "not decided"
-    assert "no push has several modes" in made.findings[2].sentence
+    assert verdict_on("modality", "modes", made.evidence["modes"]) in ("does not hold", "not decided")
+    assert "none has several modes" in made.evidence["gaussian_good"].figures[0].name
 
 
 @pytest.mark.slow
@@ -79,12 +69,12 @@ def test_section_has_findings_tables_and_picture(with_modes: Section) -> None:
     for table in with_modes.tables:
         assert {len(row) for row in table.rows} == {len(table.head)}
     assert with_modes.pictures[0].path.stat().st_size > 10_000
-    json.dumps(with_modes.data, allow_nan=False)
+    json.dumps(with_modes.tables[0].json(), allow_nan=False)
 
 
 def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
-    made = made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
-    assert [finding.verdict for finding in made.findings] == ["not decided"]
+    with pytest.raises(TooFewError, match="No push of the grid"):
+        made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
 
 
 def test_tests_of_one_mode_and_of_a_gaussian() -> None:
@@ -157,32 +147,3 @@ def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> 
 def test_one_of_many_tests_finds_less_than_one_alone() -> None:
     corrected, single = found_at(5.0, 60, 30, 0.05)
     assert 0.0 < corrected < single
-
-
-@pytest.mark.parametrize(
-    ("window", "end", "power", "verdict"),
-    [(1, 0, 0.1, "holds"), (0, 2, 0.9, "holds in part"), (0, 0, 0.9, "does not hold"), (0, 0, 0.1, "not decided")],
-)
-def test_verdicts_on_modes(window: int, end: int, power: float, verdict: str) -> None:
-    assert some_modes(window, end, power) == verdict
-
-
-@pytest.mark.parametrize(
-    ("certain", "ends", "verdict"),
-    [
-        (1, (0.0, 0.2), "holds"),
-        (0, (0.06, 0.2), "holds in part"),
-        (0, (0.02, 0.2), "not decided"),
-        (0, (0.02, 0.08), "does not hold"),
-    ],
-)
-def test_verdicts_on_gaussians(certain: int, ends: tuple[float, float], verdict: str) -> None:
-    assert not_gaussian(certain, Estimate(0.05, *ends)) == verdict
-
-
-@pytest.mark.parametrize(
-    ("ends", "verdict"),
-    [((0.0, 0.1), "holds"), ((0.1, 0.3), "holds in part"), ((0.2, 0.5), "not decided"), ((0.4, 0.5), "does not hold")],
-)
-def test_verdicts_on_the_loss(ends: tuple[float, float], verdict: str) -> None:
-    assert good_gaussian(Estimate(float(np.mean(ends)), *ends)) == verdict

@@ -203,10 +203,10 @@ LAYOUT = (
     "push_predictor/reporting/html.py",
     "push_predictor/evaluation/report/figures/gallery.py",
     "push_predictor/evaluation/report/page.py",
-    "push_predictor_paper/claims/data.py",
-    "push_predictor_paper/figures/__init__.py",
+    "push_predictor_paper/sections/data.py",
+    "push_predictor_paper/painters/__init__.py",
     "push_predictor_paper/report.py",
-    "push_predictor_paper/presentation/places.py",
+    "push_predictor_paper/claims.py",
 )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.splits import BOOTSTRAP_DRAWS, push_bootstrap
 from push_predictor.types import Array
+from push_predictor_paper.estimate import Estimate
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,10 @@ class Crossing:
     high: float
     first: int
     last: int
+
+    def estimate(self) -> Estimate:
+        """For a verdict: a crossing beyond the last size lies no further than that for certain."""
+        return Estimate(self.value, min(self.low, self.last), self.high)
 
     def text(self) -> str:
         """For a sentence: 95 (70 to 130)."""

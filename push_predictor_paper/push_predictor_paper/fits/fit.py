@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -29,15 +28,16 @@ SPLIT_WORDS = {
     "random": "random split of windows",
     "none": "trained on this set, scored on another",
 }
+SPLIT_SHORT = {"push": "by push", "random": "random"}
 KINDS = ("analytical", "gp", "vhgp")
-INFORMED = {"gp": "informed gp", "vhgp": "informed vhgp"}  # the same with fitted mechanics as mean
+KIND_NAMES = {"analytical": "analytical", "gp": "GP", "vhgp": "VHGP"}
 
 
 @dataclass(frozen=True)
 class Fit:
     """Which model: kind, training windows, split, and the seed of the draw (the held-out fold, by push).
 
-    kind: one of KINDS, whose learned models have a zero mean as the paper's, or one of the values of INFORMED.
+    kind: one of KINDS; the learned models have a zero mean, as the paper's.
     Split `none` holds nothing back: for models that are scored on other pushes, those of the grid.
     """
 
@@ -49,11 +49,10 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Scores of a fit on the held-out windows of its split; cpu: s to train it."""
+    """Scores of a fit on the held-out windows of its split."""
 
     fit: Fit
     push_scores: PushScores
-    cpu: float
 
     @property
     def nmse(self) -> Array:
@@ -80,16 +79,12 @@ def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict
 
 def score(pushes: PushSet, fit: Fit) -> Score:
     """Train and score one fit."""
-    comparison, cpu = compared(pushes, fit)
-    return Score(fit, push_scores(comparison), cpu)
+    return Score(fit, push_scores(compared(pushes, fit)))
 
 
-def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:
-    """Predictions for the held-out windows, and the CPU time of the training, s."""
-    start = time.process_time()
-    model = trained(pushes, fit)
-    cpu = time.process_time() - start
-    return compare(model, pushes.table.take(split_of(pushes, fit).test)), cpu
+def compared(pushes: PushSet, fit: Fit) -> Comparison:
+    """Predictions for the held-out windows."""
+    return compare(trained(pushes, fit), pushes.table.take(split_of(pushes, fit).test))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +111,8 @@ def trained(pushes: PushSet, fit: Fit) -> PushModel:
     """Train the model of a fit."""
     rows = np.sort(split_of(pushes, fit).first(fit.n))
     table = pushes.table.take(rows)
-    informed = fit.kind in INFORMED.values()
-    options = TrainingOptions(
-        n_train=len(rows), seed=fit.seed, mean="mechanics" if informed else "zero", per_path=informed, tails=False
-    )
-    return train_model(table, pushes.rig, fit.kind.removeprefix("informed "), name=fit.kind, options=options)
+    options = TrainingOptions(n_train=len(rows), seed=fit.seed, mean="zero", per_path=False, tails=False)
+    return train_model(table, pushes.rig, fit.kind, name=fit.kind, options=options)
 
 
 def split_of(pushes: PushSet, fit: Fit) -> Split:

@@ -15,10 +15,10 @@ from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KINDS, Fit, compared, split_of, trainable
+from push_predictor_paper.plan import SPEEDS
 from push_predictor_paper.study import Study
 
-SAME_SPEED = 1.12  # speeds within this ratio form a group
-WIDEST, EQUAL_GROUPS = 1.6, 6  # ratio of speeds within a group; groups of speeds without gaps
+SAME_SPEED = 1.12  # ratio of speeds that a reader is told as one
 FEWEST_PUSHES = 8  # at a speed, for an interval
 
 
@@ -27,7 +27,7 @@ class HeldOut:
     """n held-out windows of all folds, of models with `size` training windows.
 
     push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
-    pusher; observed (n, 3); predicted by kind (n, 3); away (n, 3): observed less the training mean.
+    pusher; observed (n, 3); predicted by kind (n, 3).
     """
 
     size: int
@@ -38,7 +38,6 @@ class HeldOut:
     travel: Array
     observed: Array
     predicted: Mapping[str, Array]
-    away: Array
 
     def at(self, group: int) -> HeldOut:
         """The windows of one speed."""
@@ -55,7 +54,6 @@ class HeldOut:
             self.travel[rows],
             self.observed[rows],
             {kind: mean[rows] for kind, mean in self.predicted.items()},
-            self.away[rows],
         )
 
     @property
@@ -97,7 +95,6 @@ def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
         return None
     fits = [Fit(kind, sizes[-1], "push", fold) for kind in KINDS for fold in folds]
     answers = study.work.run("held-out windows", compared, [(pushes, fit) for fit in fits])
-    comparisons = [comparison for comparison, _ in answers]
     count = len(folds)
     rows = np.concatenate([split_of(pushes, fit).test for fit in fits[:count]])
     table = pushes.table.take(rows)
@@ -105,11 +102,10 @@ def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
     group = speed_groups(table.push_id, speed)
     speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
     predicted = {
-        kind: np.concatenate([c.mean for c in comparisons[k * count : (k + 1) * count]]) for k, kind in enumerate(KINDS)
+        kind: np.concatenate([c.mean for c in answers[k * count : (k + 1) * count]]) for k, kind in enumerate(KINDS)
     }
-    away = np.concatenate([c.observed - c.training_mean for c in comparisons[:count]])
     travel = table.inputs[:, 0] * table.duration
-    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted, away)
+    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted)
 
 
 def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
@@ -120,18 +116,8 @@ def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
 
 
 def speed_groups(push_id: np.ndarray, speed: Array) -> IntArray:
-    """Numbers (n,) of groups: speeds (n,) that lie closer together than SAME_SPEED share one.
-
-    Speeds without gaps between them are cut into groups of equal size.
-    """
-    order = np.argsort(speed, kind="stable")
-    steps = speed[order][1:] > SAME_SPEED * speed[order][:-1]
-    number = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
-    if any(np.ptp(np.log(speed[order][number == k])) > np.log(WIDEST) for k in range(number[-1] + 1)):
-        number = np.arange(len(speed), dtype=np.int64) * EQUAL_GROUPS // len(speed)
-    group = np.empty(len(speed), dtype=np.int64)
-    group[order] = number
-    return joined(group, push_id)
+    """Numbers (n,) of groups: the nearest of the paper's speeds, as a ratio; see `joined`."""
+    return joined(np.abs(np.log(speed)[:, None] - np.log(SPEEDS)).argmin(axis=1), push_id)
 
 
 def joined(group: IntArray, push_id: np.ndarray) -> IntArray:

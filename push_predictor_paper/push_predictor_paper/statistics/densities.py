@@ -15,6 +15,7 @@ from push_predictor.models.gaussian_process.prediction import exact_log_density,
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
+from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.fit import Fit, trained
 from push_predictor_paper.statistics.unimodality import dip, holm, p_values, power, uniform_dips
 
@@ -22,6 +23,7 @@ RESOLUTION = 50  # draws of the uniform for each test: 2 % is the least family-w
 FOLDS = 5
 ITERATIONS = 100
 NARROWEST = 0.1  # of the sample's sd: what a mode's may shrink to
+FAR, POWER = 6.0, 0.8  # two equal modes so many of their sd apart should be found so often
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,11 @@ def found_at(separation: float, n: int, tests: int, level: float) -> tuple[float
     null = uniform_dips(n, RESOLUTION * tests)
     corrected, single = (float(np.quantile(null, 1.0 - p, method="higher")) for p in (level / tests, level))
     return power(n, separation, corrected), power(n, separation, single)
+
+
+def count_with_modes(found: int, power: float) -> Estimate:
+    """The number of pushes with several modes; one that a test of too little power found may be any larger one."""
+    return Estimate(float(found), float(found), float(found) if power >= POWER else np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from push_predictor_paper.estimate import Estimate, of_draws
 
 BLOCK = (0.2, 0.4)  # of the side, rad: neighbouring pushes are alike and are resampled as a block
 DRAWS = 400
+FEWEST_PUSHES = 8  # of a grid, to compare maps
 ROUNDING = 1e-9
 Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
 Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m): (d,)
@@ -30,6 +31,9 @@ def place_text(place: Place) -> str:
 def in_degrees(angle: float) -> str:
     """An angle (rad) in degrees, in words."""
     return f"{np.round(np.degrees(angle)) + 0.0:.0f}°".replace("-", "−")
+
+
+OF_BLOCKS = f"Intervals resample blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])})."
 
 
 def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.statistics.grid_maps import ROUNDING, Place, at_places
 
 SURE = 0.95
+STEP = 0.1  # of the side, and rad: the paper's grid
 
 
 @dataclass(frozen=True)
@@ -29,15 +30,10 @@ class Peak:
     places: tuple[Place, ...]
     reach: Estimate
 
-    def near(self, named: Sequence[Place], step: Place) -> list[bool]:
-        """Whether each of the places lies within one step (of the side, rad) of a named one."""
-        return [
-            any(
-                abs(c - contact) <= step[0] + ROUNDING and abs(a - angle) <= step[1] + ROUNDING
-                for contact, angle in named
-            )
-            for c, a in self.places
-        ]
+    def steps_from(self, named: Sequence[Place]) -> Estimate:
+        """Steps of the paper's grid from the nearest of the named places; the interval is over the places."""
+        away = [min(max(abs(c - n[0]), abs(a - n[1])) for n in named) / STEP for c, a in (self.place, *self.places)]
+        return Estimate(away[0], min(away[1:]), max(away[1:]))
 
 
 def peak(
