@@ -268,7 +268,7 @@ CLAIMS: dict[str, dict[str, Claim]] = {  # by section of the report
             "A model without the speed as an input is best with pushes of up to 50 to 80 mm/s",
             "figure 11",
             "Top speed of the training pushes with the lowest NMSE of the VHGP",
-            Bound(*(1e3 * speed for speed in TURN)),
+            Bound(1e3 * TURN[0], 1e3 * TURN[1]),
             form=".0f",
             unit="mm/s",
         ),

@@ -19,7 +19,18 @@ from push_predictor_paper.painters.histograms import moments
 from push_predictor_paper.section import Section, TooFewError
 from push_predictor_paper.sections import modality
 from push_predictor_paper.sections.modality import mean_over_pushes, model_loss, section
-from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
+from push_predictor_paper.statistics.modes import (
+    LogDensities,
+    dip,
+    found_at,
+    held_out,
+    holm,
+    log_densities,
+    p_values,
+    power,
+    shape,
+    uniform_dips,
+)
 
 from push_predictor.models.pushes import Push
 from push_predictor.reporting.canvas import Picture
@@ -147,3 +158,30 @@ def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> 
 def test_one_of_many_tests_finds_less_than_one_alone() -> None:
     corrected, single = found_at(5.0, 60, 30, 0.05)
     assert 0.0 < corrected < single
+
+
+def test_quantiles_of_the_uniform_equal_the_published_table() -> None:
+    # Table of the R package diptest, a million samples each, n = 100 and 30; the tolerance is four standard errors.
+    for n, published in ((100, [0.035462, 0.047153, 0.051128]), (30, [0.061451, 0.081479, 0.088169])):
+        found = np.quantile(uniform_dips(n, 10_000), [0.5, 0.9, 0.95])
+        np.testing.assert_allclose(found, published, rtol=0.02)
+
+
+def test_p_values_are_uniform_for_the_uniform_and_small_for_two_modes() -> None:
+    rng = np.random.default_rng(5)
+    p = p_values(dip(rng.random((400, 30))), 30, 2000)
+    assert np.quantile(p, 0.5) == pytest.approx(0.5, abs=0.08)
+    assert 0.02 < np.mean(p <= 0.05) < 0.09
+    two = dip(rng.standard_normal((1, 30)) + 20.0 * (np.arange(30) % 2))
+    assert p_values(two, 30, 2000)[0] == 1.0 / 2001.0
+
+
+def test_holm_equals_values_computed_by_hand() -> None:
+    np.testing.assert_allclose(holm(np.array([0.04, 0.01, 0.03, 0.5])), [0.09, 0.04, 0.09, 0.5])
+    assert holm(np.array([0.6, 0.7])).max() == 1.0
+    assert holm(np.zeros(0)).shape == (0,)
+
+
+def test_power_grows_with_the_distance_of_the_modes() -> None:
+    found = [power(50, apart, 0.08, draws=200) for apart in (0.0, 3.0, 5.0, 8.0)]
+    assert found == sorted(found) and found[0] < 0.05 and found[-1] > 0.95

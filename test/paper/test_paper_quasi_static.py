@@ -14,7 +14,6 @@ import pytest
 from push_predictor_paper.data.time_scaled import (
     TRAVEL,
     Bracket,
-    EqualTravel,
     equal_travel,
     fold_of,
     number_of,
@@ -87,8 +86,7 @@ def test_the_same_push_twice_as_fast_has_the_same_outcome_when_slow_and_not_when
     """The simulator's own truth: inertia is nothing at 20 mm/s and something at 200 mm/s."""
     plan = replace(FEW, speeds=(0.01, 0.02, 0.2), speed_pushes=6)
     slowest, slow, fast = (equal_travel(plan, "rect1", "plywood", k) for k in range(3))
-    assert slowest.outcomes.shape == (6, 3)
-    assert np.all(slowest.touching > 0.9)
+    assert slowest.shape == (6, 3)
     assert departure(slowest, slow).value < 0.01
     assert departure(slowest, fast).value > 0.03
 
@@ -109,11 +107,11 @@ def test_windows_are_of_equal_travel_at_every_speed() -> None:
 def test_departure_is_in_units_of_the_slowest_outcomes_variance() -> None:
     """Outcomes that all miss by half an sd in one output depart by a quarter."""
     rng = np.random.default_rng(0)
-    outcomes, kept = rng.standard_normal((200, 3)), np.ones(200)
+    outcomes = rng.standard_normal((200, 3))
     shifted = outcomes + [0.5 * outcomes[:, 0].std(), 0.0, 0.0]
-    assert departure(EqualTravel(outcomes, kept), EqualTravel(shifted, kept)).value == pytest.approx(0.25)
+    assert departure(outcomes, shifted).value == pytest.approx(0.25)
     shifted[:100] = outcomes[:100]
-    half = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, kept))
+    half = departure(outcomes, shifted)
     assert half.value == pytest.approx(0.125) and half.low < 0.125 < half.high
 
 

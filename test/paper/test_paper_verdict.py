@@ -17,7 +17,7 @@ from push_predictor_paper.claims import CLAIMS
 from push_predictor_paper.estimate import Estimate, exactly, of_ends, over_seeds
 from push_predictor_paper.report import OF_CORPUS, OF_STUDY, TITLES
 from push_predictor_paper.section import Number, Table
-from push_predictor_paper.statistics.densities import count_with_modes
+from push_predictor_paper.statistics.modes import count_with_modes
 from push_predictor_paper.verdict import Bound, Claim, Evidence, Figure, judged, verdict_of
 
 WITHIN, WIDER = Bound(0.0, 1.0), Bound(0.0, 2.0)

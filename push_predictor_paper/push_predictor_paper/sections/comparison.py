@@ -62,7 +62,6 @@ def section(study: Study, corpus: Corpus) -> Section:
         (
             *(_table(corpus, found, split, last[split]) for split in SPLITS),
             _paper_table(corpus, found, last["push"]),
-            _crossing_table(corpus, where),
             _gain_table(corpus, gains),
         ),
         (_picture(study, corpus, found, sizes, where), _gain_picture(study, corpus, gains)),
@@ -168,15 +167,6 @@ def _paper_table(corpus: Corpus, found: Curves, n: int) -> Table:
     )
     head = ("", *(f"{KIND_NAMES[kind]}, {whose}" for whose in ("paper", "here") for kind in KINDS))
     return Table(caption, head, tuple(rows))
-
-
-def _crossing_table(corpus: Corpus, where: Crossings) -> Table:
-    rows = tuple((KIND_NAMES[kind], *(where[split][kind] for split in SPLITS)) for kind in LEARNED)
-    caption = (
-        f"Training windows from which the total NMSE stays below the analytical model's, linear in log n. Interval by "
-        f"resampling pushes and seeds. Pushes: {corpus.name}, {_pair(corpus)}. The paper: about 100."
-    )
-    return Table(caption, ("", *(SPLIT_WORDS[split] for split in SPLITS)), rows)
 
 
 def _gain_table(corpus: Corpus, gains: Gains) -> Table:

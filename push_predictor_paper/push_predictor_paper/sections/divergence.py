@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.special import digamma
 
 from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import Picture
@@ -20,8 +21,7 @@ from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer, Fit, ask
 from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
-from push_predictor_paper.statistics.divergence import expected_kl, gaussian_kl, kl_of_mean, printed_kl
-from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, mean_of, median_of, on_grid
+from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, mean_of, median_of
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
@@ -95,6 +95,34 @@ def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:
     return Divergences(correct, printed, of_mean, model_sd / sd, block_weights(grid.seen))
 
 
+def gaussian_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
+    """KL(N(mean, sd^2) || N(model_mean, model_sd^2)) elementwise, nats, 0 where they agree; shapes broadcast.
+
+    mean and model_mean in one unit, which drops out; sd and model_sd > 0 in the same.
+    """
+    ratio = (sd / model_sd) ** 2
+    return 0.5 * (ratio - 1.0 - np.log(ratio)) + kl_of_mean(mean, model_mean, model_sd)
+
+
+def kl_of_mean(mean: Array, model_mean: Array, model_sd: Array) -> Array:
+    """The part of `gaussian_kl` due to the difference of the means; the rest is due to the standard deviations."""
+    return np.asarray(0.5 * ((mean - model_mean) / model_sd) ** 2)
+
+
+def printed_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
+    """The KL divergence as printed in Bauza and Rodriguez 2017, section VI, where the log term is half too small.
+
+    It is not a divergence: for a correct model with 1.4 times the standard deviation it reaches its minimum of -0.077.
+    """
+    return gaussian_kl(mean, sd, model_mean, model_sd) - 0.5 * np.log(model_sd / sd)
+
+
+def expected_kl(count: int) -> float:
+    """Expected KL divergence from mean and sd (ddof 1) of `count` > 1 samples to the true Gaussian, a correct model."""
+    freedom = 0.5 * (count - 1)
+    return 0.5 * float(np.log(freedom) - digamma(freedom) + 1.0 / count)
+
+
 def estimate(values: Array, statistic: Statistic, weights: Array, less: Array | None = None) -> Estimate:
     """Mean over seeds of a statistic of values (s, p), with interval from weights (d, p); minus that of `less`."""
     value, draws = by_seed(values, statistic).mean(), np.mean([statistic(seed, weights) for seed in values], axis=0)
@@ -160,7 +188,7 @@ def _maps(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences]) -> Pi
     scale = ColourScale(max(float(every.min()), 1e-3), float(every.max()), "viridis", "neither")
     maps = []
     for kind, values in kl.items():
-        shown = on_grid(grid, np.repeat(values[:, None], 3, axis=1))[..., 0]
+        shown = grid.as_map(np.repeat(values[:, None], 3, axis=1))[..., 0]
         title = f"KL(repetitions || {KIND_NAMES[kind]})"
         maps.append(Map(title, grid.fractions, grid.angles, shown, scale, "KL (nats)", logarithmic=True))
     return picture(

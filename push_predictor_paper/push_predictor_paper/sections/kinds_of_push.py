@@ -18,9 +18,8 @@ from push_predictor_paper.estimate import of_draws
 from push_predictor_paper.painters.trajectories import Trajectories, paint_trajectories
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
-from push_predictor_paper.statistics.densities import FAR, RESOLUTION, count_with_modes, found_at
 from push_predictor_paper.statistics.grid_maps import place_text
-from push_predictor_paper.statistics.unimodality import dip, holm, p_values
+from push_predictor_paper.statistics.modes import FAR, RESOLUTION, count_with_modes, dip, found_at, holm, p_values
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 

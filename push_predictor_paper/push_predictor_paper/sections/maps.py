@@ -16,7 +16,6 @@ from push_predictor.evaluation.report.maps import colour_scale
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import SYMBOLS, UNIT_NAMES, UNITS, Picture
 from push_predictor.types import Array
-from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.repetitions import FEWEST, RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, of_draws, over_seeds
 from push_predictor_paper.fits.fit import Answer
@@ -26,7 +25,6 @@ from push_predictor_paper.fits.map_models import (
     ModelMap,
     averaged,
     reference_maps,
-    square_maps,
     together,
 )
 from push_predictor_paper.painters.maps import Map, paint_maps
@@ -35,18 +33,18 @@ from push_predictor_paper.section import Number, Section, Table, TooFewError, pi
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
     OF_BLOCKS,
+    Peak,
     Place,
     at_places,
     block_weights,
     by_blocks,
     correlation,
-    on_grid,
+    peak,
     place_text,
     redrawn,
     relative_error,
     unbiased,
 )
-from push_predictor_paper.statistics.peaks import Peak, peak
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
@@ -111,8 +109,8 @@ def section(study: Study) -> Section:
     grid = study.reference_grid
     if len(grid.seen) < FEWEST_PUSHES:
         raise TooFewError(f"Only {len(grid.seen)} pushes of the grid have {FEWEST} repetitions; {FEWEST_PUSHES} must.")
-    models = reference_maps(study, "vhgp", study.plan.seeds)
-    plain = reference_maps(study, "gp", study.plan.seeds)
+    models = reference_maps(study, "vhgp")
+    plain = reference_maps(study, "gp")
     answers = {
         name: [m.at_pushes for m in maps if m.at_pushes is not None] for name, maps in (("VHGP", models), ("GP", plain))
     }
@@ -121,13 +119,13 @@ def section(study: Study) -> Section:
         {**peak_evidence(peaks_of(grid, models)), **agreement_evidence(alike)},
         (_agreement_table(study, alike),),
         [_picture(study, shown, answer, quantity) for quantity in ("mean", "sd")],
-        (*NOTES, *(_measured_note(study, corpus) for corpus in study.measured)),
+        NOTES,
     )
 
 
 def peaks_of(grid: RepeatedGrid, models: Sequence[ModelMap]) -> Peaks:
     """Find all peaks; models: one per draw of training rows."""
-    drawn = np.abs(on_grid(grid, redrawn(grid.seen)[0]))
+    drawn = np.abs(grid.as_map(redrawn(grid.seen)[0]))
     shown = np.abs(grid.mean)
     repeated = [
         peak(grid.fractions, grid.angles, shown[..., k], drawn[..., k], NAMED[name], unbiased)
@@ -271,19 +269,3 @@ def _picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -> Pi
 
 def _windows(study: Study) -> int:
     return min(study.plan.size, len(study.simulated.sets[study.simulated.reference].table))
-
-
-def _measured_note(study: Study, corpus: Corpus) -> str:
-    """A note on the maxima of VHGPs of measured windows."""
-    models = square_maps(study, corpus)
-    if not models:
-        return f"{corpus.title}: no windows of a square at about 20 mm/s, so there are no maps."
-    places = "; ".join(
-        f"|{NAMES[k]}| {found.value.times(UNITS[k]).text()} {UNIT_NAMES[k]} at {place_text(found.place)}, the paper's "
-        f"push reaches {found.reach.text('.1%')} of it"
-        for k, found in enumerate(model_peaks(models))
-    )
-    return (
-        f"{corpus.title}. VHGPs of {len(models)} draws of training windows are largest at: {places}. There are no "
-        "repetitions to compare with."
-    )

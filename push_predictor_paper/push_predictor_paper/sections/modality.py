@@ -18,7 +18,8 @@ from push_predictor_paper.estimate import Estimate, exactly, of_draws
 from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.painters.histograms import WIDTHS, Histogram, paint_histograms, shown_values
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
-from push_predictor_paper.statistics.densities import (
+from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, block_weights, place_text
+from push_predictor_paper.statistics.modes import (
     FAR,
     LogDensities,
     Shape,
@@ -27,7 +28,6 @@ from push_predictor_paper.statistics.densities import (
     log_densities,
     shape,
 )
-from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, block_weights, place_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 

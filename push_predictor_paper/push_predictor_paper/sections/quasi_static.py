@@ -21,7 +21,6 @@ from push_predictor_paper.data.time_scaled import (
     TRAVEL,
     WINDOWS,
     Bracket,
-    EqualTravel,
     equal_travel,
     number_of,
     score_bracket,
@@ -89,7 +88,7 @@ class Facts:
 
     pushes: int
     speeds: tuple[float, ...]
-    equal: tuple[EqualTravel, ...]
+    equal: tuple[Array, ...]
     windows: tuple[PushTable, ...]
     judged: Judged
     rows: int
@@ -200,13 +199,13 @@ def turn_of(speeds: Sequence[float], curves: Array) -> Estimate:
     return estimated(np.asarray(speeds)[lowest])
 
 
-def departure(slowest: EqualTravel, other: EqualTravel) -> Estimate:
+def departure(slowest: Array, other: Array) -> Estimate:
     """Squared distance of outcomes from those of the same pushes at the slowest speed.
 
     In units of the variance at the slowest speed, summed over outputs: the NMSE of a prediction whose only error is the
     quasi-static assumption.
     """
-    squared = ((other.outcomes - slowest.outcomes) ** 2 / slowest.outcomes.var(axis=0)).sum(axis=1)
+    squared = ((other - slowest) ** 2 / slowest.var(axis=0)).sum(axis=1)
     rows = np.random.default_rng(0).integers(0, len(squared), (1000, len(squared)))
     return of_draws(float(squared.mean()), squared[rows].mean(axis=1))
 
