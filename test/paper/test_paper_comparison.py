@@ -41,7 +41,7 @@ def curves_of(**kinds) -> Curves:
     return Curves(
         {
             (CORPUS.reference, kind, split, n): tuple(
-                Score(Fit(kind, n, split, k), push_scores(**arguments, fold=k)) for k in range(5)
+                Score(Fit(kind, n, split, k), push_scores(**arguments, fold=k), np.zeros((40, 3))) for k in range(5)
             )
             for kind, by_size in kinds.items()
             for n, arguments in zip(SIZES, by_size, strict=True)
@@ -95,7 +95,8 @@ def test_noise_from_push_to_push_widens_the_interval():
 
 def test_crossing_text_names_the_smallest_and_largest_size():
     assert Crossing(10.0, 10.0, np.inf, 10, 1000).text() == "at most 10 (at most 10 to beyond 1000)"
-    assert Crossing(np.inf, 95.0, np.inf, 10, 1000).json()["value"] is None
+    beyond = Crossing(np.inf, np.inf, np.inf, 10, 140).estimate()
+    assert (beyond.low, beyond.high) == (140, np.inf)
 
 
 @pytest.mark.parametrize(

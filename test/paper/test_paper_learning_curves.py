@@ -33,7 +33,7 @@ def score(fit: Fit, nmse: float, nlpd: float) -> Score:
     push_scores = PushScores(
         np.array(list("abcdef")), np.ones(6), one * nmse / 3, one, one * nlpd / 3, one * nlpd / 3, np.ones((6, 3, 3))
     )
-    return Score(fit, push_scores)
+    return Score(fit, push_scores, np.zeros((6, 3)))
 
 
 def made_up(nmse, nlpd=lambda shape, surface, n: -10.0, sizes=(500, 1000), noise=0.01) -> Curves:

@@ -27,7 +27,7 @@ from push_predictor_paper.section import TooFewError
 from push_predictor_paper.sections.quasi_static import (
     MAIN,
     SERIES,
-    Judged,
+    Brackets,
     beyond,
     course,
     departure,
@@ -69,9 +69,10 @@ def scores_of(error: dict[int, float], pushes: int = 40) -> PushScores:
     )
 
 
-def judged_from(errors: list[dict[int, float]]) -> Judged:
+def judged_from(errors: list[dict[int, float]]) -> Brackets:
     """Brackets of these errors by speed."""
-    return Judged(SPEEDS, tuple(range(5)), {series: [scores_of(error) for error in errors] for series in SERIES})
+    scores = [scores_of(error) for error in errors]
+    return Brackets(SPEEDS, tuple(range(5)), 50, 200, dict.fromkeys(SERIES, scores))
 
 
 def flat(level: float) -> dict[int, float]:

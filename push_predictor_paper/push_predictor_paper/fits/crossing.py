@@ -34,16 +34,6 @@ class Crossing:
         """For a sentence: 95 (70 to 130)."""
         return f"{self._size_text(self.value)} ({self._size_text(self.low)} to {self._size_text(self.high)})"
 
-    def cell(self) -> str:
-        """For a table: the interval beneath."""
-        return f"{self._size_text(self.value)}\n{self._size_text(self.low)} to {self._size_text(self.high)}"
-
-    def json(self) -> dict[str, float | None]:
-        """null: not up to the last size tried."""
-        ends = {"value": self.value, "low": self.low, "high": self.high}
-        reached: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
-        return {**reached, "first_tried": self.first, "last_tried": self.last}
-
     def _size_text(self, size: float) -> str:
         if not np.isfinite(size):
             return f"beyond {self.last}"

@@ -13,7 +13,7 @@ import numpy as np
 
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.splits import Split, random_split, split_by_push
-from push_predictor.evaluation.validation import Comparison, compare
+from push_predictor.evaluation.validation import compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array, BoolArray
@@ -49,10 +49,11 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Scores of a fit on the held-out windows of its split."""
+    """Scores of a fit on the held-out windows of its split; predicted: their means (m, 3)."""
 
     fit: Fit
     push_scores: PushScores
+    predicted: Array
 
     @property
     def nmse(self) -> Array:
@@ -79,12 +80,8 @@ def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict
 
 def score(pushes: PushSet, fit: Fit) -> Score:
     """Train and score one fit."""
-    return Score(fit, push_scores(compared(pushes, fit)))
-
-
-def compared(pushes: PushSet, fit: Fit) -> Comparison:
-    """Predictions for the held-out windows."""
-    return compare(trained(pushes, fit), pushes.table.take(split_of(pushes, fit).test))
+    comparison = compare(trained(pushes, fit), pushes.table.take(split_of(pushes, fit).test))
+    return Score(fit, push_scores(comparison), comparison.mean)
 
 
 @dataclass(frozen=True, eq=False)

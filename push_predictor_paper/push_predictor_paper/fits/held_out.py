@@ -14,7 +14,8 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fit import KINDS, Fit, compared, split_of, trainable
+from push_predictor_paper.fits.curves import curves
+from push_predictor_paper.fits.fit import KINDS, split_of
 from push_predictor_paper.plan import SPEEDS
 from push_predictor_paper.study import Study
 
@@ -45,16 +46,8 @@ class HeldOut:
 
     def take(self, rows: np.ndarray) -> HeldOut:
         """Some of the windows."""
-        return HeldOut(
-            self.size,
-            self.push_id[rows],
-            self.speed[rows],
-            self.group[rows],
-            self.speeds,
-            self.travel[rows],
-            self.observed[rows],
-            {kind: mean[rows] for kind, mean in self.predicted.items()},
-        )
+        columns = {f: getattr(self, f)[rows] for f in ("push_id", "speed", "group", "travel", "observed")}
+        return replace(self, **columns, predicted={kind: mean[rows] for kind, mean in self.predicted.items()})
 
     @property
     def pushes(self) -> int:
@@ -83,27 +76,20 @@ class HeldOut:
 
 
 def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
-    """Train all kinds on the reference pair, fold by fold; None if no planned size is small enough for the set.
+    """The windows of the reference pair's learning curves at the plan's size, or at the largest smaller one; else None.
 
-    The size is the plan's, or the largest smaller one that every fold holds.
+    All kinds of model, fold by fold.
     """
-    pushes = corpus.sets[corpus.reference]
-    folds = range(study.plan.seeds)
-    fewest = min(trainable(pushes, Fit("gp", 1, "push", fold)) for fold in folds)
-    sizes = [n for n in study.plan.sizes if n <= fewest]
+    pushes, found = corpus.sets[corpus.reference], curves(study, corpus, [corpus.reference], KINDS)
+    sizes = [n for n in found.sizes([corpus.reference], "gp", "push") if n <= study.plan.size]
     if not sizes:
         return None
-    fits = [Fit(kind, sizes[-1], "push", fold) for kind in KINDS for fold in folds]
-    answers = study.work.run("held-out windows", compared, [(pushes, fit) for fit in fits])
-    count = len(folds)
-    rows = np.concatenate([split_of(pushes, fit).test for fit in fits[:count]])
-    table = pushes.table.take(rows)
+    folds = {kind: found.cells[corpus.reference, kind, "push", sizes[-1]] for kind in KINDS}
+    table = pushes.table.take(np.concatenate([split_of(pushes, score.fit).test for score in folds["gp"]]))
     speed = push_speeds(table.push_id, table.inputs[:, 0])
     group = speed_groups(table.push_id, speed)
     speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
-    predicted = {
-        kind: np.concatenate([c.mean for c in answers[k * count : (k + 1) * count]]) for k, kind in enumerate(KINDS)
-    }
+    predicted = {kind: np.concatenate([score.predicted for score in scores]) for kind, scores in folds.items()}
     travel = table.inputs[:, 0] * table.duration
     return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted)
 

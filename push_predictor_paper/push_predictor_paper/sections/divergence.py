@@ -17,7 +17,8 @@ from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer, Fit, ask
+from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer
+from push_predictor_paper.fits.map_models import reference_maps
 from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
@@ -65,7 +66,8 @@ def section(study: Study) -> Section:
     grid = study.reference_grid
     if not grid.seen:
         raise TooFewError("No push of the grid has enough repetitions for a mean and a standard deviation.")
-    found = _divergences(study, grid)
+    models = {kind: reference_maps(study, kind) for kind in KINDS}
+    found = {kind: divergences(grid, [m.at_pushes for m in maps if m.at_pushes]) for kind, maps in models.items()}
     floor = float(np.mean([3.0 * expected_kl(len(cell.outcomes)) for cell in grid.seen]))
     median, mean = (estimate(found["vhgp"].correct, s, found["vhgp"].weights) for s in (median_of, mean_of))
     good = Evidence([Figure("", median)], f"Mean {mean.text()}, {len(grid.seen)} pushes.")
@@ -75,15 +77,6 @@ def section(study: Study) -> Section:
         (_maps(study, grid, found), _curves(study, grid, found, floor)),
         NOTES,
     )
-
-
-def _divergences(study: Study, grid: RepeatedGrid) -> dict[str, Divergences]:
-    """Train all kinds of model, predict the pushes of the grid, and compute the divergences."""
-    pushes, seeds = study.simulated.sets[study.simulated.reference], range(study.plan.seeds)
-    n = min(study.plan.size, len(pushes.table))
-    calls = [(pushes, Fit(kind, n, "none", seed), grid.typical_inputs) for kind in KINDS for seed in seeds]
-    answers = study.work.run("models of repeated pushes", ask, calls)
-    return {kind: divergences(grid, answers[k * len(seeds) : (k + 1) * len(seeds)]) for k, kind in enumerate(KINDS)}
 
 
 def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:

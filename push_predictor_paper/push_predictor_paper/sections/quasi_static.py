@@ -29,14 +29,14 @@ from push_predictor_paper.data.time_scaled import (
 )
 from push_predictor_paper.estimate import Estimate, of_draws, of_ends, total_nmse
 from push_predictor_paper.painters.curves import LOOKS, SPEED_TICKS, Line, Panel, paint_curves
+from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
 FEWEST, MOST = 10, 50  # training windows of a speed
 EQUAL = 200  # training windows of the control, in every bracket
-MAIN, GP, SAME_SIZE, WITH_SPEED = "VHGP", "GP", "VHGP, equal n", "VHGP with speed as input"
-SERIES = (MAIN, GP, SAME_SIZE, WITH_SPEED)
+SERIES = MAIN, SAME_SIZE, WITH_SPEED = "VHGP", "VHGP, equal n", "VHGP with speed as input"
 SLOW = 0.02  # m/s and below: the slowest pushes
 NOTABLE = 0.1  # of a model's error
 NOTES = (
@@ -54,15 +54,22 @@ NOTES = (
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Brackets:
     """Scores of models of growing brackets of speeds, all on the same held-out pushes.
 
-    speeds: top speeds (m/s) of the brackets. numbers: their places in the plan. scores: by series, one per bracket.
+    speeds: top speeds (m/s) of the brackets. numbers: their places in the plan. rows: training windows of each speed;
+    same_size: of a bracket of the control. scores: by series, one per bracket.
     """
 
     speeds: tuple[float, ...]
     numbers: tuple[int, ...]
+    rows: int
+    same_size: int
     scores: Mapping[str, Sequence[PushScores]]
+
+    def size(self, series: str, bracket: int) -> int:
+        """The number of training windows of a bracket."""
+        return _rows(series, bracket + 1, self.rows, self.same_size) * (bracket + 1)
 
     def same(self, series: str) -> Array:
         """NMSE (brackets, 1 + draws) of each bracket on held-out pushes of its own speeds; the first is the value."""
@@ -82,70 +89,51 @@ class Judged:
             return total_nmse(push_scores.totals(weights))
 
 
-@dataclass(frozen=True, eq=False)
-class Facts:
-    """The results: pushes of equal travel by speed, windows by speed, scores. rows: training windows of each speed."""
-
-    pushes: int
-    speeds: tuple[float, ...]
-    equal: tuple[Array, ...]
-    windows: tuple[PushTable, ...]
-    judged: Judged
-    rows: int
-    same_size: int
-
-    def size(self, series: str, bracket: int) -> int:
-        """The number of training windows of a bracket."""
-        return _rows(series, bracket + 1, self.rows, self.same_size) * (bracket + 1)
-
-
 def section(study: Study) -> Section:
     """NMSE by the top speed of the training pushes, and the departure of outcomes from those of slow pushes."""
-    facts = facts_of(study)
-    if len(facts.judged.speeds) < 2:
-        raise TooFewError(f"Fewer than two speeds gave {FEWEST} training windows in every fold.")
-    departures = [departure(facts.equal[0], other) for other in facts.equal]
-    error = estimated(facts.judged.slow(SAME_SIZE)[0]).value
-    return Section(
-        {
-            "course": course(facts.judged),
-            "turn": turn(facts.judged),
-            "beyond": beyond(dict(zip(facts.speeds[1:], departures[1:], strict=True)), error),
-            "speed_input": speed_as_input(facts.judged),
-        },
-        (_bracket_table(facts), _speed_table(facts, departures)),
-        (_picture(study, facts, departures, error),),
-        NOTES,
-    )
-
-
-def facts_of(study: Study) -> Facts:
-    """Simulate, train and score all models."""
     plan, pair = study.plan, study.simulated.reference
     calls = [(plan, *pair, number) for number in range(len(plan.speeds))]
     windows = study.work.run("pushes of equal travel", speed_windows, calls)
     equal = study.work.run("the same pushes at every speed", equal_travel, calls)
-    folds = range(plan.seeds)
+    models = brackets_of(study, windows)
+    departures = {speed: departure(equal[0], other) for speed, other in zip(plan.speeds, equal, strict=True)}
+    error = estimated(models.slow(SAME_SIZE)[0]).value
+    return Section(
+        {
+            "course": course(models),
+            "turn": turn(models),
+            "beyond": beyond({speed: d for speed, d in departures.items() if speed > plan.speeds[0]}, error),
+            "speed_input": speed_as_input(models),
+        },
+        (_bracket_table(models), _speed_table(plan, windows, departures)),
+        (_picture(study, models, departures, error),),
+        NOTES,
+    )
+
+
+def brackets_of(study: Study, windows: Sequence[PushTable]) -> Brackets:
+    """Train and score all models. Raises TooFewError unless two speeds have enough windows."""
+    plan, folds = study.plan, range(study.plan.seeds)
     least = [min(len(training_rows(w, Bracket(MAIN, 1, len(w), False, fold))) for fold in folds) for w in windows]
     numbers = tuple(k for k, count in enumerate(least) if count >= FEWEST)
-    usable = [windows[k] for k in numbers]
+    if len(numbers) < 2:
+        raise TooFewError(f"Fewer than two speeds gave {FEWEST} training windows in every fold.")
     rows = min([MOST, *(least[k] for k in numbers)])
     same_size = min([EQUAL, *(least[k] * (place + 1) for place, k in enumerate(numbers))])
     brackets = {
-        (series, k, fold): _bracket(series, k + 1, fold, rows, same_size)
+        (series, k, fold): Bracket("vhgp", k + 1, _rows(series, k + 1, rows, same_size), series == WITH_SPEED, fold)
         for series in SERIES
         for k in range(len(numbers))
         for fold in folds
     }
-    rig = study.simulated.sets[pair].rig
+    usable, rig = [windows[k] for k in numbers], study.simulated.sets[study.simulated.reference].rig
     done = study.work.run("models of time-scaled pushes", score_bracket, [(usable, rig, b) for b in brackets.values()])
     found = dict(zip(brackets, done, strict=True))
     scores = {s: [pooled([found[s, k, f] for f in folds]) for k in range(len(numbers))] for s in SERIES}
-    of_brackets = Judged(tuple(plan.speeds[k] for k in numbers), numbers, scores)
-    return Facts(plan.speed_pushes, plan.speeds, tuple(equal), tuple(windows), of_brackets, rows, same_size)
+    return Brackets(tuple(plan.speeds[k] for k in numbers), numbers, rows, same_size, scores)
 
 
-def course(models: Judged) -> Evidence:
+def course(models: Brackets) -> Evidence:
     """Do faster pushes first help, then harm? Against the last bracket whose top speed is in the paper's range."""
     within = [k for k, speed in enumerate(models.speeds) if TURN[0] <= speed <= TURN[1]]
     if not within:
@@ -156,9 +144,9 @@ def course(models: Judged) -> Evidence:
     return Evidence(figures, f"At equal n {equal}: a gain that vanishes there comes from more data.")
 
 
-def turn(models: Judged) -> Evidence:
+def turn(models: Brackets) -> Evidence:
     """With pushes of up to which speed is a model best?"""
-    others = {"GP": models.same(GP), SAME_SIZE: models.same(SAME_SIZE), "slow pushes only": models.slow(MAIN)}
+    others = {SAME_SIZE: models.same(SAME_SIZE), "slow pushes only": models.slow(MAIN)}
     found = (f"{n} {turn_of(models.speeds, curve).times(1e3).text('.0f')} mm/s" for n, curve in others.items())
     note = f"Others: {'; '.join(found)}. A minimum at the last speed means that there is no turn."
     return Evidence([Figure("up to", turn_of(models.speeds, models.same(MAIN)).times(1e3))], note)
@@ -166,7 +154,7 @@ def turn(models: Judged) -> Evidence:
 
 def beyond(departures: Mapping[float, Estimate], error: float) -> Evidence:
     """Do outcomes depart notably from quasi-static ones at all speeds beyond the paper's turn, and not before?"""
-    slow = [d.times(1.0 / error) for speed, d in departures.items() if speed <= 1.001 * TURN[0]]
+    slow = [d.times(1.0 / error) for speed, d in departures.items() if d.high > 0.0 and speed <= 1.001 * TURN[0]]
     fast = [d.times(1.0 / error) for speed, d in departures.items() if speed > 1.001 * TURN[1]]
     if not (slow and fast and np.isfinite(error)):
         return Evidence(note="No speeds on both sides of 50 to 80 mm/s.")
@@ -181,7 +169,7 @@ def beyond(departures: Mapping[float, Estimate], error: float) -> Evidence:
     return Evidence(figures, note)
 
 
-def speed_as_input(models: Judged) -> Evidence:
+def speed_as_input(models: Brackets) -> Evidence:
     """Is a model better with the speed as an input?"""
     all_speeds, slowest = (estimated(models.same(WITH_SPEED)[k] - models.same(MAIN)[k]) for k in (-1, 0))
     return Evidence([Figure("", all_speeds)], f"At {speed_text(models.speeds[0])} alone {slowest.text('+.3f')}.")
@@ -224,11 +212,6 @@ def _weights(push: np.ndarray) -> Array:
     return np.vstack([np.ones(len(push)), drawn * again[:, fold]])
 
 
-def _bracket(series: str, speeds: int, fold: int, rows: int, same_size: int) -> Bracket:
-    kind = "gp" if series == GP else "vhgp"
-    return Bracket(kind, speeds, _rows(series, speeds, rows, same_size), series == WITH_SPEED, fold)
-
-
 def _rows(series: str, speeds: int, rows: int, same_size: int) -> int:
     return max(1, same_size // speeds) if series == SAME_SIZE else rows
 
@@ -238,46 +221,46 @@ def _against(curve: Array, middle: int) -> tuple[Estimate, Estimate]:
     return estimated(curve[0] - curve[middle]), estimated(curve[-1] - curve[middle])
 
 
-def _bracket_table(facts: Facts) -> Table:
+def _bracket_table(models: Brackets) -> Table:
     """NMSE by bracket of speeds."""
-    models = facts.judged
     curves = [models.same(series) for series in SERIES] + [models.slow(MAIN), models.slow(SAME_SIZE)]
     rows = tuple(
         (
             f"up to {speed_text(speed)}",
-            facts.size(MAIN, k),
-            facts.size(SAME_SIZE, k),
+            models.size(MAIN, k),
+            models.size(SAME_SIZE, k),
             *(Number(estimated(curve[k]), ".3f") for curve in curves),
         )
         for k, speed in enumerate(models.speeds)
     )
     caption = (
-        f"NMSE (sum of 3) by the top speed of the training pushes. Simulated; {facts.rows} windows of each speed, or "
-        "n in all (equal n). First four: on held-out pushes of the same speeds; last two: on pushes of up to "
+        f"NMSE (sum of 3) by the top speed of the training pushes. Simulated; {models.rows} windows of each speed, or "
+        "n in all (equal n). First three: on held-out pushes of the same speeds; last two: on pushes of up to "
         f"{speed_text(SLOW)} only. The paper shows the first as a curve, lowest at 50 to 80 mm/s, without numbers."
     )
     slow = (f"slow pushes: {MAIN}", f"slow pushes: {SAME_SIZE}")
     return Table(caption, ("training pushes", "n", "equal n", *SERIES, *slow), rows)
 
 
-def _speed_table(facts: Facts, departures: Sequence[Estimate]) -> Table:
+def _speed_table(plan: Plan, windows: Sequence[PushTable], departures: Mapping[float, Estimate]) -> Table:
     """By speed: windows found and lost, departure from the slowest."""
     rows = [
-        (speed_text(speed), len(table), WINDOWS * facts.pushes - len(table), Number(away, ".3f"))
-        for speed, table, away in zip(facts.speeds, facts.windows, departures, strict=True)
+        (speed_text(speed), len(table), WINDOWS * plan.speed_pushes - len(table), Number(away, ".3f"))
+        for (speed, away), table in zip(departures.items(), windows, strict=True)
     ]
     caption = (
-        f"Windows and departure by speed. Simulated: windows of {1e3 * TRAVEL:.0f} mm found in {facts.pushes} pushes, "
-        f"{WINDOWS} each. A window is lost where the slider flies ahead or the tip slides off. Departure from the "
-        f"outcome at {speed_text(facts.speeds[0])}: of as many other pushes repeated at every speed, interval by push."
+        f"Windows and departure by speed. Simulated: windows of {1e3 * TRAVEL:.0f} mm found in {plan.speed_pushes} "
+        f"pushes, {WINDOWS} each. A window is lost where the slider flies ahead or the tip slides off. Departure from "
+        f"the outcome at {speed_text(plan.speeds[0])}: of as many other pushes repeated at every speed, interval by "
+        "push."
     )
     return Table(caption, ("speed", "windows", "lost", "departure"), rows)
 
 
-def _picture(study: Study, facts: Facts, departures: Sequence[Estimate], error: float) -> Picture:
-    models, across = facts.judged, "top speed of the training pushes (mm/s)"
-    speeds, shaded = [1e3 * speed for speed in facts.speeds], (1e3 * TURN[0], 1e3 * TURN[1])
-    tops, ticks = [1e3 * top for top in models.speeds], [tick for tick in SPEED_TICKS if tick <= 1.01 * max(speeds)]
+def _picture(study: Study, models: Brackets, departures: Mapping[float, Estimate], error: float) -> Picture:
+    across, shaded = "top speed of the training pushes (mm/s)", (1e3 * TURN[0], 1e3 * TURN[1])
+    speeds, tops = [1e3 * speed for speed in departures], [1e3 * top for top in models.speeds]
+    ticks = [tick for tick in SPEED_TICKS if tick <= 1.01 * max(speeds)]
     panels = [
         Panel(
             title,
@@ -294,9 +277,9 @@ def _picture(study: Study, facts: Facts, departures: Sequence[Estimate], error: 
         for title, of in (("held-out pushes of the same speeds", models.same), ("slowest held-out pushes", models.slow))
     ]
     levels = {"error of the slowest VHGP": error, f"{NOTABLE:.0%} of it: notable": NOTABLE * error}
-    line = Line("departure", LOOKS[0], speeds, departures)
-    label, title = f"departure from {speed_text(facts.speeds[0])} (NMSE)", "the same push at another speed"
-    top = 1.3 * max(v for d in departures for v in (d.high, error) if np.isfinite(v))
+    line = Line("departure", LOOKS[0], speeds, list(departures.values()))
+    label, title = f"departure from {speed_text(study.plan.speeds[0])} (NMSE)", "the same push at another speed"
+    top = 1.3 * max(v for d in departures.values() for v in (d.high, error) if np.isfinite(v))
     panels.append(Panel(title, "speed (mm/s)", label, [line], ticks, shaded=shaded, levels=levels, limits=(0.0, top)))
     return picture(
         study.out / "quasi_static.png",
@@ -304,7 +287,7 @@ def _picture(study: Study, facts: Facts, departures: Sequence[Estimate], error: 
         partial(paint_curves, rows=[panels], shared=False),
         "NMSE by the top speed of the training pushes, and departure from quasi-static outcomes. Simulated, "
         f"{' on '.join(study.simulated.reference)}. Left and middle: NMSE (sum of 3) on held-out pushes of the same "
-        f"speeds, and on those of up to {speed_text(SLOW)} only; {facts.rows} windows of every speed, or the same "
+        f"speeds, and on those of up to {speed_text(SLOW)} only; {models.rows} windows of every speed, or the same "
         "number in every bracket (equal n). Right: departure of the outcome from that at "
-        f"{speed_text(facts.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s.",
+        f"{speed_text(study.plan.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s.",
     )
