@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_study, rig_of, verdict_on
+from paper_studies import PLAN, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
 from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import Answer
@@ -219,17 +218,6 @@ def test_a_model_that_is_the_truth_agrees_and_one_without_shape_does_not() -> No
     wide = likenesses(cells, {"VHGP": [Answer(mean, sd, sd, known), Answer(mean, 3.0 * sd, sd, known)]})
     assert wide["sd", "VHGP"][0].size == pytest.approx(2.0)  # of each draw by itself, then the mean
     assert [verdict_on("maps", claim, e) for claim, e in agreement_evidence(found).items()] == ["holds", "holds"]
-
-
-@pytest.mark.long
-def test_the_section_has_both_figures_and_no_measured_sets(tmp_path: Path) -> None:
-    study = made_up_study(tmp_path)
-    slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")
-    made = section(replace(study, measured=(slow,)))
-    assert len(made.evidence) == 6 and len(made.tables) == 1
-    assert [picture.path.exists() for picture in made.pictures] == [True] * 2
-    assert not any("measured square" in table.caption for table in made.tables)
-    json.dumps([table.json() for table in made.tables], allow_nan=False)
 
 
 def test_too_few_known_pushes_decide_nothing(tmp_path: Path) -> None:

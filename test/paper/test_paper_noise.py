@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, verdict_on
+from paper_studies import PLAN, made_up_grid, made_up_study, verdict_on
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.map_models import ModelMap
@@ -128,21 +127,6 @@ def test_learned_noise_has_the_size_of_the_truth() -> None:
     assert rms.value == pytest.approx(np.sqrt((7 * 0.25 + 3.0) / 10.0) / 2.0)
     assert (median.value, reach.value) == (0.25, 2.0)
     assert within.value == pytest.approx(0.7) and within.low == within.high == within.value
-
-
-@pytest.mark.long
-def test_the_section_keeps_simulated_and_measured_noise_apart(tmp_path: Path) -> None:
-    study = made_up_study(tmp_path)
-    slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")
-    fast = replace(made_up_corpus(speeds=(0.3,)), origin="measured", title="a fast square")
-    made = section(replace(study, measured=(slow, fast)))
-    learned = [table for table in made.tables if table.caption.startswith("The process noise")]
-    assert [("made up" in table.caption, "measured" in table.caption) for table in learned] == [
-        (True, False),
-        (False, True),
-    ]
-    assert [picture.path.exists() for picture in made.pictures] == [True] * 2
-    json.dumps([table.json() for table in made.tables], allow_nan=False)
 
 
 def test_grid_with_too_few_repetitions_decides_nothing(tmp_path: Path) -> None:

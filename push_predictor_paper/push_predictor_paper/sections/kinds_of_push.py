@@ -32,19 +32,16 @@ LEAST_TRAVEL = 0.002  # m: below it the tip grazes, and a spread relative to the
 LARGEST_STEP = 3.0 * GRID_SPEED * STEP * 1e-9  # m between points of a path: the tip cannot have pushed so far
 OfPaths = Callable[[Array], Array]  # of paths (..., r, t, 3), (...): by their beginning, middle and end
 NOTES = (
-    "Spread: root mean square distance of the slider's centre from its mean. Relative spread: spread at the end over "
-    "the mean displacement. Paths are relative to the slider's pose at the first contact, so all begin together: they "
-    "show how paths part, not whether differences at the start vanish.",
+    "Spread: root mean square distance of the slider's centre from its mean; relative: over the mean displacement. "
+    "Paths are relative to the slider's pose at the first contact: they show how paths part, not whether differences "
+    "at the start vanish. Growth: relative spread at the end over that half-way.",
     f"Only pushes that move the slider by {1e3 * LEAST_TRAVEL:.0f} mm or more, that begin at least {EDGE:g} of the "
     f"side from its ends, and of which at most {STOPPED:.0%} of the repetitions stop early (less than "
-    f"{1e3 * STILL:.1f} mm and {np.degrees(STILL_TURN):.1f}° in the last 0.1 s: the tip slid off).",
-    "Growth: relative spread at the end over that half-way. Convergent: least growth; divergent: largest. Every second "
-    "repetition chooses the push, the others test it; otherwise the extremes of many noisy values would look too "
-    "extreme.",
-    "Multi-modal: least p of the dip test on the final poses (x, y or rotation), family-wise by Holm's correction over "
-    "all pushes and the three outputs.",
-    "Repetitions in which the slider moves further within 20 ms than the tip could push it are dropped: there the path "
-    "runs into the reset after the push.",
+    f"{1e3 * STILL:.1f} mm and {np.degrees(STILL_TURN):.1f}° in the last 0.1 s: the tip slid off). Repetitions in "
+    "which the slider moves further within 20 ms than the tip could push it run into the reset, and are dropped.",
+    "Every second repetition chooses the pushes of least and largest growth, the others test them; otherwise the "
+    "extremes of many noisy values would look too extreme. The third has the least p of the dip test on the final x, y "
+    "and rotation, family-wise by Holm's correction.",
     "Why simulated repetitions part is a property of the simulator, whose friction and pressure vary over table and "
     "slider. It proves nothing about a real rig. The paper shows its three pushes without numbers.",
 )

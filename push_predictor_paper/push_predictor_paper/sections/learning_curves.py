@@ -32,11 +32,9 @@ AXES = (("surface", 1), ("shape", 0))  # what a figure compares, and its place i
 NOTES = (
     "Folds share training windows, and all draws of the random split share one test set. The intervals do not include "
     "the effect of another recording or other test windows.",
-    "The simulated surfaces differ in the level of their friction, in its variation over the table, and in the fit of "
-    "slider and table (push_predictor/simulation/surface.py). A slow push does not depend on the level; the variation "
-    "is representative, not measured. How much the surface matters here is an assumption and shows nothing about real "
-    "materials. As on the rig, the contact point of a circle is redundant up to uneven pressure.",
-    "Means over sets have only the sizes that the smallest of them allows.",
+    "The simulated surfaces differ in their friction, its variation over the table, and the fit of slider and table. "
+    "How much the surface matters here is an assumption (push_predictor/simulation/surface.py) and shows nothing about "
+    "real materials. As on the rig, the contact point of a circle is redundant up to uneven pressure.",
 )
 
 

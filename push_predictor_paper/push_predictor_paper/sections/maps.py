@@ -65,13 +65,12 @@ NAMES = ("dx", "dy", "rotation")
 QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the process noise alone"}
 NOTES = (
     "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
-    "paper mirrors one of the two, so its (0.75, +30°) is our (0.75, −30°). For the rotation the paper names two "
-    "places: (0.75, ±30°) in its text, (1.0, 0) in the example of its figure. It gives the place for dy in a caption "
-    "only, so its handedness is uncertain.",
+    "paper mirrors one of the two, so its (0.75, +30°) is our (0.75, −30°). For the rotation it names two places: "
+    "(0.75, ±30°) in its text, (1.0, 0) in the example of its figure. It gives that for dy in a caption only, so its "
+    "handedness is uncertain.",
     "Friction in the simulator is an assumption. It determines where a push sticks or slips, and so where dy and the "
-    "rotation are largest. That dx is largest where the push goes through the middle and sticks is geometry.",
-    "The ridge of dx runs through all pushes that aim at the slider's centre and stick. Differences along it are "
-    "fractions of a per cent.",
+    "rotation are largest. That dx is largest where a push goes through the middle and sticks is geometry: along that "
+    "ridge it varies by fractions of a per cent.",
     "The sd of an outcome, of VHGP and GP, includes noise and the uncertainty of the mean, as in the paper's maps. "
     "Repetitions show the noise alone. The table lists both.",
 )

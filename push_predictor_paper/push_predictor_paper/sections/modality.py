@@ -35,14 +35,10 @@ LISTED = 10
 OUTPUT_NAMES = ("dx", "dy", "rotation")
 NOTES = (
     "Hartigan's dip test measures the distance of the outcomes' distribution from the nearest unimodal one. Its p "
-    "value is against the uniform, the unimodal distribution hardest to distinguish from two modes. It therefore "
-    "rejects bell-shaped outcomes far less often than its level. Holm's correction covers all pushes and outputs of "
-    "one time.",
-    "The noise of simulated pushes comes from friction and pressure that vary smoothly over table and slider, and from "
-    "Gaussian sensor noise. Whether that splits a push into two outcomes is a property of the simulator and proves "
-    "nothing about real pushes. The paper shows its modes without a test.",
-    f"Neighbouring pushes share the error of a model. {OF_BLOCKS}",
-    "Each output is tested alone. The three together may have modes that none of them shows.",
+    "value is against the uniform, the unimodal distribution hardest to distinguish from two modes, so that it rejects "
+    "bell-shaped outcomes far less often than its level. Each output is tested alone; Holm's correction covers all.",
+    "Whether the simulator's noise splits a push into two outcomes is a property of the simulator and proves nothing "
+    "about real pushes. The paper shows its modes without a test.",
 )
 
 

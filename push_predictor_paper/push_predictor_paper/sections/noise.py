@@ -41,14 +41,12 @@ WIDE = 1.0  # rad; beyond it the tip soon slides along the side
 NAMES = ("dx", "dy", "rotation", "whole motion")
 MOSTLY = Bound(low=0.8)  # of the pushes
 NOTES = (
-    "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. "
-    "Contact and support vary along a push and from push to push, and the trackers add noise. That the noise has "
-    "the same shape on all surfaces therefore holds partly by construction and proves nothing about real surfaces.",
-    "The size of the noise follows from strengths that we chose. Only where it is large and where small follows from "
-    "the mechanics.",
+    "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. That "
+    "the noise has the same shape on all surfaces therefore holds partly by construction, and its size follows from "
+    "strengths that we chose. Only where it is large and where small follows from the mechanics.",
     "Repetitions are at one speed, 20 mm/s. The paper's order of magnitude is also over speeds.",
-    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio has no meaning. The tables "
-    "therefore show quantiles, root mean squares, and the whole motion (rotation times the radius of gyration).",
+    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio has no meaning. The table "
+    "therefore shows quantiles, root mean squares, and the whole motion (rotation times the radius of gyration). "
     f"Beyond {in_degrees(WIDE)} the slider hardly moves, so the noise is small there.",
 )
 

@@ -44,12 +44,11 @@ NOTES = (
     "come from the simulator's true motion, because at 500 mm/s they last 10 ms, one sample of its tracker. They "
     "therefore have no sensor noise. The robot reaches its speed at least 2 mm before the contact.",
     "As we read the paper, each bracket is tested on pushes of its own speeds: faster pushes make the task "
-    "harder as well as the data more. The slow pushes alone, and equal n, separate the two.",
-    "Windows at high speed are those of pushes that stayed in contact, a selection; the departure is of all pushes.",
-    "Inertia matters through the mass, friction and contact of our simulator. The turn depends on them, on the "
-    "noise, on the number of windows at each speed, and on the length of a window: the slider is at rest at the "
-    "first contact, so short windows see more of its acceleration. None of this proves anything about a real rig.",
-    "Intervals resample folds with their models, and held-out pushes within.",
+    "harder as well as the data more. The slow pushes alone, and equal n, separate the two. Intervals resample folds "
+    "with their models, and held-out pushes within.",
+    "Windows at high speed are those of pushes that stayed in contact, a selection; the departure is of all pushes. "
+    "Inertia matters through the simulator's mass, friction and contact, and through the length of a window, which "
+    "begins at rest. None of this proves anything about a real rig.",
 )
 
 
