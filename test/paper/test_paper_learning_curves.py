@@ -179,5 +179,5 @@ def test_a_measured_set_of_one_pair_gets_tables_of_its_own(tmp_path):
     reference = study.simulated.reference
     measured = Corpus("measured", "measured: one", {reference: study.simulated.sets[reference]}, reference)
     made = section(replace(study, measured=(measured,)), measured)
-    assert len(made.tables[0].rows) == 1 and [picture.path.exists() for picture in made.pictures] == [True] * 2
+    assert len(made.tables[0].rows) == 1 and [picture.path.exists() for picture in made.pictures] == [True]
     assert [made.evidence[claim].figures for claim in ("circle", "surface")] == [(), ()]

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -49,11 +50,12 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Scores of a fit on the held-out windows of its split; predicted: their means (m, 3)."""
+    """Scores of a fit on the held-out windows of its split; predicted: their means (m, 3); cpu: s to train it."""
 
     fit: Fit
     push_scores: PushScores
     predicted: Array
+    cpu: float = 0.0
 
     @property
     def nmse(self) -> Array:
@@ -80,8 +82,11 @@ def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict
 
 def score(pushes: PushSet, fit: Fit) -> Score:
     """Train and score one fit."""
-    comparison = compare(trained(pushes, fit), pushes.table.take(split_of(pushes, fit).test))
-    return Score(fit, push_scores(comparison), comparison.mean)
+    start = time.process_time()
+    model = trained(pushes, fit)
+    cpu = time.process_time() - start
+    comparison = compare(model, pushes.table.take(split_of(pushes, fit).test))
+    return Score(fit, push_scores(comparison), comparison.mean, cpu)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,11 +44,12 @@ def section(study: Study, corpus: Corpus) -> Section:
     pairs = tuple(pair for pair in corpus.sets if all(found.sizes([pair], KIND, split) for split in SPLITS))
     if not pairs:
         raise TooFewError(f"{corpus.name}: too few windows for a learning curve.")
+    axes = [axis for axis in AXES if len({pair[axis[1]] for pair in pairs}) > 1] or AXES[:1]
     evidence = {"circle": circle(found, pairs), "surface": surface(found, pairs)}
     return Section(
         {**evidence, "saturation": saturation(found, pairs)},
         (_table(corpus, found, pairs),),
-        [_picture(study, corpus, found, pairs, axis) for axis in AXES],
+        [_picture(study, corpus, found, pairs, axis) for axis in axes],
         NOTES,
     )
 
