@@ -45,14 +45,13 @@ def heading(text: str, anchor: str = "") -> str:
 
 @dataclass(frozen=True)
 class VerdictRow:
-    """A row of `verdicts`: anchor and title of a section, a claim, its number and verdict; grey: too little data."""
+    """A row of `verdicts`: anchor and title of a section, a claim, its number and verdict."""
 
     anchor: str
     section: str
     claim: str
     number: str
     verdict: str
-    grey: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,9 +62,9 @@ class Bar:
     counts: Mapping[str, int]
 
 
-def finding(claim: str, verdict: str, sentence: str, grey: bool = False) -> str:
-    """A claim, its verdict and the evidence in one sentence; grey: too little data for a verdict."""
-    return _part("finding", claim, verdict, sentence, grey)
+def finding(claim: str, verdict: str, sentence: str) -> str:
+    """A claim, its verdict and the evidence in few sentences."""
+    return _part("finding", claim, verdict, sentence)
 
 
 def verdicts(claims: str, rows: Sequence[VerdictRow]) -> str:

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import t as student
 
 from push_predictor.evaluation.estimate import (
     Estimate,
-    Figure,
     by_push,
     difference_by_push,
     of_draws,
@@ -20,18 +19,33 @@ from push_predictor.evaluation.estimate import (
     total_nlpd,
     total_nmse,
 )
+from push_predictor.evaluation.estimate import Figure as Statistic
+from push_predictor.types import Array
 
 __all__ = [
     "Estimate",
-    "Figure",
+    "Statistic",
     "by_push",
     "difference_by_push",
+    "exactly",
     "of_draws",
+    "of_ends",
     "over_seeds",
     "total_exact_nlpd",
     "total_nlpd",
     "total_nmse",
 ]
+
+
+def exactly(value: float) -> Estimate:
+    """A count, or another figure without uncertainty."""
+    return Estimate(float(value), float(value), float(value))
+
+
+def of_ends(end: Callable[..., Array], estimates: Sequence[Estimate]) -> Estimate:
+    """The least (np.min) or largest (np.max) of several estimates, of values and of ends alike."""
+    value, low, high = end([(e.value, e.low, e.high) for e in estimates], axis=0).tolist()
+    return Estimate(value, low, high)
 
 
 def over_seeds(values: Sequence[float]) -> Estimate:

@@ -26,8 +26,7 @@ class Plan:
     pushes: of each training recording; reference_pushes: of that of the reference pair. sizes: training windows of
     the learning curves; largest: tried on the reference pair only. seeds: draws of training rows, and folds of the
     split by push. contacts, angle_step (rad), repetitions: the grid of repeated pushes on the reference surface;
-    other_repetitions: on the other surfaces. speed_pushes: pushes at each speed of the quasi-static claim. informed:
-    whether GP and VHGP with fitted mechanics as mean stand next to the paper's models; it takes minutes.
+    other_repetitions: on the other surfaces. speed_pushes: pushes at each speed of the quasi-static claim.
     """
 
     name: str
@@ -45,7 +44,6 @@ class Plan:
     other_repetitions: int
     speed_pushes: int
     seed: int = 1
-    informed: bool = True
 
     def pushes_of(self, pair: tuple[str, str]) -> int:
         """Pushes in the training recording of a pair."""

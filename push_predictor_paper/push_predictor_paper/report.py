@@ -8,7 +8,10 @@ from __future__ import annotations
 import json
 import platform
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,47 +21,63 @@ import scipy
 from push_predictor import __version__
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
+from push_predictor.reporting.canvas import Picture
 from push_predictor.watch import Watch, no_watch
-from push_predictor_paper.claims import data
-from push_predictor_paper.claims.calibration import section as calibration
-from push_predictor_paper.claims.comparison import mean_gain, speed_error
-from push_predictor_paper.claims.comparison import section as comparison
-from push_predictor_paper.claims.divergence import section as divergence
-from push_predictor_paper.claims.learning import learning_curves
-from push_predictor_paper.claims.maps import section as maps
-from push_predictor_paper.claims.noise import section as noise
-from push_predictor_paper.claims.quasi_static import section as quasi_static
-from push_predictor_paper.claims.repeated_pushes import kinds_of_push, modality
-from push_predictor_paper.data.corpus import simulated_corpus
-from push_predictor_paper.data.measured import measured_corpora
-from push_predictor_paper.data.repetitions import repeated_grid
+from push_predictor_paper.claims import CLAIMS, ENOUGH
+from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.plan import Plan
-from push_predictor_paper.presentation.enough import too_little
-from push_predictor_paper.presentation.places import PLACES, heading
-from push_predictor_paper.presentation.summary import CLAIMS as CLAIM_KINDS
-from push_predictor_paper.presentation.summary import counts, opening_sentences
-from push_predictor_paper.presentation.table_files import write_tables
-from push_predictor_paper.section import Origin, Section
-from push_predictor_paper.study import Study
+from push_predictor_paper.section import Section, Table, TooFewError
+from push_predictor_paper.sections import (
+    comparison,
+    data,
+    divergence,
+    kinds_of_push,
+    learning_curves,
+    maps,
+    modality,
+    noise,
+    quasi_static,
+    speed_error,
+)
+from push_predictor_paper.study import Study, gather
+from push_predictor_paper.verdict import RULE, VERDICTS, Evidence, Finding, judged
 from push_predictor_paper.work import Work, fingerprint
 
 PAPER = "Bauza and Rodriguez, A Probabilistic Data-Driven Model for Planar Pushing, ICRA 2017"
-CLAIMS: Mapping[str, Callable[[Study], Section]] = {  # by what the progress bar shows
+TITLES = {
+    "data": "The data",
+    "kinds_of_push": "Three kinds of push",
+    "maps": "Maps of mean and standard deviation",
+    "noise": "Size, range and shape of the noise",
+    "learning_curves": "Learning curves: surfaces and shapes",
+    "comparison": "Analytical model, GP and VHGP",
+    "speed_error": "Error against speed",
+    "divergence": "KL divergence between repeated pushes and models",
+    "modality": "Single pushes: histograms and modes",
+    "quasi_static": "The quasi-static assumption: pushes of all speeds scaled to 10 mm/s",
+}
+OF_STUDY: Mapping[str, Callable[[Study], Section]] = {
     "data": data.section,
-    "kinds of push": kinds_of_push.section,
+    "kinds_of_push": kinds_of_push.section,
     "maps": maps.section,
     "noise": noise.section,
-    "learning curves": learning_curves.section,
-    "comparison": comparison.section,
-    "mean gain": mean_gain.section,
-    "speed error": speed_error.section,
     "divergence": divergence.section,
     "modality": modality.section,
-    "quasi-static": quasi_static.section,
-    "calibration": calibration.section,
+    "quasi_static": quasi_static.section,
+}
+OF_CORPUS: Mapping[str, Callable[[Study, Corpus], Section]] = {  # of simulated pushes, and of each measured set
+    "learning_curves": learning_curves.section,
+    "comparison": comparison.section,
+    "speed_error": speed_error.section,
+}
+WORDS = {  # of one claim, of several
+    "holds": ("holds", "hold"),
+    "holds in part": ("holds in part", "hold in part"),
+    "does not hold": ("does not hold", "do not hold"),
+    "not decided": ("is not decided", "are not decided"),
 }
 HOW_TO_READ = (
-    "Each verdict follows from the numbers by a rule that its finding states. Intervals are 95 %.",
+    RULE,
     "Windows of one push are not independent. Intervals therefore resample whole pushes, or span seeds and folds, "
     "as each caption states. The split that counts holds out whole pushes. The paper used a random split of "
     "windows; it is shown for comparison.",
@@ -68,11 +87,20 @@ HOW_TO_READ = (
     "works and that the simulated physics suffices for the effect. It does not show that real pushes behave so.",
 )
 QUICK_WARNING = (
-    "Made with `--quick`: a few small recordings, to check that everything runs. Intervals are wide. Verdicts in grey "
-    "have too little data; their sections state what they lack. Without `--quick` the paper's full size is computed."
+    "Made with `--quick`: a few small recordings, at most 200 training windows, speeds up to 200 mm/s. Intervals are "
+    "wide, and verdicts may differ from those of the paper's full size, which is computed without `--quick`."
 )
-COUNTS = "Number of verdicts. Each claim and its number are in the tables below."
-Files = Mapping[str, Sequence[Mapping[str, str]]]
+COUNTS = "Number of verdicts. Each claim and its number are in the table below."
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A section with the verdicts on its claims."""
+
+    findings: Sequence[Finding]
+    tables: Sequence[Table]
+    pictures: Sequence[Picture]
+    notes: Sequence[str]
 
 
 def report_paper(
@@ -83,7 +111,7 @@ def report_paper(
     measured: a folder of measured pushes (see data.measured). keep: a folder that receives all simulated recordings.
     """
     out.mkdir(parents=True, exist_ok=True)
-    begun, count = time.monotonic(), len(CLAIMS) + 1
+    begun, count = time.monotonic(), len(TITLES) + 1
 
     def begin(number: int, title: str) -> None:
         stage = f"{number}/{count} {title}"
@@ -92,98 +120,116 @@ def report_paper(
 
     begin(1, "recordings")
     study = gather(plan, work, out, measured, keep)
-    sections = []
-    for number, (title, section) in enumerate(CLAIMS.items(), 2):
-        begin(number, title)
-        sections.append(section(study))
-    content, files = _content(plan, sections, time.monotonic() - begun), write_tables(out, sections)
+    sections = {}
+    for number, key in enumerate(TITLES, 2):
+        begin(number, key.replace("_", " "))
+        sections[key] = checked(key, study)
+    made = {
+        "push_predictor": __version__,
+        "sources": fingerprint(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "seconds": round(time.monotonic() - begun, 1),
+    }
+    content = {
+        "paper": PAPER,
+        "plan": vars(plan),
+        "made": made,
+        "sections": {key: _section_json(key, section) for key, section in sections.items()},
+    }
+    (out / "tables").mkdir(exist_ok=True)
+    for key, section in sections.items():
+        for name, table in zip(_files(key, section), section.tables, strict=True):
+            write_whole(out / name, table.csv().encode())
     write_whole(out / "paper.json", (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
-    write_whole(out / "paper.html", _page(plan, study, sections, content["made"], files).encode())
+    write_whole(out / "paper.html", _page(study, sections, made).encode())
     return out / "paper.html", content
 
 
-def gather(plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None) -> Study:
-    """Simulate the recordings, find their windows, import the measured sets."""
-    simulated = simulated_corpus(plan, work, keep)
-    reference = simulated.reference[1]
-    again = {s: plan.repetitions if s == reference else plan.other_repetitions for s in plan.surfaces}
-    grids = {surface: repeated_grid(plan, work, surface, count, keep) for surface, count in again.items()}
-    found = () if measured is None else measured_corpora(measured, work, work.folder / "measured")
-    return Study(plan, work, out, simulated, found, grids)
+def checked(key: str, study: Study) -> Checked:
+    """Compute a section, and judge all its claims."""
+    if key in OF_STUDY:
+        return _checked(key, partial(OF_STUDY[key], study), "")
+    parts = [_checked(key, partial(OF_CORPUS[key], study, corpus), corpus.name) for corpus in study.corpora]
+    every = {f.name: [item for part in parts for item in getattr(part, f.name)] for f in fields(Checked)}
+    every["notes"] = list(dict.fromkeys(every["notes"]))
+    return Checked(**every)
 
 
-def _content(plan: Plan, sections: list[Section], seconds: float) -> dict[str, Any]:
+def _checked(key: str, section_of: Callable[[], Section], of: str) -> Checked:
+    try:
+        section = section_of()
+    except TooFewError as error:
+        section = Section({claim: Evidence(note=str(error)) for claim in CLAIMS[key]})
+    findings = [judged(claim, section.evidence[name], of) for name, claim in CLAIMS[key].items()]
+    return Checked(findings, section.tables, section.pictures, section.notes)
+
+
+def _files(key: str, section: Checked) -> list[str]:
+    """The address of the CSV file of every table, relative to the page."""
+    return [f"tables/{key}_{k + 1}.csv" for k in range(len(section.tables))]
+
+
+def _section_json(key: str, section: Checked) -> dict[str, Any]:
     return {
-        "paper": PAPER,
-        "plan": vars(plan),
-        "made": {
-            "push_predictor": __version__,
-            "sources": fingerprint(),
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "scipy": scipy.__version__,
-            "seconds": round(seconds, 1),
-        },
-        "sections": {s.key: _section_json(s, too_little(plan).get(s.key, "")) for s in sections},
-    }
-
-
-def _section_json(section: Section, lacks: str) -> dict[str, Any]:
-    return {
-        "title": section.title,
-        "place": PLACES.get(section.key),
-        "too_little_data": lacks,
-        "findings": [vars(finding) for finding in section.findings],
-        "tables": [vars(table) for table in section.tables],
+        "title": TITLES[key],
+        "findings": [finding.json() for finding in section.findings],
+        "tables": [table.json() for table in section.tables],
         "notes": list(section.notes),
-        "data": dict(section.data),
     }
 
 
-def _page(plan: Plan, study: Study, sections: list[Section], made: Mapping[str, Any], files: Files) -> str:
-    lacking = too_little(plan)
-    bars = [html.Bar(CLAIM_KINDS[origin].capitalize(), counts(sections, origin, lacking)) for origin in CLAIM_KINDS]
-    label = "quick check" if lacking else "full size"
-    parts = [
-        html.opening(opening_sentences(sections, study, lacking), label, html.shares(bars, COUNTS)),
-        *([html.paragraph(QUICK_WARNING, "warning")] if lacking else []),
-        *_summary_tables(sections, lacking),
-        html.heading("How to read this page"),
-        *map(html.paragraph, (f"The paper: {PAPER}.", _origin(study), *HOW_TO_READ)),
+def _page(study: Study, sections: Mapping[str, Checked], made: Mapping[str, Any]) -> str:
+    plan, quick = study.plan, study.plan.size < ENOUGH
+    found: Counter[str] = Counter(finding.verdict for section in sections.values() for finding in section.findings)
+    bars = [html.Bar("Claims of the paper", {verdict: found[verdict] for verdict in VERDICTS})]
+    rows = [
+        html.VerdictRow(key, TITLES[key], f.claim, f.number, f.verdict)
+        for key, section in sections.items()
+        for f in section.findings
     ]
-    for section in sections:
-        parts += _section_html(section, lacking.get(section.key, ""), files[section.key])
+    measured = (
+        "; ".join(corpus.name for corpus in study.measured) or "no measured pushes (give them with --data FOLDER)"
+    )
+    data_used = f"Data: {study.simulated.title}; {measured}."
+    label = "quick check" if quick else "full size"
+    parts = [
+        html.opening(_opening(study, found, quick), label, html.shares(bars, COUNTS)),
+        *([html.paragraph(QUICK_WARNING, "warning")] if quick else []),
+        html.verdicts("claim of the paper", rows),
+        html.heading("How to read this page"),
+        *map(html.paragraph, (f"The paper: {PAPER}.", data_used, *HOW_TO_READ)),
+    ]
+    for key, section in sections.items():
+        parts += _section_html(key, section)
     facts = {name: str(value) for name, value in made.items()} | {"plan": plan.name, "seed": str(plan.seed)}
     parts += [html.heading("How this page was made"), html.definitions(facts)]
     return html.page("Planar pushing: the paper, claim by claim", parts)
 
 
-def _summary_tables(sections: Sequence[Section], lacking: Mapping[str, str]) -> list[str]:
-    """One table of the paper's claims, one of the questions beyond the paper."""
-    heads: dict[Origin, str] = {"paper": "claim of the paper", "beyond the paper": "question beyond the paper"}
-    tables = []
-    for origin, head in heads.items():
-        rows = [
-            html.VerdictRow(s.key, s.title, f.claim, f.number, f.verdict, s.key in lacking)
-            for s in sections
-            for f in s.findings
-            if f.origin == origin
-        ]
-        tables += [html.verdicts(head, rows)] if rows else []
-    return tables
+def _opening(study: Study, found: Mapping[str, int], quick: bool) -> tuple[str, str, str]:
+    """How many of the paper's claims hold, on which pushes that rests, what to do."""
+    parts = [f"{found[verdict]} {WORDS[verdict][found[verdict] > 1]}" for verdict in VERDICTS if found[verdict]]
+    claims = f"Of {sum(found.values())} claims of the paper, {', '.join(parts)}."
+    measured = ", ".join(corpus.name.removeprefix("measured: ") for corpus in study.measured)
+    also = f", and on measured ones ({measured})" if measured else ""
+    data_used = f"They are checked on simulated pushes of {len(study.simulated.sets)} sets of shape and surface{also}."
+    next_step = (
+        "Run the report without `--quick` for verdicts at the paper's size."
+        if quick
+        else "Read the number of each claim below; its section has the range that the claim requires."
+    )
+    return claims, data_used, next_step
 
 
-def _origin(study: Study) -> str:
-    measured = "; ".join(corpus.name for corpus in study.measured)
-    return f"Data: {study.simulated.title}; " + (measured or "no measured pushes (give them with --data FOLDER)") + "."
-
-
-def _section_html(section: Section, lacks: str, files: Sequence[Mapping[str, str]]) -> list[str]:
+def _section_html(key: str, section: Checked) -> list[str]:
+    places = ", ".join(dict.fromkeys(finding.place for finding in section.findings))
+    files = [{"CSV": name} for name in _files(key, section)]
     return [
-        html.heading(heading(section.key, section.title), section.key),
-        *([html.paragraph(f"Grey: too little data for a verdict ({lacks}).")] if lacks else []),
-        *(html.finding(f.claim, f.verdict, f.sentence, bool(lacks)) for f in section.findings),
+        html.heading(f"{TITLES[key]} (paper: {places})", key),
+        *(html.finding(f.claim, f.verdict, f.sentence) for f in section.findings),
         *map(html.figure, section.pictures),
-        *(html.folded_table(t.caption, t.head, t.rows, f) for t, f in zip(section.tables, files, strict=True)),
+        *(html.folded_table(t.caption, t.head, t.texts, f) for t, f in zip(section.tables, files, strict=True)),
         *([html.bullets(section.notes)] if section.notes else []),
     ]

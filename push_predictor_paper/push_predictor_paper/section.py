@@ -1,64 +1,97 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a claim contributes to the report: findings, tables, pictures, numbers."""
+"""A section of the report: findings, tables and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from push_predictor.reporting.canvas import Picture
-from push_predictor.reporting.html import NOTHING
+from push_predictor.reporting.canvas import Picture, draw
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.verdict import Evidence
 
-Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
-VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
-Origin = Literal["paper", "beyond the paper"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+
+class TooFewError(Exception):
+    """The data are too few for the claims of a section. The message states what they lack."""
+
+
+@runtime_checkable
+class Shown(Protocol):
+    """A number with its interval, as text for a cell (the interval on a second line) and for the JSON."""
+
+    def cell(self) -> str:
+        """The text."""
+
+    def json(self) -> Any:
+        """The number."""
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A claim in our words, its verdict, and the evidence: numbers with intervals, then the rule of the verdict.
+class Number:
+    """An estimate in a cell of a table, with the format of its text. The JSON has it unrounded."""
 
-    number: the one that decides, with its interval, for the summary. origin: the paper, or a question that the paper
-    does not ask.
-    """
+    estimate: Estimate
+    form: str = ".2f"
 
-    claim: str
-    verdict: Verdict
-    sentence: str
-    origin: Origin = "paper"
-    number: str = field(default=NOTHING, kw_only=True)
+    def cell(self) -> str:
+        """The value, its interval beneath."""
+        return self.estimate.cell(self.form)
+
+    def json(self) -> dict[str, float | None]:
+        """Value, low and high."""
+        return self.estimate.json()
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text for html.table. The caption states the pushes, the split and the kind of interval."""
+    """A table of texts, counts and numbers. The caption states the pushes, the split and the kind of interval."""
 
     caption: str
     head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: Sequence[Sequence[object]]
+
+    @property
+    def texts(self) -> list[list[str]]:
+        """The text of every cell; the interval of a number is its second line."""
+        return [[cell.cell() if isinstance(cell, Shown) else str(cell) for cell in row] for row in self.rows]
+
+    def json(self) -> dict[str, Any]:
+        """Caption, and a list of rows by head."""
+        rows = [[cell.json() if isinstance(cell, Shown) else cell for cell in row] for row in self.rows]
+        return {"caption": self.caption, "rows": [dict(zip(self.head, row, strict=True)) for row in rows]}
+
+    def csv(self) -> str:
+        """Head and rows as CSV; the second line of cells has a column of its own. ASCII minus signs."""
+        rows = [[cell.replace("−", "-").partition("\n") for cell in row] for row in self.texts]
+        double = [any(row[k][1] for row in rows) for k in range(len(self.head))]
+        lines: list[Iterable[tuple[str, str]]] = [[(name, f"{name}, interval") for name in self.head]]
+        lines += [[(first, second) for first, _, second in row] for row in rows]
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(
+            [part for cell, two in zip(line, double, strict=True) for part in cell[: 1 + two]] for line in lines
+        )
+        return text.getvalue()
 
 
 @dataclass(frozen=True)
 class Section:
-    """One section of the report. data: its numbers, for the JSON, with None in place of NaN."""
+    """What a section found. evidence: by claim (see claims.CLAIMS); notes: on the data and the method."""
 
-    key: str
-    title: str
-    findings: tuple[Finding, ...]
-    tables: tuple[Table, ...] = ()
-    pictures: tuple[Picture, ...] = ()
-    notes: tuple[str, ...] = ()
-    data: Mapping[str, Any] = field(default_factory=dict)
+    evidence: Mapping[str, Evidence]
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = ()
+    notes: Sequence[str] = ()
 
 
-def joined(key: str, title: str, parts: Sequence[tuple[str, Section]]) -> Section:
-    """Join sections into one; parts: (title of the corpus, its section). The parts' own keys and titles are dropped."""
-
-    def every(field_name: str) -> tuple[Any, ...]:
-        return tuple(item for _, part in parts for item in getattr(part, field_name))
-
-    data = {name: part.data for name, part in parts}
-    return Section(key, title, every("findings"), every("tables"), every("pictures"), every("notes"), data)
+def picture(path: Path, size: tuple[float, float], paint: Callable[[Canvas], None], caption: str) -> Picture:
+    """Draw a picture of that size (inches). The first sentence of the caption is also its alternative text."""
+    return Picture(draw(path, size, paint), caption.partition(". ")[0], caption)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The input of every claim: plan, data, work queue, folder for pictures."""
+"""The input of every section: plan, data, work queue, folder for pictures."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.data.repetitions import RepeatedGrid
+from push_predictor_paper.data.corpus import Corpus, simulated_corpus
+from push_predictor_paper.data.measured import measured_corpora
+from push_predictor_paper.data.repetitions import RepeatedGrid, repeated_grid
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.work import Work
 
@@ -35,3 +36,17 @@ class Study:
     def reference_grid(self) -> RepeatedGrid:
         """The grid on the reference surface."""
         return self.grids[self.simulated.reference[1]]
+
+    def file(self, name: str, corpus: Corpus, *more: str) -> Path:
+        """The file of a picture of a corpus."""
+        return self.out / f"{'_'.join((name, *more, corpus.origin))}_{self.corpora.index(corpus)}.png"
+
+
+def gather(plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None) -> Study:
+    """Simulate the recordings, find their windows, import the measured sets."""
+    simulated = simulated_corpus(plan, work, keep)
+    reference = simulated.reference[1]
+    again = {s: plan.repetitions if s == reference else plan.other_repetitions for s in plan.surfaces}
+    grids = {surface: repeated_grid(plan, work, surface, count, keep) for surface, count in again.items()}
+    found = () if measured is None else measured_corpora(measured, work, work.folder / "measured")
+    return Study(plan, work, out, simulated, found, grids)

@@ -32,6 +32,8 @@ LOOKS = (  # modules that change how results look, not what they are
     "push_predictor/evaluation/report/tables.py",
     "push_predictor_paper/report.py",
     "push_predictor_paper/section.py",
+    "push_predictor_paper/claims.py",
+    "push_predictor_paper/verdict.py",
 )
 NO_RESULTS = (  # folders on which no cached result depends
     "reporting",
@@ -40,8 +42,8 @@ NO_RESULTS = (  # folders on which no cached result depends
     "replay",
     "online",
     "commands",
-    "claims",
-    "presentation",
+    "sections",
+    "painters",
     "residuals",
 )
 

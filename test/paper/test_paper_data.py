@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.data import grid_finding, section, speed_counts
+from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet, learning_set, learning_spec, pair_number, travel_for
 from push_predictor_paper.data.repetitions import FEWEST, grid_spec, repeat_push
-from push_predictor_paper.estimate import Estimate, over_seeds
 from push_predictor_paper.plan import FULL, QUICK
+from push_predictor_paper.sections.data import known, section, speed_counts
 
 from push_predictor.recordings.load import load_data
 from push_predictor.simulation.rig_simulator import SimulationSpec
@@ -89,8 +88,8 @@ def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
 def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
     missing = made_up_corpus()
     slow = {pair: replace(s, table=s.table.take(s.table.inputs[:, 0] < 0.06)) for pair, s in missing.sets.items()}
-    finding = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).findings[0]
-    assert finding.verdict == "does not hold" and "500" in finding.sentence
+    evidence = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).evidence["sets"]
+    assert verdict_on("data", "sets", evidence) == "does not hold"
     counts = speed_counts(PLAN, replace(missing, sets=slow))
     assert [c.with_window for c in counts] == [16] * 3 + [0] * 7
     assert [c.pushes for c in counts] == [16] * 10
@@ -99,16 +98,13 @@ def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp_path: Path) -> None:
     study, pushes = made_up_study(tmp_path), next(iter(made_up_corpus().sets.values()))
-    made = section(study)
-    four = made.findings[0]
-    assert made.pictures[0].path.is_file()
-    assert four.verdict == "holds in part" and "4 of the paper's 16 sets, shapes: 2, surfaces: 2" in four.sentence
+    assert verdict_on("data", "sets", section(study).evidence["sets"]) == "holds in part"
     every = replace(study.simulated, sets=dict.fromkeys(FULL.pairs, pushes))
-    assert section(replace(study, simulated=every)).findings[0].verdict == "holds"
+    assert verdict_on("data", "sets", section(replace(study, simulated=every)).evidence["sets"]) == "holds"
 
 
 @pytest.mark.parametrize(
-    "repetitions, known, verdict",
+    "repetitions, seen, verdict",
     [
         (100, 55, "holds"),
         (100, 38, "holds in part"),
@@ -117,10 +113,11 @@ def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp
         (20, 55, "does not hold"),  # 20 repetitions give a Gaussian's deviation to 31 %
     ],
 )
-def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(repetitions: int, known: int, verdict: str) -> None:
+def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(repetitions: int, seen: int, verdict: str) -> None:
     grid = made_up_grid(replace(PLAN, contacts=11, angle_step=0.75, repetitions=repetitions))
-    few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in grid.cells[known:]]
-    assert grid_finding(replace(grid, cells=(*grid.cells[:known], *few))).verdict == verdict
+    few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in grid.cells[seen:]]
+    evidence = known(replace(grid, cells=(*grid.cells[:seen], *few)))
+    assert verdict_on("data", "known", evidence) == verdict
 
 
 def test_sets_of_several_corpora_do_not_hide_each_other(tmp_path: Path) -> None:
@@ -129,9 +126,8 @@ def test_sets_of_several_corpora_do_not_hide_each_other(tmp_path: Path) -> None:
     table = study.simulated.sets[pair].table
     others = PushSet(table.take(np.arange(60)), study.simulated.sets[pair].rig)
     measured = Corpus("measured", "measured: mit_square/pushes_a, one side", {pair: others}, pair)
-    sets = section(replace(study, measured=(measured,))).data["sets"]
-    windows = [sets[corpus.title]["/".join(pair)]["windows"] for corpus in (study.simulated, measured)]
-    assert windows == [len(table), 60]
+    tables = section(replace(study, measured=(measured,))).tables
+    assert [table.rows[0][2] for table in tables[:2]] == [len(table), 60]
 
 
 def test_a_corpus_has_a_short_name() -> None:
@@ -139,9 +135,3 @@ def test_a_corpus_has_a_short_name() -> None:
     title = "measured: mit_square/pushes_a, one side of a square, 900 overlapping windows"
     assert replace(made_up_corpus(), origin="measured", title=title).name == "measured: mit_square/pushes_a"
     assert replace(made_up_corpus(), origin="measured", title="measured: one").name == "measured: one"
-
-
-def test_an_estimate_over_seeds_is_students_interval() -> None:
-    assert over_seeds([1.0, 2.0, 3.0]).text(".3f") == "2.000 (−0.484 to 4.484)"
-    assert np.isnan(over_seeds([1.0]).low)
-    assert Estimate(0.5, np.nan, np.nan).json() == {"value": 0.5, "low": None, "high": None}

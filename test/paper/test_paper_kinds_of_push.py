@@ -11,22 +11,21 @@ from pathlib import Path
 import numpy as np
 import paper_studies
 import pytest
-from push_predictor_paper.claims.repeated_pushes.kinds_of_push import section
-from push_predictor_paper.claims.repeated_pushes.kinds_of_push_rules import (
-    Figure,
-    apart,
-    draws_together_fans_out,
+from push_predictor_paper.data.repetitions import DRAWS, PATH_POINTS, RepeatedGrid, Repetitions
+from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.sections.kinds_of_push import (
+    OfPaths,
+    apart_evidence,
     final_spread,
     growth,
-    has_modes,
+    growth_evidence,
     kinds_of,
     relative_spread,
     resampled,
+    section,
     to_the_end,
     whole_paths,
 )
-from push_predictor_paper.data.repetitions import DRAWS, PATH_POINTS, RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.study import Study
 
 from push_predictor.types import Array
@@ -59,6 +58,11 @@ def study_of(folder: Path, grid: RepeatedGrid) -> Study:
     """A study with this grid as its reference."""
     made_up = paper_studies.made_up_study(folder)
     return Study(made_up.plan, made_up.work, folder, made_up.simulated, (), {"plywood": grid})
+
+
+def verdicts(made: Section) -> list[str]:
+    """On growth, ending apart, modes."""
+    return [paper_studies.verdict_on("kinds_of_push", claim, evidence) for claim, evidence in made.evidence.items()]
 
 
 def drawn_together(sd: float, seed: int = 0) -> Array:
@@ -123,72 +127,10 @@ def test_relative_spread_and_growth_of_rays_are_what_they_were_made_with() -> No
 
 
 @pytest.mark.parametrize("figure", [final_spread, relative_spread, growth])
-def test_resampled_figures_are_those_of_the_paths_drawn(figure: Figure) -> None:
+def test_resampled_figures_are_those_of_the_paths_drawn(figure: OfPaths) -> None:
     paths = rays(3e-4, power=0.5)
     rows = np.random.default_rng(0).integers(0, len(paths), (DRAWS, len(paths)))
     np.testing.assert_allclose(resampled(paths, figure)[1], [figure(paths[drawn]) for drawn in rows])
-
-
-@pytest.mark.slow
-def test_interval_of_a_spread_covers_the_truth_as_often_as_stated() -> None:
-    """95 % intervals from 60 repetitions, 100 times over."""
-    truth, hits = np.sqrt(2.0) * 3e-4 / WAY, 0
-    for seed in range(100):
-        low, high = np.quantile(resampled(rays(3e-4, 60, seed), relative_spread)[1], [0.025, 0.975])
-        hits += low <= truth <= high
-    assert 86 <= hits <= 100
-
-
-WIDE, WIDER, LIKE, UNSURE = (
-    Estimate(4.0, 2.5, 6.0),
-    Estimate(2.5, 1.5, 4.0),
-    Estimate(1.1, 0.8, 1.5),
-    Estimate(1.5, 0.8, 3.0),
-)
-
-
-@pytest.mark.parametrize(
-    ("absolute", "relative", "verdict"),
-    [
-        (WIDE, WIDE, "holds"),
-        (WIDE, WIDER, "holds in part"),
-        (WIDER, WIDE, "holds in part"),
-        (WIDE, LIKE, "does not hold"),
-        (LIKE, WIDE, "does not hold"),
-        (WIDE, UNSURE, "not decided"),
-        (WIDE, Estimate(np.nan, np.nan, np.nan), "not decided"),
-    ],
-)
-def test_verdict_on_ending_further_apart(absolute: Estimate, relative: Estimate, verdict: str) -> None:
-    """By the intervals of both ratios of their spreads."""
-    assert apart([absolute, relative]) == verdict
-
-
-BELOW, ABOVE, ABOUT = Estimate(0.7, 0.5, 0.9), Estimate(1.4, 1.1, 1.7), Estimate(1.0, 0.8, 1.2)
-
-
-@pytest.mark.parametrize(
-    ("convergent", "divergent", "verdict"),
-    [
-        (BELOW, ABOVE, "holds"),
-        (BELOW, ABOUT, "holds in part"),
-        (ABOUT, ABOVE, "holds in part"),
-        (ABOVE, ABOUT, "does not hold"),
-        (ABOUT, BELOW, "does not hold"),
-        (ABOUT, ABOUT, "not decided"),
-    ],
-)
-def test_verdict_on_drawing_together_and_fanning_out(convergent: Estimate, divergent: Estimate, verdict: str) -> None:
-    """By the growth of both."""
-    assert draws_together_fans_out(convergent, divergent) == verdict
-
-
-@pytest.mark.parametrize(
-    ("p", "power", "verdict"), [(0.01, 0.1, "holds"), (0.4, 0.95, "does not hold"), (0.4, 0.3, "not decided")]
-)
-def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
-    """Finding no modes is evidence only where they would have been found."""
-    assert has_modes(p, power) == verdict
 
 
 @pytest.mark.long
@@ -196,28 +138,32 @@ def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -
     """Findings, one row a push, a picture, numbers that JSON can hold."""
     grid = grid_of(rays(6e-4), drawn_together(1e-4), fanned_out(1e-3), rays(4e-4, apart_by=4e-3))
     made = section(study_of(tmp_path, grid))
-    assert [finding.verdict for finding in made.findings] == ["holds"] * 3
+    assert verdicts(made) == ["holds"] * 3
     assert [row[0] for row in made.tables[0].rows] == ["most convergent", "most divergent", "largest dip"]
     assert made.pictures[0].path.stat().st_size > 10_000
-    assert json.loads(json.dumps(dict(made.data), allow_nan=False))["chosen"]["convergent"]["angle"] == 0.1
+    assert made.tables[0].rows[0][1] == "c = 0.40, 6°"
+    json.dumps(made.tables[0].json(), allow_nan=False)
 
 
 @pytest.mark.slow
 def test_equal_pushes_are_not_distinguished(tmp_path: Path) -> None:
     """Ten pushes of one spread, straight: the half that did not choose the extremes shows that they are chance."""
     made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
-    assert not {finding.verdict for finding in made.findings} & {"holds", "holds in part"}
+    assert not {*verdicts(made)} & {"holds", "holds in part"}
 
 
-@pytest.mark.slow
-def test_a_wide_push_that_draws_together_does_not_end_closer(tmp_path: Path) -> None:
+def test_a_wide_push_that_draws_together_does_not_end_closer() -> None:
     """Convergent and divergent by their growth, but the convergent one ends further apart: the second does not hold."""
-    made = section(study_of(tmp_path, grid_of(drawn_together(1e-3), fanned_out(3e-4))))
-    assert [finding.verdict for finding in made.findings[:2]] == ["holds", "does not hold"]
+    kinds = kinds_of(grid_of(drawn_together(1e-3), fanned_out(3e-4)))
+    assert kinds is not None
+    assert paper_studies.verdict_on("kinds_of_push", "growth", growth_evidence(kinds)) == "holds"
+    assert paper_studies.verdict_on("kinds_of_push", "apart", apart_evidence(kinds)) == "does not hold"
+    narrow = kinds_of(grid_of(drawn_together(1e-4), fanned_out(1e-3)))
+    assert narrow is not None
+    assert paper_studies.verdict_on("kinds_of_push", "apart", apart_evidence(narrow)) == "holds"
 
 
 def test_grid_that_moves_nothing_is_not_decided(tmp_path: Path) -> None:
     """Nothing to choose from: not decided, with a note."""
-    made = section(study_of(tmp_path, grid_of(0.01 * rays(1e-4))))
-    assert [finding.verdict for finding in made.findings] == ["not decided"]
-    assert made.notes
+    with pytest.raises(TooFewError, match="Fewer than two pushes"):
+        section(study_of(tmp_path, grid_of(0.01 * rays(1e-4))))

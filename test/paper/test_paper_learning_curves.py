@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from paper_studies import made_up_corpus, made_up_study, rig_of
-from push_predictor_paper.claims.learning import learning_curves
-from push_predictor_paper.claims.learning.findings import circle, saturation, surface
-from push_predictor_paper.claims.learning.learning_curves import band_or_range
+from paper_studies import made_up_corpus, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score
-from push_predictor_paper.study import Study
+from push_predictor_paper.sections.learning_curves import band_or_range, circle, saturation, section, surface
 
 from push_predictor.evaluation.push_scores import PushScores
 
@@ -34,7 +33,7 @@ def score(fit: Fit, nmse: float, nlpd: float) -> Score:
     push_scores = PushScores(
         np.array(list("abcdef")), np.ones(6), one * nmse / 3, one, one * nlpd / 3, one * nlpd / 3, np.ones((6, 3, 3))
     )
-    return Score(fit, push_scores, 0.1)
+    return Score(fit, push_scores, np.zeros((6, 3)))
 
 
 def made_up(nmse, nlpd=lambda shape, surface, n: -10.0, sizes=(500, 1000), noise=0.01) -> Curves:
@@ -69,22 +68,18 @@ def round_is(factor: float, nats: float, noise: float = 0.01):
     [(0.5, -1.0, "holds"), (2.0, 1.0, "does not hold"), (0.5, 1.0, "holds in part"), (1.0, 0.0, "not decided")],
 )
 def test_the_circle_is_easiest_if_every_other_shape_is_harder_in_both_figures(factor, nats, verdict):
-    assert circle(CORPUS, round_is(factor, nats), PAIRS).verdict == verdict
-
-
-def test_sentence_has_the_difference_to_each_shape():
-    assert "square NMSE 0.150" in circle(CORPUS, round_is(0.5, -1.0, noise=0.0), PAIRS).sentence
+    assert verdict_on("learning_curves", "circle", circle(round_is(factor, nats), PAIRS)) == verdict
 
 
 def test_folds_of_one_set_do_not_count_as_sets():
     """One surface among three gives the whole gap: five folds of each do not make that sure."""
     one = made_up(lambda shape, u, n: 0.3 - (0.29 if (shape, u) == ("ellip1", "pu") else 0.0), noise=0.001)
-    assert circle(CORPUS, one, PAIRS).verdict == "not decided"
+    assert verdict_on("learning_curves", "circle", circle(one, PAIRS)) == "not decided"
 
 
 def test_without_a_circle_nothing_is_decided():
     pairs = tuple(pair for pair in PAIRS if pair[0] != "ellip1")
-    assert circle(CORPUS, round_is(0.5, -1.0), pairs).verdict == "not decided"
+    assert verdict_on("learning_curves", "circle", circle(round_is(0.5, -1.0), pairs)) == "not decided"
 
 
 def spread(surfaces: float, shapes: float) -> Curves:
@@ -98,15 +93,15 @@ def spread(surfaces: float, shapes: float) -> Curves:
 
 @pytest.mark.parametrize(
     ("surfaces", "shapes", "verdict"),
-    [(0.02, 0.3, "holds"), (0.3, 0.02, "does not hold"), (0.2, 0.3, "holds in part"), (0.3, 0.3, "not decided")],
+    [(0.02, 0.3, "holds"), (0.3, 0.02, "does not hold"), (0.2, 0.3, "holds in part")],
 )
 def test_the_surface_matters_little_if_shapes_differ_far_more(surfaces, shapes, verdict):
-    assert surface(CORPUS, spread(surfaces, shapes), PAIRS).verdict == verdict
+    assert verdict_on("learning_curves", "surface", surface(spread(surfaces, shapes), PAIRS)) == verdict
 
 
 def test_one_surface_decides_nothing():
     pairs = tuple(pair for pair in PAIRS if pair[1] == "abs")
-    assert surface(CORPUS, spread(0.1, 0.1), pairs).verdict == "not decided"
+    assert verdict_on("learning_curves", "surface", surface(spread(0.1, 0.1), pairs)) == "not decided"
 
 
 def falling(per_doubling: float, nats: float, sizes=(500, 1000)) -> Curves:
@@ -120,33 +115,40 @@ def falling(per_doubling: float, nats: float, sizes=(500, 1000)) -> Curves:
     ("share", "nats", "verdict"), [(0.02, 0.01, "holds"), (0.3, 0.5, "does not hold"), (0.02, 0.5, "holds in part")]
 )
 def test_saturated_means_that_a_doubling_gains_next_to_nothing(share, nats, verdict):
-    assert saturation(CORPUS, falling(share, nats), PAIRS).verdict == verdict
+    assert verdict_on("learning_curves", "saturation", saturation(falling(share, nats), PAIRS)) == verdict
 
 
 def test_a_curve_that_falls_but_ends_early_decides_nothing():
-    assert saturation(CORPUS, falling(0.3, 0.5, (100, 200)), PAIRS).verdict == "not decided"
-
-
-def test_gain_is_per_doubling_for_any_ratio_of_sizes():
-    assert "lowers the NMSE by 30.0" in saturation(CORPUS, falling(0.3, 0.5, (100, 800)), PAIRS).sentence
+    assert (
+        verdict_on("learning_curves", "saturation", saturation(falling(0.3, 0.5, (100, 200)), PAIRS)) == "not decided"
+    )
 
 
 def test_the_gain_of_one_set_has_an_interval_by_push():
-    finding = saturation(CORPUS, falling(0.02, 0.01), PAIRS[:1])
-    assert finding.verdict == "holds" and "one set, all folds, interval by push" in finding.sentence
+    found = saturation(falling(0.02, 0.01), PAIRS[:1])
+    assert verdict_on("learning_curves", "saturation", found) == "holds"
+    assert "one set, interval by push" in found.note
 
 
 def test_interval_of_the_gain_reflects_differences_between_sets():
     def level(shape: str, u: str, n: int) -> float:
         return 0.3 if n == 500 else 0.3 * (1.0 - (0.3 if (shape, u) == ("rect1", "pu") else 0.0))
 
-    gains = saturation(CORPUS, made_up(level, lambda s, u, n: 0.5 * (n == 500), noise=0.0), PAIRS)
-    low, high = gains.sentence.split("NMSE by ")[1].split(" (")[1].split(")")[0].replace("−", "-").split(" to ")
-    assert (float(low), float(high)) == pytest.approx((-4.4, 11.0), abs=0.1)  # t of 9 sets, by hand: 3.33 +- 7.69
+    gain = saturation(made_up(level, lambda s, u, n: 0.5 * (n == 500), noise=0.0), PAIRS).figures[0].estimate
+    assert (gain.low, gain.high) == pytest.approx((-0.044, 0.110), abs=1e-3)  # t of 9 sets, by hand: 3.33 +- 7.69 %
+
+
+def test_gain_is_per_doubling_for_any_ratio_of_sizes():
+    assert saturation(falling(0.3, 0.5, (100, 800)), PAIRS).figures[0].estimate.value == pytest.approx(0.3, abs=1e-3)
+
+
+def test_difference_to_each_shape():
+    figures = {figure.name: figure.estimate.value for figure in circle(round_is(0.5, -1.0, noise=0.0), PAIRS).figures}
+    assert figures["square NMSE"] == pytest.approx(0.15) and len(figures) == 4
 
 
 def test_one_size_decides_nothing():
-    assert saturation(CORPUS, falling(0.3, 0.5, (100,)), PAIRS).verdict == "not decided"
+    assert verdict_on("learning_curves", "saturation", saturation(falling(0.3, 0.5, (100,)), PAIRS)) == "not decided"
 
 
 def test_a_size_that_a_fold_is_too_small_for_is_not_shown():
@@ -176,6 +178,6 @@ def test_a_measured_set_of_one_pair_gets_tables_of_its_own(tmp_path):
     study = made_up_study(tmp_path)
     reference = study.simulated.reference
     measured = Corpus("measured", "measured: one", {reference: study.simulated.sets[reference]}, reference)
-    made = learning_curves.section(Study(study.plan, study.work, tmp_path, study.simulated, (measured,), study.grids))
-    assert [len(table.rows) for table in made.tables if "measured: one" in table.caption] == [1, 2]
-    assert {f.verdict for f in made.findings[3:5]} == {"not decided"}
+    made = section(replace(study, measured=(measured,)), measured)
+    assert len(made.tables[0].rows) == 1 and [picture.path.exists() for picture in made.pictures] == [True]
+    assert [made.evidence[claim].figures for claim in ("circle", "surface")] == [(), ()]

@@ -11,24 +11,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.repeated_pushes import modality
-from push_predictor_paper.claims.repeated_pushes.modality import section
-from push_predictor_paper.claims.repeated_pushes.modality_rules import (
-    good_gaussian,
-    mean_over_pushes,
-    model_loss,
-    not_gaussian,
-    some_modes,
-)
+from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, verdict_on
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.figures.histograms import moments
 from push_predictor_paper.fits.fit import Fit, trained
-from push_predictor_paper.section import Section
-from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
-from push_predictor_paper.statistics.grid_maps import place_text
+from push_predictor_paper.painters.histograms import moments
+from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.sections import modality
+from push_predictor_paper.sections.modality import mean_over_pushes, model_loss, section
+from push_predictor_paper.statistics.modes import (
+    LogDensities,
+    dip,
+    found_at,
+    held_out,
+    holm,
+    log_densities,
+    p_values,
+    power,
+    shape,
+    uniform_dips,
+)
 
 from push_predictor.models.pushes import Push
 from push_predictor.reporting.canvas import Picture
@@ -60,18 +62,17 @@ def with_modes(tmp_path_factory: pytest.TempPathFactory) -> Section:
 
 @pytest.mark.slow
 def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
-    assert with_modes.findings[0].verdict == "holds"
-    assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
-    cell = grid_with_modes().cells[SPLIT]
-    assert with_modes.tables[2].rows[0][0] == f"{place_text((cell.fraction, cell.angle))}: rotation"
+    assert verdict_on("modality", "modes", with_modes.evidence["modes"]) == "holds"
+    assert with_modes.evidence["modes"].figures[0].text == f"1 of {len(grid_with_modes().seen)}"
+    assert with_modes.evidence["gaussian_good"].figures[0].name == "with several modes"
+    assert with_modes.tables[0].rows[2][1] == 1  # rotation
 
 
 def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(modality, "_picture", lambda *_: Picture(tmp_path, "", ""))
     made = made_up_section(tmp_path, made_up_grid(SHOWN))
-    assert made.findings[0].verdict in ("does not hold", "not decided")
-    assert made.findings[2].verdict == "not decided"
-    assert "no push has several modes" in made.findings[2].sentence
+    assert verdict_on("modality", "modes", made.evidence["modes"]) in ("does not hold", "not decided")
+    assert "none has several modes" in made.evidence["gaussian_good"].figures[0].name
 
 
 @pytest.mark.slow
@@ -79,12 +80,12 @@ def test_section_has_findings_tables_and_picture(with_modes: Section) -> None:
     for table in with_modes.tables:
         assert {len(row) for row in table.rows} == {len(table.head)}
     assert with_modes.pictures[0].path.stat().st_size > 10_000
-    json.dumps(with_modes.data, allow_nan=False)
+    json.dumps(with_modes.tables[0].json(), allow_nan=False)
 
 
 def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
-    made = made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
-    assert [finding.verdict for finding in made.findings] == ["not decided"]
+    with pytest.raises(TooFewError, match="No push of the grid"):
+        made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
 
 
 def test_tests_of_one_mode_and_of_a_gaussian() -> None:
@@ -159,30 +160,28 @@ def test_one_of_many_tests_finds_less_than_one_alone() -> None:
     assert 0.0 < corrected < single
 
 
-@pytest.mark.parametrize(
-    ("window", "end", "power", "verdict"),
-    [(1, 0, 0.1, "holds"), (0, 2, 0.9, "holds in part"), (0, 0, 0.9, "does not hold"), (0, 0, 0.1, "not decided")],
-)
-def test_verdicts_on_modes(window: int, end: int, power: float, verdict: str) -> None:
-    assert some_modes(window, end, power) == verdict
+def test_quantiles_of_the_uniform_equal_the_published_table() -> None:
+    # Table of the R package diptest, a million samples each, n = 100 and 30; the tolerance is four standard errors.
+    for n, published in ((100, [0.035462, 0.047153, 0.051128]), (30, [0.061451, 0.081479, 0.088169])):
+        found = np.quantile(uniform_dips(n, 10_000), [0.5, 0.9, 0.95])
+        np.testing.assert_allclose(found, published, rtol=0.02)
 
 
-@pytest.mark.parametrize(
-    ("certain", "ends", "verdict"),
-    [
-        (1, (0.0, 0.2), "holds"),
-        (0, (0.06, 0.2), "holds in part"),
-        (0, (0.02, 0.2), "not decided"),
-        (0, (0.02, 0.08), "does not hold"),
-    ],
-)
-def test_verdicts_on_gaussians(certain: int, ends: tuple[float, float], verdict: str) -> None:
-    assert not_gaussian(certain, Estimate(0.05, *ends)) == verdict
+def test_p_values_are_uniform_for_the_uniform_and_small_for_two_modes() -> None:
+    rng = np.random.default_rng(5)
+    p = p_values(dip(rng.random((400, 30))), 30, 2000)
+    assert np.quantile(p, 0.5) == pytest.approx(0.5, abs=0.08)
+    assert 0.02 < np.mean(p <= 0.05) < 0.09
+    two = dip(rng.standard_normal((1, 30)) + 20.0 * (np.arange(30) % 2))
+    assert p_values(two, 30, 2000)[0] == 1.0 / 2001.0
 
 
-@pytest.mark.parametrize(
-    ("ends", "verdict"),
-    [((0.0, 0.1), "holds"), ((0.1, 0.3), "holds in part"), ((0.2, 0.5), "not decided"), ((0.4, 0.5), "does not hold")],
-)
-def test_verdicts_on_the_loss(ends: tuple[float, float], verdict: str) -> None:
-    assert good_gaussian(Estimate(float(np.mean(ends)), *ends)) == verdict
+def test_holm_equals_values_computed_by_hand() -> None:
+    np.testing.assert_allclose(holm(np.array([0.04, 0.01, 0.03, 0.5])), [0.09, 0.04, 0.09, 0.5])
+    assert holm(np.array([0.6, 0.7])).max() == 1.0
+    assert holm(np.zeros(0)).shape == (0,)
+
+
+def test_power_grows_with_the_distance_of_the_modes() -> None:
+    found = [power(50, apart, 0.08, draws=200) for apart in (0.0, 3.0, 5.0, 8.0)]
+    assert found == sorted(found) and found[0] < 0.05 and found[-1] > 0.95

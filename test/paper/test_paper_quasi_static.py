@@ -11,22 +11,9 @@ from pathlib import Path
 import numpy as np
 import paper_studies
 import pytest
-from push_predictor_paper.claims.quasi_static.rules import (
-    Judged,
-    breaks_beyond,
-    departure,
-    estimated,
-    helps_then_harms,
-    lower,
-    turn_of,
-    turning_bracket,
-    turns_there,
-)
-from push_predictor_paper.claims.quasi_static.section import section
 from push_predictor_paper.data.time_scaled import (
     TRAVEL,
     Bracket,
-    EqualTravel,
     equal_travel,
     fold_of,
     number_of,
@@ -34,8 +21,21 @@ from push_predictor_paper.data.time_scaled import (
     speed_windows,
     training_rows,
 )
-from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.estimate import Estimate, total_nmse
 from push_predictor_paper.plan import Plan
+from push_predictor_paper.section import TooFewError
+from push_predictor_paper.sections.quasi_static import (
+    MAIN,
+    SERIES,
+    Brackets,
+    beyond,
+    course,
+    departure,
+    estimated,
+    section,
+    turn,
+    turn_of,
+)
 
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.recordings.table import PushTable
@@ -69,9 +69,10 @@ def scores_of(error: dict[int, float], pushes: int = 40) -> PushScores:
     )
 
 
-def judged_from(errors: list[dict[int, float]]) -> Judged:
+def judged_from(errors: list[dict[int, float]]) -> Brackets:
     """Brackets of these errors by speed."""
-    return Judged(SPEEDS, tuple(range(5)), {"vhgp": [scores_of(error) for error in errors]})
+    scores = [scores_of(error) for error in errors]
+    return Brackets(SPEEDS, tuple(range(5)), 50, 200, dict.fromkeys(SERIES, scores))
 
 
 def flat(level: float) -> dict[int, float]:
@@ -86,10 +87,9 @@ def test_the_same_push_twice_as_fast_has_the_same_outcome_when_slow_and_not_when
     """The simulator's own truth: inertia is nothing at 20 mm/s and something at 200 mm/s."""
     plan = replace(FEW, speeds=(0.01, 0.02, 0.2), speed_pushes=6)
     slowest, slow, fast = (equal_travel(plan, "rect1", "plywood", k) for k in range(3))
-    assert slowest.outcomes.shape == (6, 3)
-    assert np.all(slowest.touching > 0.9)
-    assert departure(slowest, slow, False)[0].value < 0.01
-    assert departure(slowest, fast, False)[0].value > 0.03
+    assert slowest.shape == (6, 3)
+    assert departure(slowest, slow).value < 0.01
+    assert departure(slowest, fast).value > 0.03
 
 
 @pytest.mark.slow
@@ -106,18 +106,14 @@ def test_windows_are_of_equal_travel_at_every_speed() -> None:
 
 
 def test_departure_is_in_units_of_the_slowest_outcomes_variance() -> None:
-    """Outcomes that all miss by half an sd in one output depart by a quarter; lost pushes count unless left out."""
+    """Outcomes that all miss by half an sd in one output depart by a quarter."""
     rng = np.random.default_rng(0)
-    outcomes, kept = rng.standard_normal((200, 3)), np.ones(200)
+    outcomes = rng.standard_normal((200, 3))
     shifted = outcomes + [0.5 * outcomes[:, 0].std(), 0.0, 0.0]
-    value, count = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, kept), True)
-    assert (count, value.value) == (200, pytest.approx(0.25))
-    lost = np.where(np.arange(200) < 100, 0.2, 1.0)
+    assert departure(outcomes, shifted).value == pytest.approx(0.25)
     shifted[:100] = outcomes[:100]
-    every, _ = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, lost), False)
-    only, count = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, lost), True)
-    assert (every.value, only.value, count) == (pytest.approx(0.125), pytest.approx(0.25), 100)
-    assert every.low < 0.125 < every.high
+    half = departure(outcomes, shifted)
+    assert half.value == pytest.approx(0.125) and half.low < 0.125 < half.high
 
 
 # --- models ---------------------------------------------------------------------------------------------------------
@@ -138,7 +134,9 @@ def nmse_at(inertia: float, with_speed: bool, speeds: int, at: int) -> float:
     """NMSE at one speed of a GP of pushes of the slowest speeds."""
     windows = [windows_at(k, inertia) for k in range(5)]
     found = score_bracket(windows, RIG, Bracket("gp", speeds, 32, with_speed, 0))
-    return float(Judged(SPEEDS, tuple(range(5)), {"gp": [found] * 5}).single("gp", 0, at)[0])
+    return float(
+        total_nmse(found.totals(np.array([[number_of(name)[0] == at for name in found.push_id.tolist()]], float)))[0]
+    )
 
 
 def test_a_model_of_slow_pushes_knows_fast_ones_only_where_the_world_is_quasi_static() -> None:
@@ -159,13 +157,12 @@ def test_speed_as_an_input_helps_where_inertia_matters() -> None:
 def test_each_bracket_is_scored_on_its_own_speeds_the_slow_ones_or_one() -> None:
     """Errors that differ by speed show which pushes were counted."""
     judged = judged_from([{0: 0.1, 1: 0.3, 2: 0.5, 3: 0.7, 4: 0.9}] * 5)
-    assert judged.same("vhgp")[:, 0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5], rel=0.05)
-    assert judged.slow("vhgp")[:, 0] == pytest.approx([0.2] * 5, rel=0.05)
-    assert judged.single("vhgp", 0, 4)[0] == pytest.approx(0.9, rel=0.05)
+    assert judged.same(MAIN)[:, 0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5], rel=0.05)
+    assert judged.slow(MAIN)[:, 0] == pytest.approx([0.2] * 5, rel=0.05)
 
 
 @pytest.mark.parametrize(
-    ("levels", "course", "place"),
+    ("levels", "verdict", "place"),
     [
         ((0.6, 0.5, 0.4, 0.3, 0.5), "holds", "holds"),
         ((0.6, 0.5, 0.4, 0.3, 0.2), "holds in part", "does not hold"),
@@ -174,54 +171,34 @@ def test_each_bracket_is_scored_on_its_own_speeds_the_slow_ones_or_one() -> None
         ((0.3, 0.3, 0.3, 0.3, 0.3), "not decided", None),
     ],
 )
-def test_the_verdict_follows_the_curve(levels: tuple[float, ...], course: str, place: str | None) -> None:
+def test_the_verdict_follows_the_curve(levels: tuple[float, ...], verdict: str, place: str | None) -> None:
     """A valley at the paper's turn, a fall, a rise, a hill, nothing."""
-    curve = judged_from([flat(level) for level in levels]).same("vhgp")
-    turn = turning_bracket(SPEEDS)
-    assert turn == 3
-    assert helps_then_harms(estimated(curve[0] - curve[turn]), estimated(curve[-1] - curve[turn])) == course
+    judged = judged_from([flat(level) for level in levels])
+    assert paper_studies.verdict_on("quasi_static", "course", course(judged)) == verdict
     if place is not None:
-        assert turns_there(turn_of(SPEEDS, curve)) == place
+        assert paper_studies.verdict_on("quasi_static", "turn", turn(judged)) == place
 
 
-def test_a_turn_that_the_draws_do_not_agree_on_is_partly_or_not_decided() -> None:
-    """The interval of the turn is that of the draws' own turns."""
+def test_the_interval_of_the_turn_is_that_of_the_draws_own_turns() -> None:
     curves = np.array([[0.3, 0.3, 0.3, 0.3], [0.2, 0.1, 0.2, 0.3], [0.1, 0.2, 0.1, 0.1]])
-    turn = turn_of((0.02, 0.03, 0.06), curves)
-    assert (turn.value, turn.low < 0.05 < turn.high) == (0.06, True)
-    assert turns_there(turn) == "holds in part"
-    assert turns_there(replace(turn, value=0.03)) == "not decided"
-    assert turns_there(Estimate(np.nan, np.nan, np.nan)) == "not decided"
+    found = turn_of((0.02, 0.03, 0.06), curves)
+    assert found.value == 0.06 and found.low < 0.05 < found.high
 
 
-def test_no_bracket_at_the_papers_turn() -> None:
-    """A plan may lack those speeds."""
-    assert turning_bracket((0.01, 0.2)) is None
-
-
-@pytest.mark.parametrize(
-    ("slow", "fast", "verdict"),
-    [
-        ((0.001, 0.002), (0.3, 0.4), "holds"),
-        ((0.01, 0.05), (0.3, 0.4), "holds in part"),
-        ((0.001, 0.002), (0.001, 0.002), "does not hold"),
-        ((0.001, 0.002), (0.01, 0.4), "not decided"),
-    ],
-)
-def test_verdict_on_outcomes_themselves(slow: tuple[float, float], fast: tuple[float, float], verdict: str) -> None:
-    """Notable is a tenth of the model's error, 0.3 here."""
-    departures = {0.05: Estimate(0.01, *slow), 0.2: Estimate(0.2, *fast)}
-    assert breaks_beyond(departures, 0.3) == verdict
-    assert breaks_beyond({0.05: departures[0.05]}, 0.3) == "not decided"
-    assert breaks_beyond(departures, np.nan) == "not decided"
-
-
-@pytest.mark.parametrize(
-    ("ends", "verdict"), [((-0.2, -0.1), "holds"), ((0.1, 0.2), "does not hold"), ((-0.1, 0.1), "not decided")]
-)
-def test_verdict_on_the_speed_as_an_input(ends: tuple[float, float], verdict: str) -> None:
-    """By the interval of the difference."""
-    assert lower(Estimate(float(np.mean(ends)), *ends)) == verdict
+def test_a_departure_is_notable_from_a_tenth_of_the_error_on() -> None:
+    """Of the model's error, 0.3 here; the least at high speed counts, and the largest at low speed."""
+    departures = {
+        0.02: Estimate(0.005, 0.001, 0.006),
+        0.05: Estimate(0.01, 0.009, 0.02),
+        0.1: Estimate(0.2, 0.1, 0.3),
+        0.2: Estimate(0.4, 0.3, 0.5),
+    }
+    evidence = beyond(departures, 0.3)
+    assert paper_studies.verdict_on("quasi_static", "beyond", evidence) == "holds"
+    assert [f.estimate.value for f in evidence.figures] == pytest.approx([0.2 / 0.3, 0.01 / 0.3])
+    departures[0.05] = Estimate(0.05, 0.04, 0.06)
+    assert paper_studies.verdict_on("quasi_static", "beyond", beyond(departures, 0.3)) == "holds in part"
+    assert beyond({0.05: departures[0.05]}, 0.3).figures == beyond(departures, np.nan).figures == ()
 
 
 def test_skips_draws_without_any_such_push() -> None:
@@ -234,7 +211,6 @@ def test_skips_draws_without_any_such_push() -> None:
 @pytest.mark.slow
 def test_too_few_windows_are_not_decided(tmp_path: Path) -> None:
     """Three pushes a speed are nothing to learn from."""
-    made = section(
-        replace(paper_studies.made_up_study(tmp_path), plan=replace(FEW, speeds=(0.075, 0.1), speed_pushes=3))
-    )
-    assert [finding.verdict for finding in made.findings] == ["not decided"]
+    plan = replace(FEW, speeds=(0.075, 0.1), speed_pushes=3)
+    with pytest.raises(TooFewError, match="Fewer than two speeds"):
+        section(replace(paper_studies.made_up_study(tmp_path), plan=plan))

@@ -9,10 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper_studies import made_up_corpus, made_up_study
-from push_predictor_paper.claims.comparison import speed_error
-from push_predictor_paper.claims.comparison.speed_error import captured, rank_correlation, spearman, unreliable
-from push_predictor_paper.figures.speed_error import SpeedCurve
+from paper_studies import made_up_corpus, made_up_study, verdict_on
 from push_predictor_paper.fits.held_out import (
     FEWEST_PUSHES,
     HeldOut,
@@ -22,9 +19,10 @@ from push_predictor_paper.fits.held_out import (
     speed_groups,
     within_nmse,
 )
+from push_predictor_paper.section import TooFewError
+from push_predictor_paper.sections.speed_error import captured, rank_correlation, section, spearman, unreliable
 from scipy.stats import spearmanr
 
-CORPUS = made_up_corpus()
 SPEEDS = np.array([0.02, 0.1, 0.2, 0.4])
 PUSHES = 60  # at each speed
 
@@ -43,13 +41,7 @@ def windows(analytical=(0.1, 0.1, 0.1, 0.1), vhgp=(0.1, 0.1, 0.1, 0.1)) -> HeldO
 
     names = np.array([f"p{k:04d}" for k in range(len(group))])
     predicted = {"analytical": off(analytical), "gp": off(vhgp), "vhgp": off(vhgp)}
-    return HeldOut(500, names, speed, group, SPEEDS, 0.2 * speed, observed, predicted, observed)
-
-
-def curve(held: HeldOut) -> SpeedCurve:
-    at = [held.at(k) for k in range(4)]
-    nmse = tuple(within_nmse(w, ("analytical",)) for w in at)
-    return SpeedCurve("analytical", tuple(SPEEDS.tolist()), nmse, nmse, nmse)
+    return HeldOut(500, names, speed, group, SPEEDS, 0.2 * speed, observed, predicted)
 
 
 @pytest.mark.slow
@@ -58,18 +50,12 @@ def curve(held: HeldOut) -> SpeedCurve:
 )
 def test_unreliable_at_speed_means_that_error_and_speed_are_ranked_alike(nmse, verdict):
     held = windows(nmse)
-    assert unreliable(CORPUS, held, curve(held)).verdict == verdict
-
-
-def test_too_few_pushes_decide_nothing():
-    held = windows((0.3, 0.3, 0.3, 0.3))
-    few = held.take(np.arange(len(held.group)) % PUSHES < 4)
-    assert unreliable(CORPUS, few, curve(few)).verdict == "not decided"
+    assert verdict_on("speed_error", "unreliable", unreliable(held)) == verdict
 
 
 def test_growth_at_high_speed_alone_holds_in_part():
     held = windows((1.0, 0.02, 0.2, 0.8))
-    assert unreliable(CORPUS, held, curve(held)).verdict == "holds in part"
+    assert verdict_on("speed_error", "unreliable", unreliable(held)) == "holds in part"
 
 
 def test_resampled_rank_correlations_are_those_of_repeated_pairs():
@@ -95,7 +81,7 @@ def test_the_rank_correlation_knows_no_units_of_speed_s_spread():
     ],
 )
 def test_models_with_speed_must_lead_at_every_high_speed(vhgp, verdict):
-    assert captured(CORPUS, windows((0.5,) * 4, vhgp), [0, 1, 2, 3]).verdict == verdict
+    assert verdict_on("speed_error", "captured", captured(windows((0.5,) * 4, vhgp))) == verdict
 
 
 def test_levelled_outcomes_have_the_same_spread_at_every_speed():
@@ -105,7 +91,7 @@ def test_levelled_outcomes_have_the_same_spread_at_every_speed():
 
 
 def test_slow_pushes_alone_decide_nothing_about_high_speed():
-    assert captured(CORPUS, windows(), [0]).verdict == "not decided"
+    assert verdict_on("speed_error", "captured", captured(replace(windows(), speeds=SPEEDS[:1]))) == "not decided"
 
 
 def test_the_nmse_within_a_speed_is_measured_by_the_spread_at_that_speed():
@@ -141,11 +127,6 @@ def test_speeds_near_one_command_form_one_group():
     assert np.array_equal(group, np.repeat([0, 1, 2], 20))
 
 
-def test_speeds_without_gaps_are_cut_into_equal_groups():
-    group = speed_groups(np.array([f"p{k}" for k in range(120)]), np.geomspace(0.01, 0.5, 120))
-    assert np.array_equal(np.bincount(group), [20] * 6)
-
-
 def test_speeds_of_few_pushes_join_their_neighbours():
     group = np.repeat([0, 1, 2, 3], [3, 6, FEWEST_PUSHES, 2])
     pushes = np.array([f"p{k}" for k in range(len(group))])
@@ -160,5 +141,5 @@ def test_a_push_has_one_speed():
 
 def test_a_set_of_one_speed_gets_a_note(tmp_path):
     study = replace(made_up_study(tmp_path), simulated=made_up_corpus(speeds=(0.02,)))
-    made = speed_error.section(study)
-    assert made.findings == () and "one speed only (20 mm/s)" in made.notes[0]
+    with pytest.raises(TooFewError, match="one speed only"):
+        section(study, study.simulated)

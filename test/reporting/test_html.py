@@ -58,23 +58,22 @@ def test_folded_table_links_to_its_files() -> None:
     assert "href" not in html.folded_table("Scores.", ("a", "b"), (("x", "1"),))
 
 
-def test_summary_of_verdicts_has_a_number_and_grey_where_data_are_few() -> None:
+def test_summary_of_verdicts_has_a_number_for_each() -> None:
     rows = [
         html.VerdictRow("maps", "Maps", "dx is <largest>", "3.97 mm", "holds in part"),
-        html.VerdictRow("noise", "Noise", "it varies", "5", "holds", grey=True),
+        html.VerdictRow("noise", "Noise", "it varies", "5", "holds"),
     ]
     part = html.verdicts("claim", rows)
     assert "<th>claim</th><th>number</th><th>here</th>" in part
     assert '<td><a href="#maps">Maps</a></td><td>dx is &lt;largest&gt;</td><td>3.97 mm</td>' in part
     assert re.findall(r'<td class="([\w-]+)"><span class="verdict">(.*?)<', part) == [
         ("holds-in-part", "holds in part"),
-        ("grey", "holds"),
+        ("holds", "holds"),
     ]
 
 
-def test_finding_without_enough_data_is_grey() -> None:
+def test_finding_has_the_colour_of_its_verdict() -> None:
     assert '<div class="finding does-not-hold">' in html.finding("c", "does not hold", "s")
-    assert '<div class="finding grey">' in html.finding("c", "does not hold", "s", grey=True)
 
 
 def test_bars_show_each_count_that_is_not_zero() -> None:

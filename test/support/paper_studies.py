@@ -9,10 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from push_predictor_paper.claims import CLAIMS
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
 from push_predictor_paper.plan import GRID_SPEED, QUICK, SPEEDS, Plan
 from push_predictor_paper.study import Study
+from push_predictor_paper.verdict import Evidence, judged
 from push_predictor_paper.work import Work
 
 from push_predictor.geometry.shapes import shape_outline
@@ -30,7 +32,6 @@ PLAN: Plan = replace(
     contacts=3,
     angle_step=0.75,
     repetitions=20,
-    informed=False,
 )
 PAIRS = (("rect1", "plywood"), ("rect1", "abs"), ("ellip1", "plywood"), ("ellip1", "abs"))
 
@@ -106,3 +107,8 @@ def made_up_study(folder: Path, plan: Plan = PLAN) -> Study:
     """All of it, pictures and kept results in the folder."""
     grids = {surface: made_up_grid(plan, surface, k) for k, surface in enumerate(("plywood", "abs"))}
     return Study(plan, Work(folder / "work", cores=1), folder, made_up_corpus(), (), grids)
+
+
+def verdict_on(section: str, claim: str, evidence: Evidence) -> str:
+    """The verdict of the report on this evidence for a claim."""
+    return judged(CLAIMS[section][claim], evidence).verdict

@@ -91,12 +91,12 @@ class RepeatedGrid:
     @property
     def mean(self) -> Array:
         """Mean outcomes (A, C, 3) over angle and contact, NaN with too few repetitions."""
-        return self._map([cell.mean for cell in self.cells])
+        return self.as_map(np.reshape([cell.mean for cell in self.seen], (-1, 3)))
 
     @property
     def sd(self) -> Array:
         """Standard deviations (A, C, 3) of the outcomes."""
-        return self._map([cell.sd for cell in self.cells])
+        return self.as_map(np.reshape([cell.sd for cell in self.seen], (-1, 3)))
 
     @property
     def seen(self) -> list[Repetitions]:
@@ -108,9 +108,12 @@ class RepeatedGrid:
         """Mean measured inputs (len(seen), 3) of these pushes, at which models are evaluated."""
         return np.array([cell.inputs.mean(axis=0) for cell in self.seen])
 
-    def _map(self, values: list[Array]) -> Array:
-        shape = (len(self.fractions), len(self.angles), 3)
-        return np.asarray(np.transpose(np.reshape(values, shape), (1, 0, 2)))
+    def as_map(self, values: Array) -> Array:
+        """Values (..., len(seen), 3) of the pushes seen as maps (..., A, C, 3), NaN elsewhere."""
+        enough = np.reshape([cell.enough for cell in self.cells], (len(self.fractions), len(self.angles)))
+        maps = np.full((*values.shape[:-2], *enough.shape, 3), np.nan)
+        maps[..., enough, :] = values
+        return np.asarray(np.swapaxes(maps, -3, -2))
 
 
 def repeated_grid(

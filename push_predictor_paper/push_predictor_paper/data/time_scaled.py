@@ -52,17 +52,6 @@ class Bracket:
     fold: int
 
 
-@dataclass(frozen=True, eq=False)
-class EqualTravel:
-    """Outcomes of n pushes after the tip has travelled TRAVEL from the first contact.
-
-    outcomes (n, 3), m, m, rad in the push frame; touching (n,), share of that way on which the tip touched.
-    """
-
-    outcomes: Array
-    touching: Array
-
-
 def speed_windows(plan: Plan, shape: str, surface: str, number: int) -> PushTable:
     """Windows of pushes at the number-th speed of the plan; each push is at one speed only.
 
@@ -75,8 +64,11 @@ def speed_windows(plan: Plan, shape: str, surface: str, number: int) -> PushTabl
     return replace(table, push_id=names)
 
 
-def equal_travel(plan: Plan, shape: str, surface: str, number: int) -> EqualTravel:
-    """The same pushes at the number-th speed, with the same contacts, angles, places and noise at every speed."""
+def equal_travel(plan: Plan, shape: str, surface: str, number: int) -> Array:
+    """Outcomes (n, 3), m, m, rad in the push frame, of n pushes after TRAVEL of the tip from the first contact.
+
+    They are the same pushes at every speed, with the same contacts, angles, places and noise.
+    """
     spec = _spec(plan, (shape, surface), plan.speeds[number], np.random.default_rng([plan.seed, 8]), 1, 99)
     start = start_poses(spec)
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, start, spec.acceleration)
@@ -136,7 +128,7 @@ def _spec(
     return on_the_table(SimulationSpec(*pair, pushes, acceleration=PROMPT), plan.seed, number)
 
 
-def _first_travel(motion: Motion, path: PusherPath) -> EqualTravel:
+def _first_travel(motion: Motion, path: PusherPath) -> Array:
     rows, steps = np.arange(len(motion.time)), motion.time[:, 1]
     touch = np.hypot(motion.wrench[..., 0], motion.wrench[..., 1]) > 0.0
     first = np.argmax(touch, axis=1)
@@ -144,7 +136,4 @@ def _first_travel(motion: Motion, path: PusherPath) -> EqualTravel:
     before, after = motion.slider[rows, first], motion.slider[rows, last]
     ahead = np.arctan2(path.direction[:, 1], path.direction[:, 0])
     moved = np.column_stack([rotate(after[:, :2] - before[:, :2], -ahead), after[:, 2] - before[:, 2]])
-    since = np.cumsum(touch, axis=1)
-    share = (since[rows, last] - since[rows, first]) / np.maximum(last - first, 1)
-    touched = since[:, -1] > 0
-    return EqualTravel(np.where(touched[:, None], moved, 0.0), np.where(touched, share, 0.0))
+    return np.asarray(np.where(np.any(touch, axis=1, keepdims=True), moved, 0.0))

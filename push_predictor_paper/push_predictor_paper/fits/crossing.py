@@ -13,6 +13,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.splits import BOOTSTRAP_DRAWS, push_bootstrap
 from push_predictor.types import Array
+from push_predictor_paper.estimate import Estimate
 
 
 @dataclass(frozen=True)
@@ -25,19 +26,13 @@ class Crossing:
     first: int
     last: int
 
+    def estimate(self) -> Estimate:
+        """For a verdict: a crossing beyond the last size lies no further than that for certain."""
+        return Estimate(self.value, min(self.low, self.last), self.high)
+
     def text(self) -> str:
         """For a sentence: 95 (70 to 130)."""
         return f"{self._size_text(self.value)} ({self._size_text(self.low)} to {self._size_text(self.high)})"
-
-    def cell(self) -> str:
-        """For a table: the interval beneath."""
-        return f"{self._size_text(self.value)}\n{self._size_text(self.low)} to {self._size_text(self.high)}"
-
-    def json(self) -> dict[str, float | None]:
-        """null: not up to the last size tried."""
-        ends = {"value": self.value, "low": self.low, "high": self.high}
-        reached: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
-        return {**reached, "first_tried": self.first, "last_tried": self.last}
 
     def _size_text(self, size: float) -> str:
         if not np.isfinite(size):

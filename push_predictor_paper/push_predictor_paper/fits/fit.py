@@ -14,7 +14,7 @@ import numpy as np
 
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.splits import Split, random_split, split_by_push
-from push_predictor.evaluation.validation import Comparison, compare
+from push_predictor.evaluation.validation import compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array, BoolArray
@@ -29,15 +29,16 @@ SPLIT_WORDS = {
     "random": "random split of windows",
     "none": "trained on this set, scored on another",
 }
+SPLIT_SHORT = {"push": "by push", "random": "random"}
 KINDS = ("analytical", "gp", "vhgp")
-INFORMED = {"gp": "informed gp", "vhgp": "informed vhgp"}  # the same with fitted mechanics as mean
+KIND_NAMES = {"analytical": "analytical", "gp": "GP", "vhgp": "VHGP"}
 
 
 @dataclass(frozen=True)
 class Fit:
     """Which model: kind, training windows, split, and the seed of the draw (the held-out fold, by push).
 
-    kind: one of KINDS, whose learned models have a zero mean as the paper's, or one of the values of INFORMED.
+    kind: one of KINDS; the learned models have a zero mean, as the paper's.
     Split `none` holds nothing back: for models that are scored on other pushes, those of the grid.
     """
 
@@ -49,11 +50,12 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Scores of a fit on the held-out windows of its split; cpu: s to train it."""
+    """Scores of a fit on the held-out windows of its split; predicted: their means (m, 3); cpu: s to train it."""
 
     fit: Fit
     push_scores: PushScores
-    cpu: float
+    predicted: Array
+    cpu: float = 0.0
 
     @property
     def nmse(self) -> Array:
@@ -80,16 +82,11 @@ def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict
 
 def score(pushes: PushSet, fit: Fit) -> Score:
     """Train and score one fit."""
-    comparison, cpu = compared(pushes, fit)
-    return Score(fit, push_scores(comparison), cpu)
-
-
-def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:
-    """Predictions for the held-out windows, and the CPU time of the training, s."""
     start = time.process_time()
     model = trained(pushes, fit)
     cpu = time.process_time() - start
-    return compare(model, pushes.table.take(split_of(pushes, fit).test)), cpu
+    comparison = compare(model, pushes.table.take(split_of(pushes, fit).test))
+    return Score(fit, push_scores(comparison), comparison.mean, cpu)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +113,8 @@ def trained(pushes: PushSet, fit: Fit) -> PushModel:
     """Train the model of a fit."""
     rows = np.sort(split_of(pushes, fit).first(fit.n))
     table = pushes.table.take(rows)
-    informed = fit.kind in INFORMED.values()
-    options = TrainingOptions(
-        n_train=len(rows), seed=fit.seed, mean="mechanics" if informed else "zero", per_path=informed, tails=False
-    )
-    return train_model(table, pushes.rig, fit.kind.removeprefix("informed "), name=fit.kind, options=options)
+    options = TrainingOptions(n_train=len(rows), seed=fit.seed, mean="zero", per_path=False, tails=False)
+    return train_model(table, pushes.rig, fit.kind, name=fit.kind, options=options)
 
 
 def split_of(pushes: PushSet, fit: Fit) -> Split:

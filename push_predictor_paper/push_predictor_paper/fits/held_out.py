@@ -14,11 +14,12 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fit import KINDS, Fit, compared, split_of, trainable
+from push_predictor_paper.fits.curves import curves
+from push_predictor_paper.fits.fit import KINDS, split_of
+from push_predictor_paper.plan import SPEEDS
 from push_predictor_paper.study import Study
 
-SAME_SPEED = 1.12  # speeds within this ratio form a group
-WIDEST, EQUAL_GROUPS = 1.6, 6  # ratio of speeds within a group; groups of speeds without gaps
+SAME_SPEED = 1.12  # ratio of speeds that a reader is told as one
 FEWEST_PUSHES = 8  # at a speed, for an interval
 
 
@@ -27,7 +28,7 @@ class HeldOut:
     """n held-out windows of all folds, of models with `size` training windows.
 
     push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
-    pusher; observed (n, 3); predicted by kind (n, 3); away (n, 3): observed less the training mean.
+    pusher; observed (n, 3); predicted by kind (n, 3).
     """
 
     size: int
@@ -38,7 +39,6 @@ class HeldOut:
     travel: Array
     observed: Array
     predicted: Mapping[str, Array]
-    away: Array
 
     def at(self, group: int) -> HeldOut:
         """The windows of one speed."""
@@ -46,17 +46,8 @@ class HeldOut:
 
     def take(self, rows: np.ndarray) -> HeldOut:
         """Some of the windows."""
-        return HeldOut(
-            self.size,
-            self.push_id[rows],
-            self.speed[rows],
-            self.group[rows],
-            self.speeds,
-            self.travel[rows],
-            self.observed[rows],
-            {kind: mean[rows] for kind, mean in self.predicted.items()},
-            self.away[rows],
-        )
+        columns = {f: getattr(self, f)[rows] for f in ("push_id", "speed", "group", "travel", "observed")}
+        return replace(self, **columns, predicted={kind: mean[rows] for kind, mean in self.predicted.items()})
 
     @property
     def pushes(self) -> int:
@@ -85,31 +76,22 @@ class HeldOut:
 
 
 def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
-    """Train all kinds on the reference pair, fold by fold; None if no planned size is small enough for the set.
+    """The windows of the reference pair's learning curves at the plan's size, or at the largest smaller one; else None.
 
-    The size is the plan's, or the largest smaller one that every fold holds.
+    All kinds of model, fold by fold.
     """
-    pushes = corpus.sets[corpus.reference]
-    folds = range(study.plan.seeds)
-    fewest = min(trainable(pushes, Fit("gp", 1, "push", fold)) for fold in folds)
-    sizes = [n for n in study.plan.sizes if n <= fewest]
+    pushes, found = corpus.sets[corpus.reference], curves(study, corpus, [corpus.reference], KINDS)
+    sizes = [n for n in found.sizes([corpus.reference], "gp", "push") if n <= study.plan.size]
     if not sizes:
         return None
-    fits = [Fit(kind, sizes[-1], "push", fold) for kind in KINDS for fold in folds]
-    answers = study.work.run("held-out windows", compared, [(pushes, fit) for fit in fits])
-    comparisons = [comparison for comparison, _ in answers]
-    count = len(folds)
-    rows = np.concatenate([split_of(pushes, fit).test for fit in fits[:count]])
-    table = pushes.table.take(rows)
+    folds = {kind: found.cells[corpus.reference, kind, "push", sizes[-1]] for kind in KINDS}
+    table = pushes.table.take(np.concatenate([split_of(pushes, score.fit).test for score in folds["gp"]]))
     speed = push_speeds(table.push_id, table.inputs[:, 0])
     group = speed_groups(table.push_id, speed)
     speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
-    predicted = {
-        kind: np.concatenate([c.mean for c in comparisons[k * count : (k + 1) * count]]) for k, kind in enumerate(KINDS)
-    }
-    away = np.concatenate([c.observed - c.training_mean for c in comparisons[:count]])
+    predicted = {kind: np.concatenate([score.predicted for score in scores]) for kind, scores in folds.items()}
     travel = table.inputs[:, 0] * table.duration
-    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted, away)
+    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted)
 
 
 def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
@@ -120,18 +102,8 @@ def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
 
 
 def speed_groups(push_id: np.ndarray, speed: Array) -> IntArray:
-    """Numbers (n,) of groups: speeds (n,) that lie closer together than SAME_SPEED share one.
-
-    Speeds without gaps between them are cut into groups of equal size.
-    """
-    order = np.argsort(speed, kind="stable")
-    steps = speed[order][1:] > SAME_SPEED * speed[order][:-1]
-    number = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
-    if any(np.ptp(np.log(speed[order][number == k])) > np.log(WIDEST) for k in range(number[-1] + 1)):
-        number = np.arange(len(speed), dtype=np.int64) * EQUAL_GROUPS // len(speed)
-    group = np.empty(len(speed), dtype=np.int64)
-    group[order] = number
-    return joined(group, push_id)
+    """Numbers (n,) of groups: the nearest of the paper's speeds, as a ratio; see `joined`."""
+    return joined(np.abs(np.log(speed)[:, None] - np.log(SPEEDS)).argmin(axis=1), push_id)
 
 
 def joined(group: IntArray, push_id: np.ndarray) -> IntArray:

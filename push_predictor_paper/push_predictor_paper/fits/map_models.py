@@ -13,15 +13,14 @@ import numpy as np
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus, Pair, PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, contact_on_first_side
-from push_predictor_paper.fits.fit import Answer, Fit, ask, trainable
+from push_predictor_paper.fits.fit import Answer, Fit, ask
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.study import Study
-from push_predictor_paper.work import Work
 
 FRACTIONS = np.linspace(0.0055, 0.9945, 41)
 ANGLES = np.linspace(-1.5, 1.5, 61)
 SAME_SPEED = 0.1  # relative; a set needs windows this close to the grid's speed
-Question = tuple[Corpus, Pair, Fit, RepeatedGrid | None]
+Question = tuple[Corpus, Pair, str, int, RepeatedGrid | None]  # kind, seed
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +34,17 @@ class ModelMap:
     at_pushes: Answer | None
 
 
-def reference_maps(study: Study, kind: str, seeds: int = 1) -> list[ModelMap]:
+def reference_maps(study: Study, kind: str) -> list[ModelMap]:
     """Maps of models of the reference pair, one for each draw of training windows."""
-    corpus, grid = study.simulated, study.reference_grid
-    fits = [_all_rows(study, corpus, corpus.reference, kind, seed) for seed in range(seeds)]
-    return model_maps(study.work, [(corpus, corpus.reference, fit, grid) for fit in fits])
+    corpus, seeds = study.simulated, range(study.plan.seeds)
+    return _maps(study, [(corpus, corpus.reference, kind, seed, study.reference_grid) for seed in seeds])
 
 
 def surface_maps(study: Study, kind: str) -> dict[str, ModelMap]:
     """Maps of one model for every surface with a grid and a training set of the grid's shape."""
     corpus = study.simulated
-    pairs = {s: ((grid.shape, s), grid) for s, grid in study.grids.items() if (grid.shape, s) in corpus.sets}
-    asked: list[Question] = [(corpus, p, _all_rows(study, corpus, p, kind, 0), grid) for p, grid in pairs.values()]
-    return dict(zip(pairs, model_maps(study.work, asked), strict=True))
+    shown = {s: grid for s, grid in study.grids.items() if (grid.shape, s) in corpus.sets}
+    return dict(zip(shown, _maps(study, [(corpus, (g.shape, s), kind, 0, g) for s, g in shown.items()]), strict=True))
 
 
 def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
@@ -55,36 +52,34 @@ def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
     speed = corpus.sets[corpus.reference].table.inputs[:, 0]
     if corpus.reference[0] != "rect1" or not np.any(np.abs(speed - GRID_SPEED) <= SAME_SPEED * GRID_SPEED):
         return []
-    fits = [_all_rows(study, corpus, corpus.reference, "vhgp", seed) for seed in range(study.plan.seeds)]
     grid = study.reference_grid if corpus is study.simulated else None
-    return model_maps(study.work, [(corpus, corpus.reference, fit, grid) for fit in fits])
-
-
-def model_maps(work: Work, questions: Sequence[Question]) -> list[ModelMap]:
-    """Train these models and evaluate them."""
-    calls = [(c.sets[pair], fit, _inputs(c.sets[pair], grid)) for c, pair, fit, grid in questions]
-    return [_map(answer) for answer in work.run("models asked for maps", ask, calls)]
+    return _maps(study, [(corpus, corpus.reference, "vhgp", seed, grid) for seed in range(study.plan.seeds)])
 
 
 def averaged(models: Sequence[ModelMap]) -> ModelMap:
     """Mean map of models of several draws of training windows; known where all of them are."""
-    mean, sd, process_sd = (
-        np.mean([getattr(m, what) for m in models], axis=0) for what in ("mean", "sd", "process_sd")
-    )
+    mean, sd, process_sd = (_mean(models, what) for what in ("mean", "sd", "process_sd"))
     return ModelMap(mean, sd, process_sd, None)
 
 
 def together(answers: Sequence[Answer]) -> Answer:
     """Mean of the predictions of such models for the same pushes."""
-    mean, sd, process_sd = (
-        np.mean([getattr(a, what) for a in answers], axis=0) for what in ("mean", "sd", "process_sd")
-    )
+    mean, sd, process_sd = (_mean(answers, what) for what in ("mean", "sd", "process_sd"))
     return Answer(mean, sd, process_sd, np.all([a.in_domain for a in answers], axis=0))
 
 
-def _all_rows(study: Study, corpus: Corpus, pair: Pair, kind: str, seed: int) -> Fit:
-    whole = Fit(kind, study.plan.size, "none", seed)
-    return Fit(kind, min(study.plan.size, trainable(corpus.sets[pair], whole)), "none", seed)
+def _mean(several: Sequence[ModelMap | Answer], what: str) -> Array:
+    return np.asarray(np.mean([getattr(one, what) for one in several], axis=0))
+
+
+def _maps(study: Study, questions: Sequence[Question]) -> list[ModelMap]:
+    """Train models of all rows, or of the plan's size, and evaluate them."""
+    calls = []
+    for corpus, pair, kind, seed, grid in questions:
+        pushes = corpus.sets[pair]
+        n = min(study.plan.size, len(pushes.table))
+        calls.append((pushes, Fit(kind, n, "none", seed), _inputs(pushes, grid)))
+    return [_map(answer) for answer in study.work.run("models asked for maps", ask, calls)]
 
 
 def _inputs(pushes: PushSet, grid: RepeatedGrid | None) -> Array:

@@ -1,22 +1,26 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Arithmetic of maps over (contact, angle): resampling, interpolation, agreement of two maps."""
+"""Arithmetic of maps over (contact, angle): resampling, interpolation, agreement of two maps, the maximum of one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array
-from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
+from push_predictor_paper.data.repetitions import Repetitions
 from push_predictor_paper.estimate import Estimate, of_draws
 
 BLOCK = (0.2, 0.4)  # of the side, rad: neighbouring pushes are alike and are resampled as a block
 DRAWS = 400
+SURE = 0.95
+STEP = 0.1  # of the side, and rad: the paper's grid
+FEWEST_PUSHES = 8  # of a grid, to compare maps
 ROUNDING = 1e-9
 Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
 Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m): (d,)
@@ -32,6 +36,9 @@ def in_degrees(angle: float) -> str:
     return f"{np.round(np.degrees(angle)) + 0.0:.0f}°".replace("-", "−")
 
 
+OF_BLOCKS = f"Intervals resample blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])})."
+
+
 def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:
     """Means and sds (DRAWS, len(cells), 3) of pushes with resampled repetitions."""
     rng, drawn = np.random.default_rng(seed), []
@@ -40,14 +47,6 @@ def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:
         drawn.append((again.mean(axis=1), again.std(axis=1, ddof=1)))
     means, sds = zip(*drawn, strict=True)
     return np.stack(means, axis=1), np.stack(sds, axis=1)
-
-
-def on_grid(grid: RepeatedGrid, values: Array) -> Array:
-    """Values (..., len(grid.seen), 3) of the pushes seen as maps (..., A, C, 3), NaN elsewhere."""
-    enough = np.reshape([cell.enough for cell in grid.cells], (len(grid.fractions), len(grid.angles)))
-    maps = np.full((*values.shape[:-2], *enough.shape, 3), np.nan)
-    maps[..., enough, :] = values
-    return np.asarray(np.swapaxes(maps, -3, -2))
 
 
 def at_places(fractions: Array, angles: Array, maps: Array, places: Sequence[Place]) -> Array:
@@ -109,3 +108,46 @@ def relative_error(model: Array, truth: Array, weights: Array) -> Array:
     total, away = weights.sum(axis=1), truth - truth.mean()
     spread = weights @ away**2 - (weights @ away) ** 2 / total
     return np.asarray(weights @ (model - truth) ** 2 / spread)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest value of a map and its place; places: where it falls in 95 % of the draws.
+
+    reach: the value at the named places (mean over them, between the map's points) over the largest.
+    """
+
+    value: Estimate
+    place: Place
+    places: tuple[Place, ...]
+    reach: Estimate
+
+    def steps_from(self, named: Sequence[Place]) -> Estimate:
+        """Steps of the paper's grid from the nearest of the named places; the interval is over the places."""
+        away = [min(max(abs(c - n[0]), abs(a - n[1])) for n in named) / STEP for c, a in (self.place, *self.places)]
+        return Estimate(away[0], min(away[1:]), max(away[1:]))
+
+
+def peak(
+    fractions: Array,
+    angles: Array,
+    shown: Array,
+    drawn: Array,
+    named: Sequence[Place],
+    interval: Callable[[float, Array], Estimate],
+) -> Peak:
+    """The peak of a map (A, C) with draws (d, A, C), NaN where unknown; named: places of interest."""
+    maps = np.concatenate([shown[None], drawn])
+    flat = np.where(np.isfinite(maps), maps, -np.inf).reshape(len(maps), -1)
+    top, where = flat.max(axis=1), flat.argmax(axis=1)
+    reach = at_places(fractions, angles, maps, named).mean(axis=1) / top
+    cells = [(float(fractions[i % len(fractions)]), float(angles[i // len(fractions)])) for i in where]
+    return Peak(interval(float(top[0]), top[1:]), cells[0], _commonest(cells[1:]), interval(float(reach[0]), reach[1:]))
+
+
+def _commonest(places: Sequence[Place]) -> tuple[Place, ...]:
+    """The fewest places with 95 % of all, the most frequent first."""
+    counts = {place: places.count(place) for place in dict.fromkeys(places)}
+    ordered = sorted(counts, key=lambda place: -counts[place])
+    held = np.cumsum([counts[place] for place in ordered])
+    return tuple(ordered[: int(np.searchsorted(held, SURE * len(places) - ROUNDING)) + 1])

@@ -1,0 +1,214 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""KL divergence of models from repeated pushes, by the correct formula and by the one the paper prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.special import digamma
+
+from push_predictor.evaluation.report.maps import ColourScale
+from push_predictor.reporting.canvas import Picture
+from push_predictor.types import Array
+from push_predictor_paper.data.repetitions import RepeatedGrid
+from push_predictor_paper.estimate import Estimate, of_draws
+from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer
+from push_predictor_paper.fits.map_models import reference_maps
+from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
+from push_predictor_paper.painters.maps import Map, paint_maps
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, mean_of, median_of
+from push_predictor_paper.study import Study
+from push_predictor_paper.verdict import Evidence, Figure
+
+STATISTICS: dict[str, Statistic] = {"mean": mean_of, "median": median_of}
+PAPER = {"gp": ("22.63", "5.74"), "vhgp": ("15.32", "5.34")}
+NOTES = (
+    "KL(repetitions || model). As in the paper, both are taken as Gaussian with independent outputs. The model's sd is "
+    "that of an outcome, its own uncertainty included. KL does not depend on the units of the outputs.",
+    "The formula printed in the paper has log(sd2/sd1) in place of log(sd2^2/sd1^2). It is not a divergence: it is "
+    "negative, down to −0.077 per output, for a model that is right but 1.4 times as wide. The paper does not state "
+    "which formula its figures come from.",
+    "The paper's figures are of the measured square: repetitions on the robot, models learned from the MIT set. "
+    "Ours are of pushes on the simulator's plywood, over their first 0.2 s. How its noise grows with speed is an "
+    "assumption.",
+    "A perfect model's expected KL is by theory for Gaussians; heavier tails give a proportionally higher one.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Divergences:
+    """Of p pushes from models of s seeds, (s, p), three outputs together: nats.
+
+    of_mean: the part of wrong means; sd_ratio (s, p, 3) of model and repetitions. weights (d, p): draws of blocks of
+    neighbouring pushes, which share the error of a model.
+    """
+
+    correct: Array
+    printed: Array
+    of_mean: Array
+    sd_ratio: Array
+    weights: Array
+
+    @property
+    def of_sd(self) -> Array:
+        """The part of the divergence (s, p) that remains with exact means."""
+        return np.asarray(self.correct - self.of_mean)
+
+
+def section(study: Study) -> Section:
+    """The paper's table, and maps and distribution of the divergence."""
+    grid = study.reference_grid
+    if not grid.seen:
+        raise TooFewError("No push of the grid has enough repetitions for a mean and a standard deviation.")
+    models = {kind: reference_maps(study, kind) for kind in KINDS}
+    found = {kind: divergences(grid, [m.at_pushes for m in maps if m.at_pushes]) for kind, maps in models.items()}
+    floor = float(np.mean([3.0 * expected_kl(len(cell.outcomes)) for cell in grid.seen]))
+    median, mean = (estimate(found["vhgp"].correct, s, found["vhgp"].weights) for s in (median_of, mean_of))
+    good = Evidence([Figure("", median)], f"Mean {mean.text()}, {len(grid.seen)} pushes.")
+    return Section(
+        {**{name: nearer(name, found) for name in STATISTICS}, "good": good},
+        (_table(study, found, floor),),
+        (_maps(study, grid, found), _curves(study, grid, found, floor)),
+        NOTES,
+    )
+
+
+def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:
+    """Divergences of the models' answers, one a seed, from the pushes of the grid."""
+    mean, sd = (np.array([getattr(cell, what) for cell in grid.seen]) for what in ("mean", "sd"))
+    model_mean, model_sd = (np.array([getattr(answer, what) for answer in answers]) for what in ("mean", "sd"))
+    correct, printed = (kl(mean, sd, model_mean, model_sd).sum(axis=2) for kl in (gaussian_kl, printed_kl))
+    of_mean = kl_of_mean(mean, model_mean, model_sd).sum(axis=2)
+    return Divergences(correct, printed, of_mean, model_sd / sd, block_weights(grid.seen))
+
+
+def gaussian_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
+    """KL(N(mean, sd^2) || N(model_mean, model_sd^2)) elementwise, nats, 0 where they agree; shapes broadcast.
+
+    mean and model_mean in one unit, which drops out; sd and model_sd > 0 in the same.
+    """
+    ratio = (sd / model_sd) ** 2
+    return 0.5 * (ratio - 1.0 - np.log(ratio)) + kl_of_mean(mean, model_mean, model_sd)
+
+
+def kl_of_mean(mean: Array, model_mean: Array, model_sd: Array) -> Array:
+    """The part of `gaussian_kl` due to the difference of the means; the rest is due to the standard deviations."""
+    return np.asarray(0.5 * ((mean - model_mean) / model_sd) ** 2)
+
+
+def printed_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
+    """The KL divergence as printed in Bauza and Rodriguez 2017, section VI, where the log term is half too small.
+
+    It is not a divergence: for a correct model with 1.4 times the standard deviation it reaches its minimum of -0.077.
+    """
+    return gaussian_kl(mean, sd, model_mean, model_sd) - 0.5 * np.log(model_sd / sd)
+
+
+def expected_kl(count: int) -> float:
+    """Expected KL divergence from mean and sd (ddof 1) of `count` > 1 samples to the true Gaussian, a correct model."""
+    freedom = 0.5 * (count - 1)
+    return 0.5 * float(np.log(freedom) - digamma(freedom) + 1.0 / count)
+
+
+def estimate(values: Array, statistic: Statistic, weights: Array, less: Array | None = None) -> Estimate:
+    """Mean over seeds of a statistic of values (s, p), with interval from weights (d, p); minus that of `less`."""
+    value, draws = by_seed(values, statistic).mean(), np.mean([statistic(seed, weights) for seed in values], axis=0)
+    if less is None:
+        return of_draws(float(value), draws)
+    base = np.mean([statistic(seed, weights) for seed in less], axis=0)
+    return of_draws(float(value - by_seed(less, statistic).mean()), draws - base)
+
+
+def by_seed(values: Array, statistic: Statistic) -> Array:
+    """A statistic (s,) over the pushes of values (s, p)."""
+    return np.array([statistic(seed, np.ones((1, len(seed))))[0] for seed in values])
+
+
+def nearer(name: str, of: Mapping[str, Divergences]) -> Evidence:
+    """Is the VHGP closer than the GP, in this statistic?"""
+    gp, vhgp, statistic, weights = of["gp"].correct, of["vhgp"].correct, STATISTICS[name], of["gp"].weights
+    difference = estimate(vhgp, statistic, weights, gp)
+    below = int(np.sum(by_seed(vhgp, statistic) < by_seed(gp, statistic)))
+    printed = estimate(of["vhgp"].printed, statistic, weights, of["gp"].printed)
+    note = (
+        f"{gp.shape[1]} pushes of the grid; lower in {below} of {len(gp)} seeds of training windows. By the formula as "
+        f"printed: {printed.text()}."
+    )
+    return Evidence([Figure("", difference)], note)
+
+
+def _table(study: Study, of: Mapping[str, Divergences], floor: float) -> Table:
+    """The paper's table, its figures next to ours."""
+    rows: list[tuple[object, ...]] = []
+    for kind, d in of.items():
+        numbers = [estimate(values, s, d.weights) for values in (d.correct, d.printed) for s in STATISTICS.values()]
+        numbers += [estimate(values, mean_of, d.weights) for values in (d.of_mean, d.of_sd)]
+        seeds = (f"{v.min():.2f} to {v.max():.2f}" for v in (by_seed(d.correct, s) for s in STATISTICS.values()))
+        ratios = " / ".join(f"{r:.2f}" for r in np.median(d.sd_ratio, axis=(0, 1)))
+        rows.append((KIND_NAMES[kind], *map(Number, numbers), *seeds, ratios, *PAPER.get(kind, ("–", "–"))))
+    head = (
+        "model",
+        "mean KL",
+        "median KL",
+        "mean, formula as printed",
+        "median, formula as printed",
+        "mean KL of wrong means",
+        "mean KL of wrong sds",
+        "mean KL over seeds",
+        "median KL over seeds",
+        "sd predicted / seen, median (dx / dy / rotation)",
+        "paper: mean (other data)",
+        "paper: median (other data)",
+    )
+    caption = (
+        f"KL (nats, three outputs) of models from {len(study.reference_grid.seen)} simulated pushes of the grid, "
+        f"{study.plan.repetitions} repetitions each. Models of windows of all speeds of "
+        f"{' on '.join(study.simulated.reference)}, none of the grid; mean of {study.plan.seeds} seeds. {OF_BLOCKS} "
+        "Over seeds: least to largest. A perfect model: the expected KL with so many repetitions."
+    )
+    return Table(caption, head, (*rows, ("a perfect model", f"{floor:.3f}", *("–",) * 10)))
+
+
+def _maps(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences]) -> Picture:
+    kl = {kind: of[kind].correct.mean(axis=0) for kind in ("gp", "vhgp")}
+    every = np.concatenate(list(kl.values()))
+    scale = ColourScale(max(float(every.min()), 1e-3), float(every.max()), "viridis", "neither")
+    maps = []
+    for kind, values in kl.items():
+        shown = grid.as_map(np.repeat(values[:, None], 3, axis=1))[..., 0]
+        title = f"KL(repetitions || {KIND_NAMES[kind]})"
+        maps.append(Map(title, grid.fractions, grid.angles, shown, scale, "KL (nats)", logarithmic=True))
+    return picture(
+        study.out / "divergence_maps.png",
+        (8.0, 3.4),
+        partial(paint_maps, rows=[("", maps)]),
+        f"Maps of the KL divergence over contact and angle for GP and VHGP. {len(grid.seen)} simulated pushes on "
+        f"{grid.surface}, three outputs, mean of {study.plan.seeds} seeds, one log scale; grey: too few repetitions.",
+    )
+
+
+def _curves(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences], floor: float) -> Picture:
+    lines = [cumulative(KIND_NAMES[kind], KIND_LOOKS[kind], of[kind].correct.mean(axis=0)) for kind in KINDS]
+    ticks = [t for t in (0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300) if t <= max(max(line.x) for line in lines)]
+    panel = Panel(
+        "",
+        "KL (nats, three outputs)",
+        "cumulative share of pushes (%)",
+        lines,
+        ticks,
+        places={f"perfect model: {floor:.3f}": floor},
+        limits=(0.0, 100.0),
+    )
+    return picture(
+        study.out / "divergence.png",
+        (6.4, 3.4),
+        partial(paint_curves, rows=[[panel]]),
+        f"Distribution of the KL divergence over pushes, for each model. {len(grid.seen)} simulated pushes on "
+        f"{grid.surface}, mean of {study.plan.seeds} seeds. Dotted: expected value of a perfect model.",
+    )

@@ -1,0 +1,228 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The size of the noise, its range over pushes, and its shape on different surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from push_predictor.evaluation.report.maps import ColourScale
+from push_predictor.reporting.canvas import SYMBOLS, Picture
+from push_predictor.types import Array
+from push_predictor_paper.data.corpus import Corpus
+from push_predictor_paper.data.repetitions import RepeatedGrid
+from push_predictor_paper.estimate import Estimate, of_ends, over_seeds
+from push_predictor_paper.fits.map_models import ModelMap, square_maps, surface_maps
+from push_predictor_paper.painters.curves import LOOKS, Panel, cumulative, paint_curves
+from push_predictor_paper.painters.maps import Map, paint_maps
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.statistics.grid_maps import FEWEST_PUSHES, OF_BLOCKS, in_degrees
+from push_predictor_paper.statistics.noise import (
+    HIGH,
+    LOW,
+    Ratios,
+    Shape,
+    ceiling,
+    learned_shapes,
+    noise_ratios,
+    radius_of_gyration,
+    repeated_shapes,
+    span_of,
+    spans,
+)
+from push_predictor_paper.study import Study
+from push_predictor_paper.verdict import Bound, Evidence, Figure
+
+WIDE = 1.0  # rad; beyond it the tip soon slides along the side
+NAMES = ("dx", "dy", "rotation", "whole motion")
+MOSTLY = Bound(low=0.8)  # of the pushes
+NOTES = (
+    "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. That "
+    "the noise has the same shape on all surfaces therefore holds partly by construction, and its size follows from "
+    "strengths that we chose. Only where it is large and where small follows from the mechanics.",
+    "Repetitions are at one speed, 20 mm/s. The paper's order of magnitude is also over speeds.",
+    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio has no meaning. The table "
+    "therefore shows quantiles, root mean squares, and the whole motion (rotation times the radius of gyration). "
+    f"Beyond {in_degrees(WIDE)} the slider hardly moves, so the noise is small there.",
+)
+
+
+def section(study: Study) -> Section:
+    """The noise of repetitions on every surface, of VHGPs, and of VHGPs of measured sets."""
+    grid = study.reference_grid
+    groups = {
+        f"all {len(grid.seen)} pushes": grid.seen,
+        f"within {in_degrees(WIDE)}": [cell for cell in grid.seen if abs(cell.angle) <= WIDE],
+    }
+    if any(len(cells) < FEWEST_PUSHES for cells in groups.values()):
+        raise TooFewError(f"Fewer than {FEWEST_PUSHES} pushes within {in_degrees(WIDE)} have enough repetitions.")
+    arm = radius_of_gyration(grid)
+    ratios = {name: noise_ratios(cells, arm) for name, cells in groups.items()}
+    ranges = {name: spans(cells) for name, cells in groups.items()}
+    found = {
+        "repetitions": repeated_shapes(study.grids),
+        "VHGP": learned_shapes(study.grids, surface_maps(study, "vhgp")),
+    }
+    most = ceiling(grid)
+    every = next(iter(ratios.values()))
+    return Section(
+        {"size": size(every), "span": span(ranges), "shape": shape(found, most)},
+        (
+            _size_table(grid, ratios, ranges, arm),
+            _shape_table(study, {**found, "halves of the repetitions": [most] if most else []}),
+            *(table for corpus in study.corpora for table in _learned_table(study, corpus)),
+        ),
+        (_ratio_picture(study, every), _map_picture(study)),
+        NOTES,
+    )
+
+
+def size(ratios: Sequence[Ratios]) -> Evidence:
+    """Is the noise 10 to 40 % of the mean outcome? ratios: dx, dy, rotation, whole motion of all pushes."""
+    figures = [Figure(name, part.overall) for name, part in zip(NAMES[:3], ratios[:3], strict=True)]
+    return Evidence([*figures, Figure("share of pushes", ratios[3].within, MOSTLY)])
+
+
+def span(ranges: Mapping[str, Sequence[Estimate]]) -> Evidence:
+    """Does the noise vary by an order of magnitude? ranges: of all pushes, and of those at moderate angles."""
+    return Evidence([Figure(name, of_ends(np.max, parts)) for name, parts in ranges.items()])
+
+
+def shape(found: Mapping[str, Sequence[Shape]], most: Shape | None) -> Evidence:
+    """Is the shape the same for all pairs of surfaces, by repetitions and by the process noise of the VHGPs?"""
+    figures = [
+        Figure(f"{name}, {source}", of_ends(np.min, [pair.correlations[k] for pair in pairs]))
+        for source, pairs in found.items()
+        for k, name in enumerate(NAMES[:3] if pairs else ())
+    ]
+    halves = ", ".join(f"{n} {e.text()}" for n, e in zip(NAMES, most.correlations, strict=False)) if most else "unknown"
+    return Evidence(figures, f"Two halves of one surface's repetitions reach: {halves}.")
+
+
+def learned_figures(models: Sequence[ModelMap], k: int) -> tuple[Estimate, ...]:
+    """RMS ratio, median ratio, share within 10 to 40 % and range of output k, over the models."""
+    known = [np.isfinite(model.mean[..., k]) for model in models]
+    parts = [(m.mean[at][:, k], m.process_sd[at][:, k]) for m, at in zip(models, known, strict=True)]
+    figures = np.array([_learned(np.abs(mean), sd) for mean, sd in parts])
+    return tuple(over_seeds(column.tolist()) for column in figures.T)
+
+
+def _learned(mean: Array, sd: Array) -> tuple[float, float, float, float]:
+    ratio = sd / mean
+    within = float(np.mean((ratio >= LOW) & (ratio <= HIGH)))
+    return float(np.sqrt(np.mean(sd**2) / np.mean(mean**2))), float(np.median(ratio)), within, span_of(sd)
+
+
+def _learned_table(study: Study, corpus: Corpus) -> list[Table]:
+    """The noise that VHGPs learn from a corpus; none without a square pushed at about 20 mm/s."""
+    models = square_maps(study, corpus)
+    forms = (".0%", ".0%", ".0%", ".1f")
+    rows = [
+        (name, *(Number(e, form) for e, form in zip(learned_figures(models, k), forms, strict=True)))
+        for k, name in enumerate(NAMES[:3] if models else ())
+    ]
+    caption = (
+        f"The process noise learned from {' on '.join(corpus.reference)}. {corpus.title}. VHGPs of "
+        f"{min(study.plan.size, len(corpus.sets[corpus.reference].table))} training windows at 20 mm/s, 61 angles and "
+        f"41 contacts within the training data; mean over {study.plan.seeds} draws of training windows with Student's "
+        "interval. The paper: 10 to 40 %, up to an order of magnitude."
+    )
+    head = ("output", "RMS ratio", "median of sd over |mean|", "within 10 to 40 %")
+    return [Table(caption, (*head, "95th over 5th percentile of the sd"), rows)] if rows else []
+
+
+def _size_table(
+    grid: RepeatedGrid, ratios: Mapping[str, Sequence[Ratios]], ranges: Mapping[str, Sequence[Estimate]], arm: float
+) -> Table:
+    """Quantiles, share within the paper's range, ratio of root mean squares, range of the sd; arm in m."""
+    rows = [
+        (
+            f"{name}, {which}",
+            *(f"{q:.0%}" for q in part.quantiles),
+            Number(part.within, ".0%"),
+            Number(part.overall, ".0%"),
+            Number(reach, ".1f") if reach else "–",
+        )
+        for which, parts in ratios.items()
+        for name, part, reach in zip(NAMES, parts, (*ranges[which], None), strict=True)
+    ]
+    head = ("sd over |mean|", "5 % of pushes below", "25 %", "median", "75 %", "95 %", "within 10 to 40 %", "RMS ratio")
+    caption = (
+        f"The noise relative to the mean outcome. Simulated repetitions on {grid.surface}, first window of 0.2 s at "
+        f"20 mm/s. Whole motion: rotation times {arm * 1e3:.1f} mm, the square's radius of gyration. RMS ratio: root "
+        f"mean square of the sd over that of the mean. {OF_BLOCKS} Last: the range of the sd; its intervals resample "
+        "repetitions, and a basic bootstrap of the logarithm removes most of the bias from errors of the sds."
+    )
+    return Table(caption, (*head, "95th over 5th percentile of the sd"), rows)
+
+
+def _shape_table(study: Study, found: Mapping[str, Sequence[Shape]]) -> Table:
+    """Correlations by repetitions, and by the VHGPs."""
+    rows = [
+        (f"{source}: {pair.first}, {pair.second}", pair.pushes, *map(Number, pair.correlations))
+        for source, pairs in found.items()
+        for pair in pairs
+    ]
+    caption = (
+        "Correlation of log sd between surfaces, by repetitions and by the VHGPs' process noise. Simulated; VHGPs of "
+        f"{study.plan.size} training windows or all on each surface. Halves of one surface's repetitions: the largest "
+        f"correlation that so few repetitions can show. {OF_BLOCKS}"
+    )
+    return Table(caption, ("surfaces", "pushes", *NAMES[:3]), rows)
+
+
+def _ratio_picture(study: Study, ratios: Sequence[Ratios]) -> Picture:
+    names = (*SYMBOLS, NAMES[-1])
+    lines = [cumulative(n, look, 100.0 * part.values) for n, look, part in zip(names, LOOKS, ratios, strict=True)]
+    panel = Panel(
+        "",
+        "sd of the outcome, % of its |mean|",
+        "cumulative share of pushes (%)",
+        lines,
+        (1, 3, 10, 30, 100, 300, 1000),
+        shaded=(100 * LOW, 100 * HIGH),
+        limits=(0.0, 100.0),
+    )
+    return picture(
+        study.out / "noise_ratio.png",
+        (7.0, 3.6),
+        partial(paint_curves, rows=[[panel]]),
+        "Cumulative share of the pushes against the sd as a percentage of the mean, for each output. "
+        f"{len(ratios[0].values)} pushes on {study.reference_grid.surface}, simulated repetitions. Shaded: the "
+        "paper's 10 to 40 %.",
+    )
+
+
+def _map_picture(study: Study) -> Picture:
+    """A row per surface, a column per output: sd over the surface's median, one scale per column."""
+    grids = {surface: grid for surface, grid in study.grids.items() if grid.seen}
+    shown = {surface: grid.sd / np.nanmedian(grid.sd, axis=(0, 1)) for surface, grid in grids.items()}
+    tops = [float(np.nanpercentile([sd[..., k] for sd in shown.values()], 99.0)) for k in range(3)]
+    rows = [
+        (
+            surface,
+            [
+                Map(
+                    f"sd of {SYMBOLS[k]}",
+                    grid.fractions,
+                    grid.angles,
+                    shown[surface][..., k],
+                    ColourScale(0.0, tops[k], "viridis", "max"),
+                    "sd / median",
+                )
+                for k in range(3)
+            ],
+        )
+        for surface, grid in grids.items()
+    ]
+    return picture(
+        study.out / "noise_maps.png",
+        (10.0, 1.9 * len(grids) + 0.8),
+        partial(paint_maps, rows=rows),
+        "Maps of the standard deviation of dx, dy and rotation over contact and angle, a row for each surface. "
+        "Simulated repetitions, first window; divided by the median of the surface. One scale per column.",
+    )
