@@ -5,7 +5,7 @@
 
 ros2 launch push_predictor record.launch.py bag:=monday rig:=rig.yaml slider_topic:=/vicon/block/block
 
-docs/how_to/record.md describes it.
+docs/how_to/your_own_data.md describes it.
 """
 
 from __future__ import annotations
