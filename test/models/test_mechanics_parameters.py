@@ -12,10 +12,10 @@ from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 
 def parameter_table() -> str:
     """All parameters as a Markdown table."""
-    head = ["| parameter | part | unit | textbook | range | prior sd | meaning |", "|" + " --- |" * 7]
+    head = ["| parameter | unit | range | prior sd | meaning |", "|" + " --- |" * 5]
     rows = [
-        f"| `{p.name}` | {p.part} | {p.unit} | {p.textbook:g} | {minus(p.low)} to {minus(p.high)} | {p.spread:g} "
-        f"| {p.meaning}{' *' if p.needs else ''} |"
+        f"| `{p.name}` | {p.unit} | {f'±{p.high:g}' if p.high == -p.low else f'{minus(p.low)} to {minus(p.high)}'} "
+        f"| {p.spread:g} | {p.meaning}{' *' if p.needs else ''} |"
         for p in PARAMETERS
     ]
     return "\n".join([*head, *rows])
