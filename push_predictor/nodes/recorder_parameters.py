@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of push_recorder; the table in docs/reference/push_recorder.md repeats them."""
+"""The parameters of push_recorder; config/push_recorder.yaml repeats them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,6 @@ PARAMETERS = (
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )
 
-
 @dataclass(frozen=True)
 class RecorderOptions:
     """topics have full names. duration: s, 0 without end. rig: a file, '' for the topic rig.
@@ -48,7 +47,6 @@ class RecorderOptions:
     duration: float
     diagnostics_period: float
     with_wrench: bool
-
 
 def read_options(node: Node) -> RecorderOptions:
     """Declare and read the parameters.
@@ -65,7 +63,6 @@ def read_options(node: Node) -> RecorderOptions:
         bag, topics, values["rig"], values["duration"], values["diagnostics_period"], bool(given.wrench)
     )
 
-
 def _bag(values: Mapping[str, Any]) -> Path:
     if not values["bag"]:
         raise RequestError("bag", "", "the path of a bag: a folder, or FILE.mcap")
@@ -73,7 +70,6 @@ def _bag(values: Mapping[str, Any]) -> Path:
     if path.exists() and not values["force"]:
         raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
     return path
-
 
 def _full_name(node: Node, topic: str) -> str:
     try:

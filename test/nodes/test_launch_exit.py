@@ -15,9 +15,7 @@ from fake_launch import FakeAction, actions, install_fake_launch, install_fake_r
 from repository import REPOSITORY
 
 from push_predictor.nodes.launch_exit import end_launch
-from push_predictor.nodes.parameters import Param
-from push_predictor.nodes.recorder_parameters import PARAMETERS as RECORDER
-from push_predictor.nodes.validator.parameters import PARAMETERS as VALIDATOR
+from push_predictor.nodes.validator.parameters import PARAMETERS
 
 MAIN = REPOSITORY / "launch" / "push_predictor.launch.py"
 RECORD = REPOSITORY / "launch" / "record.launch.py"
@@ -51,19 +49,6 @@ def test_a_switch_is_true_or_false(file: Path, count: int, monkeypatch: pytest.M
 
 def test_rviz_is_a_dependency_of_the_package() -> None:
     assert "<exec_depend>rviz2</exec_depend>" in (REPOSITORY / "package.xml").read_text()
-
-
-@pytest.mark.parametrize(("file", "node"), [(MAIN, VALIDATOR), (RECORD, RECORDER)], ids=["main", "record"])
-def test_the_page_describes_every_argument_that_is_no_parameter(file: Path, node: tuple[Param, ...]) -> None:
-    page = (REPOSITORY / "docs" / "reference" / "launch.md").read_text()
-    section = page.split(f"\n## `{file.name}`\n")[1].split("\n## ")[0]
-    rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in section.splitlines() if "|" in line]
-    described = [tuple(row) for row in rows[2:]]
-    arguments = list(load_launch_file(file)["ARGUMENTS"])
-    assert described == [row for row in arguments if row in described]
-    others = {row[0] for row in arguments if row not in described}
-    assert others <= {parameter.name for parameter in node}
-    assert all(f"`{name}`" in section for name in others)
 
 
 # --- the end of a node -----------------------------------------------------------------------------------------------
@@ -122,7 +107,7 @@ def validator(monkeypatch: pytest.MonkeyPatch, *words: str) -> dict[str, Any]:
 def test_covariates_are_a_list_of_topics(monkeypatch: pytest.MonkeyPatch) -> None:
     given = validator(monkeypatch, "covariate_topics:=surface/temperature, /room/humidity,")
     assert given == {"covariate_topics": ["surface/temperature", "/room/humidity"]}
-    (row,) = (row for row in VALIDATOR if row.name == "covariate_topics")
+    (row,) = (row for row in PARAMETERS if row.name == "covariate_topics")
     assert row.allows(given["covariate_topics"])
     assert validator(monkeypatch) == {}
 
