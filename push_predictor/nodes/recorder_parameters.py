@@ -34,6 +34,7 @@ PARAMETERS = (
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )
 
+
 @dataclass(frozen=True)
 class RecorderOptions:
     """topics have full names. duration: s, 0 without end. rig: a file, '' for the topic rig.
@@ -47,6 +48,7 @@ class RecorderOptions:
     duration: float
     diagnostics_period: float
     with_wrench: bool
+
 
 def read_options(node: Node) -> RecorderOptions:
     """Declare and read the parameters.
@@ -63,6 +65,7 @@ def read_options(node: Node) -> RecorderOptions:
         bag, topics, values["rig"], values["duration"], values["diagnostics_period"], bool(given.wrench)
     )
 
+
 def _bag(values: Mapping[str, Any]) -> Path:
     if not values["bag"]:
         raise RequestError("bag", "", "the path of a bag: a folder, or FILE.mcap")
@@ -70,6 +73,7 @@ def _bag(values: Mapping[str, Any]) -> Path:
     if path.exists() and not values["force"]:
         raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
     return path
+
 
 def _full_name(node: Node, topic: str) -> str:
     try:
