@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of push_recorder; config/push_recorder.yaml repeats them."""
+"""The parameters of push_recorder; the table in docs/reference/push_recorder.md repeats them."""
 
 from __future__ import annotations
 

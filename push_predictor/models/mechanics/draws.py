@@ -9,7 +9,7 @@ most: a simplex, the points of which are mirrored. With any orthogonal columns t
 displacements are quadratic in the parameters, and the covariance where they are linear. Those of a random rotation also
 spread the squares of deviates, which all are 1 in a two-level design: without the variance of a quadratic effect,
 pushes of a circle were far too certain. Eighteen points predict standard deviations to 3 to 11 % (root mean square over
-pushes), thirty-two to 1 to 5 %, in almost twice the time (benchmarks/models/RESULTS.md).
+pushes), thirty-two to 1 to 5 %, in almost twice the time (docs/results/prior.md).
 """
 
 from __future__ import annotations
