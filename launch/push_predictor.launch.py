@@ -28,6 +28,7 @@ CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
     "reliability": ("", "reliable", "best_effort")
 }
 
+# --8<-- [start:documented]
 ARGUMENTS = (
     ("namespace", "", "Namespace of all nodes."),
     ("params_file", "", "YAML file with parameters, such as those in config/. Other arguments override it."),
@@ -51,6 +52,7 @@ ARGUMENTS = (
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
     ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
 )
+# --8<-- [end:documented]
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -5,7 +5,7 @@
 
 ros2 launch push_predictor record.launch.py bag:=monday rig:=rig.yaml slider_topic:=/vicon/block/block
 
-docs/how_to/record.md describes it.
+docs/how_to/your_own_data.md describes it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame")
 PATHS = ("bag", "rig")
 SWITCHES = ("force", "use_sim_time")
+# --8<-- [start:documented]
 ARGUMENTS = (
     ("namespace", "", "Namespace of the node."),
     ("params_file", "", "YAML file with parameters, such as config/push_recorder.yaml. Other arguments override it."),
@@ -44,6 +45,7 @@ ARGUMENTS = (
     ("covariate_topics", "", "Further topics to record, separated by commas."),
     ("duration", "", "Seconds after the first message at which the node ends. Empty: at Ctrl-C."),
 )
+# --8<-- [end:documented]
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -40,7 +40,7 @@ CHANNELS: dict[Verdict, str] = {
     "input_shift": "none",
 }
 # Relative standard deviation of a size by errors of the mechanics; more pushes do not reduce it. Chosen from misses on
-# rigs with other laws of friction (docs/results/residual_loop.md).
+# rigs with other laws of friction (benchmarks/blind/RESULTS.md).
 DISCREPANCY = 0.025
 DRAWS = 2000
 

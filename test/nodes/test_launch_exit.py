@@ -51,14 +51,6 @@ def test_rviz_is_a_dependency_of_the_package() -> None:
     assert "<exec_depend>rviz2</exec_depend>" in (REPOSITORY / "package.xml").read_text()
 
 
-@pytest.mark.parametrize("file", [MAIN, RECORD], ids=lambda file: file.name)
-def test_the_page_lists_every_argument_with_its_default(file: Path) -> None:
-    page = (REPOSITORY / "docs" / "reference" / "launch.md").read_text()
-    section = page.split(f"\n## `{file.name}`\n")[1].split("\n## ")[0]
-    rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in section.splitlines() if "|" in line]
-    assert [tuple(row) for row in rows[2:]] == list(load_launch_file(file)["ARGUMENTS"])
-
-
 # --- the end of a node -----------------------------------------------------------------------------------------------
 
 

@@ -95,17 +95,20 @@ def test_every_parameter_has_a_description_and_accepts_its_default(node: str):
         assert row.description and row.allows(row.default), row.name
 
 
-def test_the_table_of_the_validators_parameters_is_that_of_the_code():
-    rows = table(REFERENCE / "push_validator.md", "Parameters")
-    written = {name.strip("`"): (yaml.safe_load(value.strip("`")), text) for name, value, text in rows}
-    assert written == {row.name: (row.default, row.description) for row in parameter_tables.PUSH_VALIDATOR}
+@pytest.mark.parametrize("node", NODES)
+def test_the_configuration_file_describes_every_parameter_and_the_reference_page_shows_it(node: str):
+    name = f"config/{node}.yaml"
+    comments = re.findall(r"^ {4,6}\w+: .*?  # (.+)$", (REPOSITORY / name).read_text(), re.MULTILINE)
+    assert comments == [described(row) for row in NODES[node][1]]
+    assert f'--8<-- "{name}"' in section(REFERENCE / f"{node}.md", "Parameters")
 
 
-@pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay"])
-def test_the_reference_page_lists_every_parameter_with_its_default(node: str):
-    rows = table(REFERENCE / f"{node}.md", "Parameters")
-    written = {row[0].strip("`"): yaml.safe_load(row[1].strip("`")) for row in rows}
-    assert written == {row.name: row.default for row in NODES[node][1]}
+def described(row: Param) -> str:
+    """The comment of a parameter: its description, and what is accepted."""
+    text = row.description.rstrip(".") + "."
+    if row.choices:
+        return f"{text} Accepted: {', '.join(row.choices[:-1])} or {row.choices[-1]}."
+    return f"{text} Accepted: {row.low:g} to {row.high:g}." if row.low is not None else text
 
 
 # --- topics and services ---------------------------------------------------------------------------------------------
@@ -159,6 +162,13 @@ def test_every_link_to_a_file_leads_somewhere(document: Path):
     for target in re.findall(r"\]\(([^)#\s]+)", document.read_text()):
         if not target.startswith(("http://", "https://")):
             assert (document.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
+def test_every_file_that_a_page_shows_exists_with_the_part_that_it_shows(document: Path):
+    for name, part in re.findall(r"^--8<-- \"([^\":]+)(?::(\w+))?\"$", document.read_text(), re.MULTILINE):
+        text = (REPOSITORY / name).read_text()
+        assert not part or (f"[start:{part}]" in text and f"[end:{part}]" in text)
 
 
 def test_the_names_in_the_documented_files_are_those_that_are_written():
@@ -229,10 +239,9 @@ def test_the_example_rig_has_every_key_and_loads():
     np.testing.assert_allclose(rig.outline.centroid, 0.0, atol=1e-9)
 
 
-def test_the_rig_page_explains_every_key():
-    page = (REFERENCE / "rig_file.md").read_text()
-    for key in yaml.safe_load((REFERENCE / "rig.yaml").read_text()):
-        assert f"| `{key}` |" in page, key
+def test_every_key_of_the_example_rig_has_a_comment_before_it_and_the_rig_page_shows_them():
+    assert '--8<-- "docs/reference/rig.yaml"' in (REFERENCE / "rig_file.md").read_text()
+    assert not re.findall(r"^(?!#).*\n(\w+:)", (REFERENCE / "rig.yaml").read_text(), re.MULTILINE)
 
 
 # --- what the documents cite -----------------------------------------------------------------------------------------

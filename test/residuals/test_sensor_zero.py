@@ -76,7 +76,7 @@ def test_bias_from_a_push_on_is_found_as_a_step_with_its_size() -> None:
 
 
 def test_smallest_bias_that_is_found_is_as_documented() -> None:
-    """In docs/explanation/residual_loop.md, at a level of 0.001."""
+    """In docs/reference/trace.md, at a level of 0.001."""
     sound = reading(np.zeros((PUSHES, 2)))
     for since, missed, seen in ((0, 0.107, 0.113), (PUSHES // 2, 0.088, 0.103)):
         for size in (missed, seen):

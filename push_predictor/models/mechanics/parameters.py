@@ -46,6 +46,7 @@ def _part(part: str, *rows: _Row, needs: tuple[str, ...] = ()) -> Iterator[Mecha
         yield MechanicsParameter(name, unit, textbook, low, high, spread, part, meaning, needs)
 
 
+# --8<-- [start:documented]
 PARAMETERS: tuple[MechanicsParameter, ...] = (
     *_part(
         "contact",
@@ -92,4 +93,5 @@ PARAMETERS: tuple[MechanicsParameter, ...] = (
         ("inertia", "s^2/m", 0.0, 0.0, 2.0, 0.3, "inertia: 1 / (friction of the table times gravity)"),
     ),
 )
+# --8<-- [end:documented]
 BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}

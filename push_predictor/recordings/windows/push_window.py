@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The push window: its options and its fields (docs/reference/recordings.md)."""
+"""The push window: its options and its fields (docs/explanation/windows.md)."""
 
 from __future__ import annotations
 
