@@ -117,7 +117,7 @@ class PushMechanics:
                 self._tables[knots] = surface_tables(self._known, self.outline, knots)
         tables = self._tables[knots]
         slopes = tables.slopes if stretched else NO_SLOPES
-        surfaces = tables.cells, slopes, tables.quantities, tables.power
+        surfaces = tables.nodes, slopes, tables.quantities, tables.power
         return Shape(in_world, Slider(self.outline.boundary, *surfaces, self.pusher_radius, self.accuracy))
 
     def _pushes(self, shape: Shape, push: Push) -> Array:
