@@ -49,7 +49,7 @@ class JointEffects:
 
     def changes(self, columns: Array) -> Array:
         """The changes (n, q), at most the largest that a rig can have."""
-        return np.minimum(np.maximum(columns @ self._weights, -self._largest), self._largest)
+        return np.minimum(np.maximum(columns.dot(self._weights), self._least), self._largest)
 
     def shifted(self, mechanics: FittedMechanics, push: Push) -> tuple[Array, Array, Array]:
         """Shift (n, 3) of the mean, its derivatives (n, q, 3) by the parameters, and the columns (n, b)."""
@@ -90,6 +90,10 @@ class JointEffects:
     @cached_property
     def _largest(self) -> Array:
         return np.array([LARGEST[name] for name in self.names])
+
+    @cached_property
+    def _least(self) -> Array:
+        return -self._largest
 
 
 class JointShift(NamedTuple):

@@ -46,12 +46,12 @@ class GpParameters:
         """Number of hyperparameters."""
         return len(self.log_lengthscales) + 2
 
-    @property
+    @cached_property
     def kernel(self) -> ArdKernel:
         """Kernel of f."""
         return ArdKernel(self.log_lengthscales, self.log_signal_sd)
 
-    @property
+    @cached_property
     def noise_variance(self) -> float:
         """Variance of the noise."""
         return float(np.exp(2.0 * self.log_noise_sd))

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,14 @@ TEXTBOOK_FRICTION = 0.3
 ANALYTICAL_ACCURACY = 1e-4  # of a displacement, relative
 
 
+class _Changed(NamedTuple):
+    """What is the same for all changes of some parameters; moved: see PushMechanics.shifted."""
+
+    shape: Shape
+    moved: Array
+    heading: bool
+
+
 @dataclass(frozen=True, eq=False)
 class FittedMechanics:
     """Mechanics with the values of its free parameters; the others have their textbook values.
@@ -38,8 +47,7 @@ class FittedMechanics:
     mechanics: PushMechanics
     values: dict[str, float] = field(default_factory=dict)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    _shapes: dict[tuple[str, ...], Shape] = field(default_factory=dict, init=False, repr=False)
-    _differences: dict[tuple[tuple[str, ...], float], Array] = field(default_factory=dict, init=False, repr=False)
+    _changed: dict[tuple[tuple[str, ...], float], _Changed] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -56,7 +64,7 @@ class FittedMechanics:
     def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
         push = Push(inputs, duration, covariates or {})
-        return self.mechanics.displaced(self._row[None, None], push, self._shape)[:, 0]
+        return self.mechanics.displaced(self._rows, push, self._shape)[:, 0]
 
     def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
         """Displacements (k, n, 3) with each of k sets of changes of parameters, computed in one call.
@@ -68,7 +76,7 @@ class FittedMechanics:
         for k, changes in enumerate(tried):
             for name, change in changes.items():
                 values[:, k, COLUMN[name]] += change
-        given = self._covariates(push, {name for changes in tried for name in changes})
+        given = self._covariates(push, self._heading_matters({name for changes in tried for name in changes}))
         found = self.mechanics.displaced(values, Push(push.inputs, push.duration, given))
         return np.ascontiguousarray(found.transpose(1, 0, 2))
 
@@ -79,24 +87,22 @@ class FittedMechanics:
 
         difference: step to both sides for a derivative, in prior standard deviations.
         """
-        given = Push(push.inputs, push.duration, self._covariates(push, names))
-        moved = self._moved(names, difference)
-        shape = self._changed_shape(names, changes, difference)
-        found = self.mechanics.shifted(self._row, shape, changes, moved, given)
+        known = self._changed.get((names, difference))
+        if known is None or "rim_exponent" in names:
+            shape = self._changed_shape(names, changes, difference)
+            known = _Changed(shape, self._moved(names, difference), self._heading_matters(names))
+            self._changed[names, difference] = known
+        given = Push(push.inputs, push.duration, self._covariates(push, known.heading))
+        found = self.mechanics.shifted(self._row, known.shape, changes, known.moved, given)
         return found[:, 0], found[:, 1:]
 
     def _changed_shape(self, names: tuple[str, ...], changes: Array, difference: float) -> Shape:
         """Where no rim changes it is the same for all changes of these parameters."""
-        rim = "rim_exponent" in names
-        if rim or names not in self._shapes:
-            ends = np.tile(self._row, (2, 1))
-            for k, name in enumerate(names):
-                step = difference * BY_NAME[name].spread
-                ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
-            if rim:
-                return self.mechanics.shape_of(ends)
-            self._shapes[names] = self.mechanics.shape_of(ends)
-        return self._shapes[names]
+        ends = np.tile(self._row, (2, 1))
+        for k, name in enumerate(names):
+            step = difference * BY_NAME[name].spread
+            ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
+        return self.mechanics.shape_of(ends)
 
     @cached_property
     def _shape(self) -> Shape:
@@ -104,12 +110,9 @@ class FittedMechanics:
 
     def _moved(self, names: tuple[str, ...], difference: float) -> Array:
         """The parameters of a difference, see PushMechanics.shifted. No friction and no inertia is below zero."""
-        if (names, difference) not in self._differences:
-            steps = [difference * BY_NAME[name].spread for name in names]
-            least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
-            own = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
-            self._differences[names, difference] = own
-        return self._differences[names, difference]
+        steps = [difference * BY_NAME[name].spread for name in names]
+        least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
+        return np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
 
     def value(self, name: str) -> float:
         """The value of a parameter: the fitted one, or the textbook's."""
@@ -135,17 +138,21 @@ class FittedMechanics:
             row[COLUMN[name]] = value
         return row
 
-    def _covariates(self, push: Push, names: Iterable[str]) -> dict[str, Array]:
-        """What the mechanics with changes of these parameters need of the covariates of pushes."""
+    @cached_property
+    def _rows(self) -> Array:
+        return self._row[None, None]
+
+    def _covariates(self, push: Push, heading: bool) -> dict[str, Array]:
+        """What the mechanics need of the covariates of pushes; heading: whether that matters."""
         given = push.covariates
         used = {RECORDING: given[RECORDING]} if self.mechanics.supports and RECORDING in given else {}
-        if self._in_world or any(BY_NAME[name].needs for name in names):
+        if heading:
             used["push_heading"] = self._heading(push)
         return used
 
-    @cached_property
-    def _in_world(self) -> bool:
-        return any(BY_NAME[name].needs for name in self.values)
+    def _heading_matters(self, changed: Iterable[str]) -> bool:
+        """Whether the heading of a push matters to the mechanics with changes of these parameters."""
+        return any(BY_NAME[name].needs for name in (*self.values, *changed))
 
     def _heading(self, push: Push) -> Array:
         if "slider_heading" not in push.covariates:

@@ -78,7 +78,7 @@ def table_nodes(
     knots = boxes * int(np.prod([count + 1.0 for count in cells]))
     if knots > MOST_KNOTS:
         raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are allowed")
-    coupled = [(correlation.kernel, COUPLING_CELLS)] if correlation else []
+    coupled = [(correlation.known.kernel, COUPLING_CELLS)] if correlation else []
     coarse = [_cells(side, coupled, refinement) for side in sides] if correlation else []
     least = predictor.reported_sd**2 * [_least_variance(regression) for regression in posteriors]
     return TableNodes(cells, coarse, least.tolist(), _values(Grid(sides, refinement), predictor, posteriors))
@@ -104,7 +104,7 @@ def _resolved(regressions: Sequence[OnGrid], correlation: Correlation | None) ->
     learnt = [regression for regression in regressions if isinstance(regression, GridRegression)]
     wanted = [(r.signal.kernel, SIGNAL.cells) for r in learnt]
     wanted += [(r.noise.kernel, NOISE.cells) for r in learnt if r.noise]
-    return wanted + ([(correlation.kernel, COUPLING_CELLS)] if correlation else [])
+    return wanted + ([(correlation.known.kernel, COUPLING_CELLS)] if correlation else [])
 
 
 def _cells(side: Side, resolved: Sequence[tuple[ArdKernel, float]], refinement: float) -> int:
@@ -143,7 +143,7 @@ class Grid:
     def coupling(self, correlation: Correlation, cells: Sequence[int]) -> list[Array]:
         """The three numbers of a correlation at the knots of a coarse spline, (boxes, cells_1 + 1, ...) each."""
         knots = [np.linspace(side.low, side.high, count + 1) for side, count in zip(self.sides, cells, strict=True)]
-        factors = self._factors(correlation.kernel, correlation.features, knots)
+        factors = self._factors(correlation.known.kernel, correlation.features, knots)
         sums = weighted_sums(factors, correlation.products)
         numbers = unbounded(correlations(sums.reshape(-1, sums.shape[-1]), correlation.shrinkage))
         counts = [len(knot) for knot in knots]
