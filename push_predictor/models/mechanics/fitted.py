@@ -76,8 +76,8 @@ class FittedMechanics:
         for k, changes in enumerate(tried):
             for name, change in changes.items():
                 values[:, k, COLUMN[name]] += change
-        given = self._covariates(push, self._heading_matters({name for changes in tried for name in changes}))
-        found = self.mechanics.displaced(values, Push(push.inputs, push.duration, given))
+        heading = self._heading_matters(name for changes in tried for name in changes)
+        found = self.mechanics.displaced(values, self._with_heading(push) if heading else push)
         return np.ascontiguousarray(found.transpose(1, 0, 2))
 
     def shifted(
@@ -92,7 +92,7 @@ class FittedMechanics:
             shape = self._changed_shape(names, changes, difference)
             known = _Changed(shape, self._moved(names, difference), self._heading_matters(names))
             self._changed[names, difference] = known
-        given = Push(push.inputs, push.duration, self._covariates(push, known.heading))
+        given = self._with_heading(push) if known.heading else push
         found = self.mechanics.shifted(self._row, known.shape, changes, known.moved, given)
         return found[:, 0], found[:, 1:]
 
@@ -142,25 +142,17 @@ class FittedMechanics:
     def _rows(self) -> Array:
         return self._row[None, None]
 
-    def _covariates(self, push: Push, heading: bool) -> dict[str, Array]:
-        """What the mechanics need of the covariates of pushes; heading: whether that matters."""
-        given = push.covariates
-        used = {RECORDING: given[RECORDING]} if self.mechanics.supports and RECORDING in given else {}
-        if heading:
-            used["push_heading"] = self._heading(push)
-        return used
-
     def _heading_matters(self, changed: Iterable[str]) -> bool:
         """Whether the heading of a push matters to the mechanics with changes of these parameters."""
         return any(BY_NAME[name].needs for name in (*self.values, *changed))
 
-    def _heading(self, push: Push) -> Array:
+    def _with_heading(self, push: Push) -> Push:
+        """The pushes with their heading in the world, from that of the slider where it is given."""
         if "slider_heading" not in push.covariates:
-            return push.covariates["push_heading"]
+            return push
         normal = self.outline.inward_normal(push.inputs[:, 1])
-        return np.asarray(
-            push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
-        )
+        heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+        return Push(push.inputs, push.duration, {**push.covariates, "push_heading": heading})
 
 
 def analytical_mechanics(
