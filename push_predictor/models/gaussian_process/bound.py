@@ -23,8 +23,8 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.gp import Kernel, Likelihood, Ridge
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.likelihood import Kernel, Likelihood, Ridge
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray

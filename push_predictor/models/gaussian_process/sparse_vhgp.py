@@ -16,7 +16,6 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.descent import Descent, some_rows
 from push_predictor.models.gaussian_process.fit import (
     FEW_ROWS,
     LOG_NUGGET_SD,
@@ -27,7 +26,7 @@ from push_predictor.models.gaussian_process.fit import (
     Prior,
     Search,
 )
-from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.gp import Descent, check_rows, some_rows
 from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp

@@ -18,9 +18,15 @@ import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
 from push_predictor.models.gaussian_process.fit import maximise_bound, precisions_from
-from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.gp import (
+    MOST_SEARCHED,
+    SHORTEST,
+    GpParameters,
+    check_rows,
+    fit_gp,
+    some_rows,
+)
 from push_predictor.models.gaussian_process.inducing import InducedPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
