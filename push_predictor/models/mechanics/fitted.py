@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -20,8 +20,6 @@ from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array
-
-Changes = Mapping[str, Array]  # by name of a parameter: what is added to its value at each push, (n,)
 
 # Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
 DIFFERENCE = 0.5
@@ -66,34 +64,28 @@ class FittedMechanics:
         push = Push(inputs, duration, covariates or {})
         return self.mechanics.displaced(self._rows, push, self._shape)[:, 0]
 
-    def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
-        """Displacements (k, n, 3) with each of k sets of changes of parameters, computed in one call.
-
-        The heading of a push follows from that of the slider where it is given.
-        """
-        values = np.empty((len(push.inputs), len(tried), len(TEXTBOOK)))
-        values[:] = self._row
-        for k, changes in enumerate(tried):
-            for name, change in changes.items():
-                values[:, k, COLUMN[name]] += change
-        heading = self._heading_matters(name for changes in tried for name in changes)
-        found = self.mechanics.displaced(values, self._with_heading(push) if heading else push)
-        return np.ascontiguousarray(found.transpose(1, 0, 2))
-
     def shifted(
-        self, names: tuple[str, ...], changes: Array, push: Push, difference: float = DIFFERENCE
+        self,
+        names: tuple[str, ...],
+        changes: Array,
+        push: Push,
+        difference: float = DIFFERENCE,
+        *,
+        derivatives: bool = True,
     ) -> tuple[Array, Array]:
         """What changes (n, q) of the parameters `names` shift the displacement by (n, 3), and derivatives (n, q, 3).
 
-        difference: step to both sides for a derivative, in prior standard deviations.
+        The heading of a push follows from that of the slider where it is given. difference: step to both sides for a
+        derivative, in prior standard deviations. Without derivatives there are none, (n, 0, 3).
         """
         known = self._changed.get((names, difference))
         if known is None or "rim_exponent" in names:
             shape = self._changed_shape(names, changes, difference)
-            known = _Changed(shape, self._moved(names, difference), self._heading_matters(names))
+            heading = any(BY_NAME[name].needs for name in (*self.values, *names))
+            known = _Changed(shape, self._moved(names, difference), heading)
             self._changed[names, difference] = known
         given = self._with_heading(push) if known.heading else push
-        found = self.mechanics.shifted(self._row, known.shape, changes, known.moved, given)
+        found = self.mechanics.shifted(self._row, known.shape, changes, known.moved, given, derivatives=derivatives)
         return found[:, 0], found[:, 1:]
 
     def _changed_shape(self, names: tuple[str, ...], changes: Array, difference: float) -> Shape:
@@ -141,10 +133,6 @@ class FittedMechanics:
     @cached_property
     def _rows(self) -> Array:
         return self._row[None, None]
-
-    def _heading_matters(self, changed: Iterable[str]) -> bool:
-        """Whether the heading of a push matters to the mechanics with changes of these parameters."""
-        return any(BY_NAME[name].needs for name in (*self.values, *changed))
 
     def _with_heading(self, push: Push) -> Push:
         """The pushes with their heading in the world, from that of the slider where it is given."""

@@ -91,7 +91,7 @@ def shifts(
     """Compute what changes (n, q) of q parameters shift, and its derivatives by each of them, by central differences.
 
     values (28,). moved (3, q): number of the parameter, step of its difference, least change of it. found
-    (n, 1 + q, 3) is written: the shift, then the derivatives. The rest as in `displacements`.
+    (n, 1 + q, 3) is written: the shift, then the derivatives; (n, 1, 3): the shift. The rest as in `displacements`.
     """
     common: cython.pointer(Common) = cython.address(slider.common)
     own: cython.double[28]
@@ -119,7 +119,7 @@ def shifts(
                 if end == 0:
                     for k in range(changes.shape[1]):
                         own[cython.cast(cython.Py_ssize_t, moved[0, k])] += changes[n, k]
-            for k in range(changes.shape[1]):
+            for k in range(found.shape[1] - 1):
                 column = cython.cast(cython.Py_ssize_t, moved[0, k])
                 changed: cython.double = own[column]
                 least: cython.double = values[column] + moved[2, k]
