@@ -89,11 +89,11 @@ class FittedMechanics:
         return found[:, 0], found[:, 1:]
 
     def _changed_shape(self, names: tuple[str, ...], changes: Array, difference: float) -> Shape:
-        """Where no rim changes it is the same for all changes of these parameters."""
+        """Of changes and of none; where no rim changes it is the same for all changes of these parameters."""
         ends = np.tile(self._row, (2, 1))
         for k, name in enumerate(names):
             step = difference * BY_NAME[name].spread
-            ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
+            ends[:, COLUMN[name]] += min(changes[:, k].min() - step, 0.0), max(changes[:, k].max() + step, 0.0)
         return self.mechanics.shape_of(ends)
 
     @cached_property
