@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -42,9 +43,10 @@ class Prediction:
     @property
     def first_not_finite(self) -> int | None:
         """The first push without a finite mean and covariance, None if there is none."""
-        if np.isfinite(self.mean.sum() + self.covariance.sum()):  # a sum is finite only if all of its terms are
-            return None
-        return int(np.argmin(np.isfinite(self.mean.sum(axis=1) + self.covariance.sum(axis=(1, 2)))))
+        if isfinite(np.vdot(self.mean, self.mean) + np.vdot(self.covariance, self.covariance)):
+            return None  # a sum is finite only if all of its terms are
+        finite = np.isfinite(self.mean).all(axis=1) & np.isfinite(self.covariance).all(axis=(1, 2))
+        return None if finite.all() else int(np.argmin(finite))
 
     def interval(self, level: float = 0.95, kind: IntervalKind = "student") -> tuple[Array, Array]:
         """Low and high ends (n, 3) of the central intervals that contain a new outcome with this probability.

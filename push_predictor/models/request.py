@@ -95,8 +95,8 @@ def _check(
     _require("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)")
     _require("angle", angle, (angle > -pi / 2.0) & (angle < pi / 2.0), "an angle in (-pi/2, pi/2), in rad")
     for name, values in covariates.items():
-        finite = (values > -inf) & (values < inf)
-        _require(f"covariate {name}", values, finite, _finite_number(name), error=CovariateError)
+        if (finite := (values > -inf) & (values < inf)) is not True:
+            _require(f"covariate {name}", values, finite, _finite_number(name), error=CovariateError)
     for name in model.needs:
         if name not in covariates:
             raise CovariateError(f"covariate {name}", "missing", f"{_finite_number(name)}: {model.name} needs it")

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,13 +17,9 @@ from push_predictor.models.gaussian_process.sparse_vhgp import DEFAULT_INDUCING
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import mechanics_on
 from push_predictor.models.mechanics.ladder import Rung
-from push_predictor.models.predictors import (
-    GaussianProcessPredictor,
-    Predictor,
-    PriorPredictor,
-)
+from push_predictor.models.predictors import GaussianProcessPredictor, Predictor, PriorPredictor
 from push_predictor.models.push_model import KINDS, LEARNT, Provenance, PushModel
-from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_learnt
+from push_predictor.models.train_learnt import MEANS, MeanChoice, train_learnt
 from push_predictor.models.train_mechanics import predictor_about, prior_predictor, sharpened, train_mechanics
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -112,12 +108,9 @@ def train_model(
 def _predictor(
     rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
 ) -> tuple[Predictor, list[Rung]]:
-    inducing = inducing_inputs(kind, len(rows), options.inducing)
+    options = replace(options, inducing=inducing_inputs(kind, len(rows), options.inducing))
     if kind in LEARNT:
-        learnt = LearntOptions(
-            kind, inducing, options.mean, options.about, options.tails, options.per_path, near=options.near
-        )
-        return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
+        return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, kind, options, watch), []
     if kind == "analytical" and not options.fit:
         return predictor_about(analytical_mechanics(rig.outline, rig.pusher_radius), rows), []
     mechanics = mechanics_on(rig.outline, rig.pusher_radius, rig.support_points, options.supports)

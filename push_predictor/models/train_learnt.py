@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
 from push_predictor.watch import Watch, no_watch, part_of
 
+if TYPE_CHECKING:
+    from push_predictor.models.train import TrainingOptions
+
 MeanChoice = Literal["mechanics", "zero", "auto"]
 MEANS: tuple[MeanChoice, ...] = ("mechanics", "zero", "auto")
 CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
@@ -43,50 +46,31 @@ ONE_SPEED = 1.2  # ratio of speeds up to which they count as one
 EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by less
 
 
-@dataclass(frozen=True)
-class LearntOptions:
-    """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
-
-    about: mechanics that were fitted to other rows, in place of `mean`. tails: whether to fit the distribution of new
-    pushes. per_path: whether outcomes are learnt per path length. rough: whether a gp is only to be compared. near: a
-    predictor about the same mechanics, at which the search of a vhgp begins.
-    """
-
-    kind: str
-    inducing: int | None = None
-    mean: MeanChoice = "auto"
-    about: FittedMechanics | None = None
-    tails: bool = True
-    per_path: bool = True
-    rough: bool = False
-    near: GaussianProcessPredictor | None = None
-
-
 def train_learnt(
-    rows: PushTable, of_mean: PushTable, rig: Rig, options: LearntOptions, watch: Watch
+    rows: PushTable, of_mean: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
 ) -> GaussianProcessPredictor:
     """The predictor trained on the rows; of_mean: those of them that the mechanics are fitted to.
 
-    With the mean `auto`, these rows decide about it, by a GP of each: see `zero_is_better`. Raises TrainingError for
-    outcomes that do not vary, and for options that the kind does not have.
+    kind: vhgp or gp. options.inducing: None for a dense model. With the mean `auto`, the rows of_mean decide about it,
+    by a GP of each: see `zero_is_better`. Raises TrainingError for outcomes that do not vary.
     """
     _check_rows(rows, rig)
     about, near = None, options.near
     if options.about is not None:
         about = FittedMean(options.about, rows.outcomes - _moved(options.about, rows))
     elif options.mean != "zero":
-        watch(f"train {options.kind}: mechanics as mean", 0.0)
+        watch(f"train {kind}: mechanics as mean", 0.0)
         about = fitted_mean(of_mean, rig)
     if options.about is None and about is not None and options.mean == "auto":
-        watch(f"train {options.kind}: choice of the mean", 0.2)
-        rough = replace(options, kind="gp", inducing=None, rough=True)
-        each = [_trained(of_mean, rig, rough, mean) for mean in (None, about)]
+        watch(f"train {kind}: choice of the mean", 0.2)
+        each = [_trained(of_mean, rig, "gp", options, mean, rough=True) for mean in (None, about)]
         zero, mechanics = (trained.density(of_mean) for trained in each)
         about = None if zero_is_better(zero, mechanics) else about
         chosen = each[0 if about is None else 1]
         near = replace(chosen.predictor, regressions=chosen.fitted)
-    trained = _trained(rows, rig, options, about, part_of(watch, 0.3, 0.9), near)
-    return _completed(trained, rows, options, watch)
+    trained = _trained(rows, rig, kind, options, about, part_of(watch, 0.3, 0.9), near)
+    watch(f"train {kind}: correlation and tails", 0.9)
+    return _completed(trained, rows, tails=options.tails)
 
 
 def zero_is_better(zero: Array, mechanics: Array) -> bool:
@@ -100,18 +84,16 @@ def zero_is_better(zero: Array, mechanics: Array) -> bool:
     return len(gain) > 1 and bool(gain.sum() > np.sqrt(len(gain)) * gain.std(ddof=1))
 
 
-def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch: Watch) -> GaussianProcessPredictor:
+def _completed(trained: _Trained, rows: PushTable, *, tails: bool) -> GaussianProcessPredictor:
     """The predictor with what only held-out pushes show: the correlation of the outputs, and the tails."""
-    watch(f"train {options.kind}: correlation of the outputs", 0.9)
     predictor = replace(trained.predictor, correlation=fit_correlation(trained.predictor.regressions, rows.push_id))
-    if not options.tails:
+    if not tails:
         return predictor
-    watch(f"train {options.kind}: tails", 0.95)
     push = Push.of(rows)
     learnt = predictor.of_targets().held_out_moments(push, _blocks(rows))
     counts = [regression.parameters.count for regression in predictor.regressions]
-    tails = fit_tails(trained.observed - learnt.mean, learnt.covariance, rows.push_id, counts)
-    return replace(predictor, tails=tails)
+    fitted = fit_tails(trained.observed - learnt.mean, learnt.covariance, rows.push_id, counts)
+    return replace(predictor, tails=fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +153,18 @@ class _Trained:
 def _trained(
     rows: PushTable,
     rig: Rig,
-    options: LearntOptions,
+    kind: str,
+    options: TrainingOptions,
     about: FittedMean | None,
     watch: Watch = no_watch,
     near: GaussianProcessPredictor | None = None,
+    *,
+    rough: bool = False,
 ) -> _Trained:
-    """near: regressions of similar rows about the same mean, where the search of a VHGP begins."""
+    """near: regressions of similar rows about the same mean, where the search of a VHGP begins.
+
+    rough: whether a GP is only to be compared.
+    """
     mean = None if about is None else about.mean
     path = rows.inputs[:, 0] * rows.duration
     size = (path / path.mean() if options.per_path else np.ones(len(path)))[:, None]
@@ -194,11 +182,16 @@ def _trained(
     fitted: list[Regression] = []
     chosen: list[Regression] = []
     for k, name in enumerate(OUTPUTS):
-        watch(f"train {options.kind}: {name}", k / len(OUTPUTS))
-        fitted.append(_learnt(features, columns[k], options, shortest, starts[k]))
+        watch(f"train {kind}: {name}", k / len(OUTPUTS))
+        if kind == "gp":
+            fitted.append(fit_gp(features, columns[k], shortest=shortest, rough=rough))
+        elif options.inducing is None:
+            fitted.append(fit_vhgp(features, columns[k], start=starts[k], shortest=shortest))
+        else:
+            fitted.append(fit_sparse_vhgp(features, columns[k], options.inducing))
         chosen.append(fitted[k])
         if mean is not None:
-            constant = fit_constant(features, columns[k], heavy_tails=options.kind != "gp", observed=seen[k])
+            constant = fit_constant(features, columns[k], heavy_tails=kind != "gp", observed=seen[k])
             chosen[k] = best_held_out([constant, fitted[k]], block, seen[k])
     predictor = GaussianProcessPredictor(rig, scaling, tuple(chosen), mean=mean)
     return _Trained(predictor, observed, tuple(fitted))
@@ -233,16 +226,6 @@ def _alike(regression: Regression) -> GpParameters | None:
         noise = parameters.noise_mean + 0.5 * (parameters.noise.variance + parameters.nugget)
         return GpParameters(parameters.log_lengthscales, parameters.log_signal_sd, 0.5 * noise)
     return parameters if isinstance(parameters, GpParameters) else None
-
-
-def _learnt(
-    features: Array, column: Array, options: LearntOptions, shortest: float, start: GpParameters | None
-) -> Regression:
-    if options.kind == "gp":
-        return fit_gp(features, column, shortest=shortest, rough=options.rough)
-    if options.inducing is None:
-        return fit_vhgp(features, column, start=start, shortest=shortest)
-    return fit_sparse_vhgp(features, column, options.inducing)
 
 
 def _scaling(

@@ -10,13 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.mechanics.draws import normal_draws, prior_draws
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics, mechanics_on
 from push_predictor.models.mechanics.ladder import Rung, climb
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import ProcessNoise, drawn_parameters, prior_spreads, updated
+from push_predictor.models.mechanics.prior import (
+    ProcessNoise,
+    drawn_parameters,
+    normal_draws,
+    prior_draws,
+    prior_spreads,
+    updated,
+)
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.rig import Rig

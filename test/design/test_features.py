@@ -119,7 +119,9 @@ def test_features_of_the_mechanics_are_derivatives_by_the_parameters() -> None:
         alone = replace(mechanics, covariance=one)
         found = features_of(replace(model, predictor=MechanicsPredictor(alone, model.predictor.covariance)), push)
         ends = within(name, mechanics.values[name])
-        low, high = mechanics.displacements([{name: np.full(10, end - mechanics.values[name])} for end in ends], push)
+        low, high = (
+            mechanics.shifted((name,), np.full((10, 1), end - mechanics.values[name]), push)[0] for end in ends
+        )
         slope = 0.01 * (high - low) / (ends[1] - ends[0]) / found.noise_sd
         along = found.values[:, :, np.argmax(np.abs(found.values).sum(axis=(0, 1)))]
         np.testing.assert_allclose(np.abs(along), np.abs(slope), atol=1e-3 * np.abs(slope).max())

@@ -31,8 +31,8 @@ from push_predictor.models.predictors.correlation import (
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.prediction_table import unbounded
 from push_predictor.models.tabulated.spline import table_moments
-from push_predictor.models.tabulated.table_nodes import unbounded
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array

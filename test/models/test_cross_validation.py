@@ -13,8 +13,8 @@ from drifting_models import extended, pushes, slippery
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.models.gaussian_process.bound import VhgpProblem
+from push_predictor.models.gaussian_process.fit import maximise_over_noise
 from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
-from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.pushes import Push

@@ -18,7 +18,7 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
-from push_predictor.models.pushes import Pushes
+from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
@@ -149,3 +149,13 @@ def test_ellipsoid_has_the_friction_and_the_pressure_of_the_mechanics(by_recordi
     shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.mechanics.ellipsoid
     assert shifted.centre == pytest.approx((0.002, 0.0), abs=1e-12)
     assert shifted.length > 1.1 * mechanics_model({}).predictor.mechanics.ellipsoid.length
+
+
+def test_each_change_of_the_rim_is_on_surfaces_of_its_own() -> None:
+    model = mechanics_model({})
+    push, even = Push.of(model.training), model.predictor.mechanics
+    still = even.displacement(push.inputs, push.duration)
+    for exponent in (0.5, 7.0):
+        shift = even.shifted(("rim_exponent",), np.full((len(still), 1), exponent), push)[0]
+        moved = mechanics_model({"rim_exponent": exponent}).predictor.mechanics.displacement(push.inputs, push.duration)
+        np.testing.assert_allclose(still + shift, moved, rtol=0.0, atol=1e-15)

@@ -11,8 +11,14 @@ from likelihoods import log_marginal_likelihood
 from scipy.stats import multivariate_normal
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
-from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, log_likelihood_and_gradient
+from push_predictor.models.gaussian_process.gp import (
+    MOST_SEARCHED,
+    GaussianProcess,
+    GpParameters,
+    fit_gp,
+    log_likelihood_and_gradient,
+    some_rows,
+)
 from push_predictor.types import Array
 
 PARAMETERS = GpParameters(np.array([0.2, -0.3]), 0.1, -1.2)

@@ -227,8 +227,8 @@ def test_tables_have_the_size_that_the_kernel_reads() -> None:
     assert (number["AZIMUTHS"], number["ELEVATIONS"]) == (load_map.AZIMUTHS, load_map.ELEVATIONS)
     assert number["DIRECTIONS"] == load_map.DIRECTIONS
     table = load_map.load_map(THREE_POINTS)
-    assert number["SLOPES"] == table.cells.size == table.slopes[0].size
-    assert number["CELL"] == table.cells.shape[1]
-    assert f"{load_map.AZIMUTHS} * {load_map.ELEVATIONS - 1} * {number['CELL']}" in source("push.py")
+    rows, columns, size = table.nodes.shape
+    assert table.slopes.shape == (rows, columns, 2 * size)
+    assert f"NODES = cython.declare(cython.Py_ssize_t, {columns} * {rows} * {size})" in source("push.py")
     assert f"QUANTITIES = cython.declare(cython.Py_ssize_t, {table.quantities.size + 1})" in source("push.py")
     assert compiled.displacements.__doc__ is not None

@@ -207,9 +207,8 @@ def test_inertia_grows_with_squared_speed_for_equal_path_length() -> None:
     slow = pushes(50)
     fast = Push(slow.inputs * [3.0, 1.0, 1.0], slow.duration / 3.0, slow.covariates)
     fitted = mechanics_of("ellip1", 2.0)
-    plain, nine = (fitted.displacement(p.inputs, p.duration) for p in (slow, fast))
-    once = fitted.displacements([{"inertia": np.full(50, 0.09)}], slow)[0] - plain
-    nine = fitted.displacements([{"inertia": np.full(50, 0.01)}], fast)[0] - nine
+    once = fitted.shifted(("inertia",), np.full((50, 1), 0.09), slow)[0]
+    nine = fitted.shifted(("inertia",), np.full((50, 1), 0.01), fast)[0]
     assert nine * IN_METRES == pytest.approx(once * IN_METRES, abs=1e-7)
 
 
@@ -271,7 +270,8 @@ def test_large_changes_are_those_of_the_surface_solved_by_root_finding(
     mechanics = mechanics_of("rect1", STICKING)
     push = Push(np.array([[0.02, contact, angle]]), np.array([INSTANT / 0.02]), {"slider_heading": np.zeros(1)})
     amount = float(np.sum(np.array(next(iter(setting.values())))))
-    moved = mechanics.displacements([{quantity: np.array([amount])}], push)[0, 0] / INSTANT
+    shift = mechanics.shifted((quantity,), np.array([[amount]]), push)[0]
+    moved = (mechanics.displacement(push.inputs, push.duration) + shift)[0] / INSTANT
     expected = Surface(mechanics, contact, angle).twist(**setting)
     assert moved * IN_METRES == pytest.approx(expected * IN_METRES, abs=1e-3)
     assert np.abs((expected - Surface(mechanics, contact, angle).twist()) * IN_METRES).max() > 5e-3

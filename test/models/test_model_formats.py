@@ -237,6 +237,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("gp", put("correlation.rows", [0, 1]), "ValueError: matmul"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": -np.ones(40)}), r"site_precisions: numbers from"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": np.ones(39)}), "ValueError: matmul"),
+    ("sparse vhgp", put("regressions.0.parameters.log_lengthscales", [0.0]), r"log_lengthscales: shape \(1,\)"),
     ("sparse vhgp", put("regressions.0.inducing_signal", [3, 3]), "inducing_signal does not contain distinct"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [-1]), "inducing_noise does not contain distinct"),
     ("sparse vhgp", put("regressions.0.inducing_noise", [40]), "IndexError: index 40 is out of bounds"),

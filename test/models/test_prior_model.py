@@ -17,12 +17,19 @@ from push_predictor.cli import main
 from push_predictor.errors import RequestError, RigError, TrainingError
 from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
-from push_predictor.models.mechanics.draws import DRAWS, normal_draws, prior_draws
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanics.prior import MIRRORED, ProcessNoise, prior_spreads, table_of
+from push_predictor.models.mechanics.prior import (
+    DRAWS,
+    MIRRORED,
+    ProcessNoise,
+    normal_draws,
+    prior_draws,
+    prior_spreads,
+    table_of,
+)
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel

@@ -10,8 +10,8 @@ import pytest
 from sparse_rows import PARAMETERS, rows
 
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
+from push_predictor.models.gaussian_process.fit import maximise_over_noise
 from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
-from push_predictor.models.gaussian_process.inner import maximise_over_noise
 from push_predictor.models.gaussian_process.sparse_vhgp import noise_prior
 from push_predictor.types import Array
 

@@ -25,7 +25,7 @@ from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_cache import read_tables, write_tables
-from push_predictor.models.tabulated import table_nodes
+from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
 from push_predictor.models.tabulated.tabulated_model import (
@@ -189,7 +189,7 @@ def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
 
 def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.MonkeyPatch) -> None:
     model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
-    monkeypatch.setattr(table_nodes, "COUPLING_CELLS", 1.5)
+    monkeypatch.setattr(table_of, "COUPLING_CELLS", 1.5)
     assert isinstance(model.predictor, GaussianProcessPredictor)
     posteriors = [on_grid(regression) for regression in model.predictor.regressions]
     ends = wide_box(model, model.predictor)
@@ -305,7 +305,7 @@ def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: s
 def test_the_table_is_of_the_domain_alone_where_a_wide_one_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = tabulate(independent(trained(OUTLINES["square"], "gp", *WIDE, per_path=False)))
     assert wide.table is not None
-    monkeypatch.setattr(table_nodes, "MOST_KNOTS", wide.table.spline.knots - 1)
+    monkeypatch.setattr(table_of, "MOST_KNOTS", wide.table.spline.knots - 1)
     narrow, outside = tabulate(wide.model), outside_pushes(wide.model, 50)
     assert_true_to_the_model(narrow)
     assert narrow.exact_count(outside) == 50 and narrow.exact_count(inside(wide.model, 50)) == 0
@@ -348,7 +348,7 @@ def test_analytical_model_has_no_table() -> None:
 def test_too_large_table_is_not_built(monkeypatch: pytest.MonkeyPatch) -> None:
     for limit in ("MOST_KNOTS", "MOST_NODES"):
         with monkeypatch.context() as patch:
-            patch.setattr(table_nodes, limit, 100)
+            patch.setattr(table_of, limit, 100)
             answers = tabulate(tabulated("square", "gp").model)
         assert not answers.tabulated
         assert "at most 100" in answers.how
@@ -357,9 +357,9 @@ def test_too_large_table_is_not_built(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     model = tabulated("square", "vhgp").model
     for name in ("SIGNAL", "NOISE"):
-        monkeypatch.setattr(table_nodes, name, table_nodes.Density(nodes=0.3, cells=0.3))
+        monkeypatch.setattr(table_of, name, table_of.Density(nodes=0.3, cells=0.3))
     for name in ("FEWEST_NODES", "FEWEST_CELLS"):
-        monkeypatch.setattr(table_nodes, name, 4)
+        monkeypatch.setattr(table_of, name, 4)
     answers, inputs = tabulate(model), inside(model, 5)
     assert not answers.tabulated
     assert "too far off" in answers.how

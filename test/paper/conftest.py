@@ -12,7 +12,7 @@ from importlib.util import find_spec
 import pytest
 from coarse import coarse_simulator
 
-from push_predictor.models.gaussian_process.descent import Cost, Descent, Minimum
+from push_predictor.models.gaussian_process.gp import Cost, Descent, Minimum
 from push_predictor.types import Array
 
 # rosdep has no key of diptest: `colcon test` goes without the tests of the paper's package, unless pip installed it.

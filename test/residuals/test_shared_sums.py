@@ -112,8 +112,8 @@ def test_candidates_are_screened_together_as_each_alone() -> None:
 
 def test_candidates_are_searched_by_the_secant_over_95_percent_of_rigs(deployed: PushModel) -> None:
     evidence = evidence_of(deployed, pushes(20, 2))
-    end = np.full(len(evidence.table), 2.0 * BY_NAME["centre_x"].spread)
-    more, less = evidence.mechanics.displacements([{"centre_x": end}, {"centre_x": -end}], evidence.push)
+    end = np.full((len(evidence.table), 1), 2.0 * BY_NAME["centre_x"].spread)
+    more, less = (evidence.mechanics.shifted(("centre_x",), side * end, evidence.push)[0] for side in (1.0, -1.0))
     secant = np.einsum("nij,nj->ni", evidence.whitener, (more - less) / (2.0 * end[0]))
     np.testing.assert_allclose(whitened_response(evidence, "centre_of_friction")[:, :, 0], secant, rtol=1e-9, atol=1e-9)
 

@@ -49,12 +49,14 @@ class JointEffects:
 
     def changes(self, columns: Array) -> Array:
         """The changes (n, q), at most the largest that a rig can have."""
-        return np.minimum(np.maximum(columns @ self._weights, -self._largest), self._largest)
+        return np.asarray(np.minimum(np.maximum(columns.dot(self._weights), self._least), self._largest))
 
-    def shifted(self, mechanics: FittedMechanics, push: Push) -> tuple[Array, Array, Array]:
+    def shifted(
+        self, mechanics: FittedMechanics, push: Push, *, derivatives: bool = True
+    ) -> tuple[Array, Array, Array]:
         """Shift (n, 3) of the mean, its derivatives (n, q, 3) by the parameters, and the columns (n, b)."""
         columns = self.columns(push)
-        return *mechanics.shifted(self.names, self.changes(columns), push), columns
+        return *mechanics.shifted(self.names, self.changes(columns), push, derivatives=derivatives), columns
 
     def design(self, columns: Array, slopes: Array) -> Array:
         """Derivatives (n, m, 3) by the coefficients, from those (n, q, 3) by the parameters."""
@@ -91,6 +93,10 @@ class JointEffects:
     def _largest(self) -> Array:
         return np.array([LARGEST[name] for name in self.names])
 
+    @cached_property
+    def _least(self) -> Array:
+        return -self._largest
+
 
 class JointShift(NamedTuple):
     """Shift (n, 3) of the mean; per effect, its derivatives (n, 3, p * m) by the coefficients."""
@@ -108,13 +114,10 @@ def joint(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push, *, 
     """The shift by all effects together, and its derivatives by their coefficients."""
     acting, shift, designs = JointEffects.of(effects), np.zeros((len(push.inputs), 3)), []
     exact: Iterator[Array] = iter(())
-    if acting.effects and derivatives:
-        shift, slopes, columns = acting.shifted(mechanics, push)
-        exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
-    elif acting.effects:
-        changes = acting.changes(acting.columns(push)).T
-        still, moved = mechanics.displacements([{}, dict(zip(acting.names, changes, strict=True))], push)
-        shift = moved - still
+    if acting.effects:
+        shift, slopes, columns = acting.shifted(mechanics, push, derivatives=derivatives)
+        if derivatives:
+            exact = iter(np.split(acting.design(columns, slopes).transpose(0, 2, 1), _ends(acting.effects), axis=2))
     for effect in effects:
         if not effect.exact:
             designs.append(effect.design(mechanics, push))

@@ -23,8 +23,8 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.gp import Kernel, Likelihood, Ridge
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.likelihood import Kernel, Likelihood, Ridge
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
@@ -53,22 +53,22 @@ class VhgpParameters:
         """Number of hyperparameters."""
         return 2 * len(self.log_lengthscales) + 4
 
-    @property
+    @cached_property
     def signal(self) -> ArdKernel:
         """Kernel of f."""
         return ArdKernel(self.log_lengthscales, self.log_signal_sd)
 
-    @property
+    @cached_property
     def noise(self) -> ArdKernel:
         """Kernel of g, without its nugget."""
         return ArdKernel(self.noise_log_lengthscales, self.noise_log_sd)
 
-    @property
+    @cached_property
     def nugget(self) -> float:
         """What is added to the diagonal of K_g, and to the variance of g at any input."""
         return float(np.exp(2.0 * self.log_nugget_sd))
 
-    @property
+    @cached_property
     def jitter(self) -> float:
         """What is added to the diagonal of K_f."""
         return JITTER * self.signal.variance

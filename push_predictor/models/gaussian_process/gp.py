@@ -1,21 +1,26 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Standard Gaussian process regression with one noise level (Rasmussen and Williams 2006, algorithm 2.1)."""
+"""Standard Gaussian process regression with one noise level (Rasmussen and Williams 2006, algorithm 2.1).
+
+Also what a VHGP shares with it: the likelihood of a process seen through independent noise, and the search for
+hyperparameters by L-BFGS, on at most MOST_SEARCHED rows: more rows determine little more.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, Cost, Descent, some_rows
+from push_predictor.models.gaussian_process.inducing import InducedKernel, InducedRidge
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.likelihood import Likelihood
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
-from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
+from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior, DenseRidge
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.
@@ -46,12 +51,12 @@ class GpParameters:
         """Number of hyperparameters."""
         return len(self.log_lengthscales) + 2
 
-    @property
+    @cached_property
     def kernel(self) -> ArdKernel:
         """Kernel of f."""
         return ArdKernel(self.log_lengthscales, self.log_signal_sd)
 
-    @property
+    @cached_property
     def noise_variance(self) -> float:
         """Variance of the noise."""
         return float(np.exp(2.0 * self.log_noise_sd))
@@ -165,3 +170,75 @@ def _cost(inputs: Array, outputs: Array) -> Cost:
         return -value, -gradient
 
     return negative_log_likelihood
+
+
+Kernel: TypeAlias = DenseKernel | InducedKernel
+Ridge: TypeAlias = DenseRidge | InducedRidge
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """log N(y | 0, K + D) - 1/2 sum_i unexplained_i / D_i, and its derivatives."""
+
+    kernel: Kernel
+    ridge: Ridge
+    alpha: Array  # (K + D)^-1 y
+    value: float
+
+    @classmethod
+    def of(cls, kernel: Kernel, outputs: Array, noise: Array) -> Likelihood:
+        """For outputs y (n,) and noise variances D (n,). Raises LinAlgError."""
+        weights = 1.0 / noise
+        ridge = kernel.regularise(weights)
+        alpha = ridge.residual(weights * outputs)
+        fit = outputs @ alpha + ridge.log_determinant + np.log(2.0 * np.pi * noise).sum()
+        return cls(kernel, ridge, alpha, -0.5 * float(fit + (weights * kernel.unexplained).sum()))
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Derivative of the value by D, shape (n,)."""
+        weights, uncertainty = self.ridge.weights, self.ridge.posterior_diagonal + self.kernel.unexplained
+        return np.asarray(0.5 * (self.alpha**2 - weights + uncertainty * weights**2))
+
+    def gradient(self) -> Array:
+        """Derivative of the value by (log_lengthscales, log_sd) of the kernel at fixed D, shape (D + 1,)."""
+        return self.ridge.gradient(self.alpha)
+
+
+Cost = Callable[[Array], tuple[float, Array]]
+
+MOST_SEARCHED = 350
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """A minimum of a cost: point (D,)."""
+
+    point: Array
+    cost: float
+
+
+@dataclass(frozen=True)
+class Descent:
+    """A bounded minimisation: box (D, 2) of the variables, most iterations, relative decrease at which it ends."""
+
+    box: Array
+    most_iterations: int
+    stop: float
+
+    def run(self, cost: Cost, first: Array, unit: float = 1.0) -> Minimum:
+        """The local minimum reached from a point of the box; unit: about the length of the first step."""
+        from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
+
+        def scaled(point: Array) -> tuple[float, Array]:
+            value, gradient = cost(point * unit)
+            return value, gradient * unit
+
+        options = {"maxiter": self.most_iterations, "ftol": self.stop}
+        found = minimize(scaled, first / unit, jac=True, method="L-BFGS-B", bounds=self.box / unit, options=options)
+        return Minimum(found.x * unit, float(found.fun))
+
+
+def some_rows(n: int, most: int) -> IntArray:
+    """Indices of at most this many of n rows, at random, but always the same."""
+    return np.sort(np.random.default_rng(0).permutation(n)[:most])

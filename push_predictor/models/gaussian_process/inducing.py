@@ -23,7 +23,7 @@ import numpy as np
 import scipy
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.models.gaussian_process.ridge import DenseKernel, cholesky_in_place
 from push_predictor.types import Array, IntArray
 
 _BLOCK = 2048
@@ -123,9 +123,8 @@ class InducedRidge:
         kept = share > _NOTHING
         columns = np.column_stack([induced.features.T @ weights, vectors[:, kept] * np.sqrt(share[kept])])
         columns = scipy.linalg.blas.dtrsm(1.0, induced.factor, columns, lower=1, trans_a=1)
-        return InducedPosterior(
-            induced.kernel, induced.inducing, columns[:, 0].copy(), np.ascontiguousarray(columns[:, 1:])
-        )
+        known = DenseKernel(induced.kernel, induced.inducing)
+        return InducedPosterior(known, columns[:, 0].copy(), np.ascontiguousarray(columns[:, 1:]))
 
     def residual(self, values: Array) -> Array:
         """P D values, shape (n,): the residual of a smoother of these values."""
@@ -191,24 +190,23 @@ class InducedRidge:
 class InducedPosterior:
     """A function's posterior from inducing inputs Z (m, D): mean k(x, Z) weights, explained variance |k(x, Z) root|^2.
 
-    weights (m,); root (m, r).
+    known: the kernel between Z. weights (m,); root (m, r).
     """
 
-    kernel: ArdKernel
-    inducing: Array
+    known: DenseKernel
     weights: Array
     root: Array
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Mean and explained variance at inputs (q, D), (q,) each."""
-        cross = self.kernel.cross(inputs, self.inducing)
+        cross = self.known.cross(inputs)
         half = cross @ self.root
         return cross @ self.weights, np.asarray(np.einsum("ij,ij->i", half, half))
 
     def covariance(self, inputs: Array) -> Array:
         """Posterior covariance (q, q) between inputs (q, D)."""
-        half = self.kernel.cross(inputs, self.inducing) @ self.root
-        return np.asarray(self.kernel.matrix(inputs) - half @ half.T)
+        half = self.known.cross(inputs) @ self.root
+        return np.asarray(self.known.kernel.matrix(inputs) - half @ half.T)
 
 
 def _inducing_factor(kernel: ArdKernel, inducing: Array) -> Array:

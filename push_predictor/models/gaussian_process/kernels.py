@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,14 +31,14 @@ class ArdKernel:
     log_lengthscales: Array
     log_sd: float
 
-    @property
+    @cached_property
     def variance(self) -> float:
         """k(x, x), the same for every x."""
         return float(np.exp(2.0 * self.log_sd))
 
     def matrix(self, inputs: Array) -> Array:
         """Kernel between all rows of inputs (n, D), shape (n, n), exactly symmetric."""
-        z = self._scaled(inputs)
+        z = self.scaled(inputs)
         kernel = np.empty((len(z), len(z)))
         for rows, columns in _upper_blocks(len(z)):
             kernel[rows, columns] = self._values(_exponents(z[rows], z[columns]))
@@ -45,9 +46,13 @@ class ArdKernel:
 
     def cross(self, left: Array, right: Array) -> Array:
         """Kernel between the rows of left (n, D) and right (m, D), shape (n, m)."""
-        a, b = self._scaled(left), self._scaled(right)
+        return self.between(self.scaled(left), self.scaled(right))
+
+    def between(self, a: Array, b: Array) -> Array:
+        """The same of scaled inputs a (n, D) and b (m, D); with n of 1, fastest where b is in Fortran order."""
         if len(a) == 1:
-            return self._values(-0.5 * ((a - b) ** 2).sum(axis=1)[None, :])
+            away = b.T - a.T
+            return self._values(-0.5 * (away * away).sum(axis=0)[None])
         kernel = np.empty((len(a), len(b)))
         for start in range(0, len(a), _BLOCK):
             kernel[start : start + _BLOCK] = self._values(_exponents(a[start : start + _BLOCK], b))
@@ -58,7 +63,7 @@ class ArdKernel:
 
         inputs (n, D); matrix is `self.matrix(inputs)`; weights (n, n) symmetric, of which the upper triangle is read.
         """
-        z = self._scaled(inputs)
+        z = self.scaled(inputs)
         gradient = np.zeros(z.shape[1] + 1)
         for rows, columns in _upper_blocks(len(z)):
             weighted = weights[rows, columns] * matrix[rows, columns]
@@ -68,10 +73,15 @@ class ArdKernel:
 
     def cross_gradient(self, left: Array, right: Array, weighted: Array) -> Array:
         """sum_ij weights_ij d k(left_i, right_j) / d(log_lengthscales, log_sd), of weighted = weights * k (n, m)."""
-        return _contracted(weighted, self._scaled(left), self._scaled(right))
+        return _contracted(weighted, self.scaled(left), self.scaled(right))
 
-    def _scaled(self, inputs: Array) -> Array:
-        return inputs * np.exp(-self.log_lengthscales)
+    def scaled(self, inputs: Array) -> Array:
+        """Inputs (n, D) in units of the lengthscales."""
+        return inputs * self._per_unit
+
+    @cached_property
+    def _per_unit(self) -> Array:
+        return np.asarray(np.exp(-self.log_lengthscales))
 
     def _values(self, exponents: Array) -> Array:
         """The kernel at exponents -r^2 / 2, in their memory."""

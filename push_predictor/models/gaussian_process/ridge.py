@@ -48,6 +48,14 @@ class DenseKernel:
         """K vector, shape (n,)."""
         return np.asarray(self.matrix @ vector)
 
+    def cross(self, inputs: Array) -> Array:
+        """Kernel between inputs (q, D) and these, (q, n)."""
+        return self.kernel.between(self.kernel.scaled(inputs), self._scaled)
+
+    @cached_property
+    def _scaled(self) -> Array:
+        return np.asfortranarray(self.kernel.scaled(self.inputs))
+
 
 def cholesky_in_place(matrix: Array) -> Array:
     """Lower Cholesky factor in the memory of a symmetric C-ordered matrix, itself in Fortran order.
@@ -83,6 +91,10 @@ class DenseRidge:
         return cls(kernel, weights, log_determinant, inverse)
 
     @cached_property
+    def _scale(self) -> Array:
+        return np.asarray(np.sqrt(self.weights))
+
+    @cached_property
     def posterior_diagonal(self) -> Array:
         """Diagonal of K - K P K, shape (n,)."""
         explained = np.einsum("ij,ij->j", self.inverse_root, self.inverse_root)
@@ -90,13 +102,12 @@ class DenseRidge:
 
     def residual(self, values: Array) -> Array:
         """P D values, shape (n,): the residual of a smoother of these values."""
-        scale = np.sqrt(self.weights)
-        half = scipy.linalg.blas.dtrmv(self.inverse_root, values / scale, lower=1)
-        return np.asarray(scale * scipy.linalg.blas.dtrmv(self.inverse_root, half, lower=1, trans=1))
+        half = scipy.linalg.blas.dtrmv(self.inverse_root, values / self._scale, lower=1)
+        return np.asarray(self._scale * scipy.linalg.blas.dtrmv(self.inverse_root, half, lower=1, trans=1))
 
     def explained(self, cross: Array) -> Array:
         """H (n, m), H'H = cross P cross': what n values explain of the prior covariance of m others; cross (m, n)."""
-        scaled = cross * np.sqrt(self.weights)
+        scaled = cross * self._scale
         if len(cross) == 1:
             return np.asarray(scipy.linalg.blas.dtrmv(self.inverse_root, scaled[0], lower=1)[:, None])
         return np.asarray(scipy.linalg.blas.dtrmm(1.0, self.inverse_root, scaled.T, lower=1))
@@ -109,9 +120,8 @@ class DenseRidge:
         """P in the upper triangle of a C-ordered matrix (n, n), whose other elements have no meaning."""
         # L'L in Fortran's lower triangle, for a sixth of a product's operations.
         matrix, _ = scipy.linalg.lapack.dlauum(self.inverse_root, lower=1)
-        scale = np.sqrt(self.weights)
-        matrix *= scale
-        matrix *= scale[:, None]
+        matrix *= self._scale
+        matrix *= self._scale[:, None]
         return np.asarray(matrix.T)
 
     def precision(self) -> Array:
@@ -158,13 +168,12 @@ class DensePosterior:
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Mean and explained variance at inputs (q, D), (q,) each."""
-        known = self.ridge.of_kernel
-        cross = known.kernel.cross(inputs, known.inputs)
+        cross = self.ridge.of_kernel.cross(inputs)
         half = self.ridge.explained(cross)
         return cross @ self.weights, np.asarray(np.einsum("ij,ij->j", half, half))
 
     def covariance(self, inputs: Array) -> Array:
         """Posterior covariance (q, q) between inputs (q, D)."""
         known = self.ridge.of_kernel
-        half = self.ridge.explained(known.kernel.cross(inputs, known.inputs))
+        half = self.ridge.explained(known.cross(inputs))
         return np.asarray(known.kernel.matrix(inputs) - half.T @ half)

@@ -16,7 +16,6 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.descent import Descent, some_rows
 from push_predictor.models.gaussian_process.fit import (
     FEW_ROWS,
     LOG_NUGGET_SD,
@@ -27,10 +26,10 @@ from push_predictor.models.gaussian_process.fit import (
     Prior,
     Search,
 )
-from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.gp import Descent, check_rows, some_rows
 from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
-from push_predictor.models.gaussian_process.vhgp import VHGP, Posterior, fit_vhgp
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array, IntArray
 
 DEFAULT_INDUCING = 100
@@ -61,7 +60,7 @@ class SparseVHGP(VHGP):
     ) -> None:
         super().__init__(inputs, outputs, parameters, site_precisions)
         self.inducing_signal, self.inducing_noise = inducing_signal, inducing_noise
-        self._functions = super().functions()
+        _ = self.functions
         self.free_matrices()
 
     @cached_property
@@ -70,9 +69,9 @@ class SparseVHGP(VHGP):
         chosen = self.inputs[self.inducing_signal], self.inputs[self.inducing_noise]
         return Bound.tied(problem_about(self.inputs, self.outputs, self.parameters, *chosen), self.site_precisions)
 
-    def functions(self) -> tuple[Posterior, Posterior]:
-        """The posteriors of f, and of g less its prior mean and without its nugget."""
-        return self._functions
+    def free_matrices(self) -> None:
+        """See VHGP; the posteriors stay."""
+        self.__dict__.pop("solved", None)
 
     def _predicted_without(self, block: IntArray) -> LatentPrediction:
         prediction = super()._predicted_without(block)

@@ -18,9 +18,15 @@ import numpy as np
 
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.descent import MOST_SEARCHED, some_rows
 from push_predictor.models.gaussian_process.fit import maximise_bound, precisions_from
-from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.gp import (
+    MOST_SEARCHED,
+    SHORTEST,
+    GpParameters,
+    check_rows,
+    fit_gp,
+    some_rows,
+)
 from push_predictor.models.gaussian_process.inducing import InducedPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
@@ -62,8 +68,10 @@ class VHGP:
 
     def free_matrices(self) -> None:
         """Free the matrices, which the next prediction computes again."""
-        self.__dict__.pop("solved", None)  # a cached property
+        for name in ("solved", "functions"):
+            self.__dict__.pop(name, None)  # a cached property
 
+    @cached_property
     def functions(self) -> tuple[Posterior, Posterior]:
         """The posteriors of f, and of g less its prior mean and without its nugget."""
         bound = self.solved
@@ -72,7 +80,7 @@ class VHGP:
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
-        parameters, (signal, noise) = self.parameters, self.functions()
+        parameters, (signal, noise) = self.parameters, self.functions
         of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
         mean, explained = signal.predict(inputs)
         log_noise, noise_explained = noise.predict(inputs)
@@ -83,7 +91,7 @@ class VHGP:
 
     def function_covariance(self, inputs: Array) -> Array:
         """Posterior covariance (m, m) of f between inputs (m, D), without the jitter, of which data tell nothing."""
-        return self.functions()[0].covariance(inputs)
+        return self.functions[0].covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""

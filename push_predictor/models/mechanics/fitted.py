@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,18 @@ from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellips
 from push_predictor.models.pushes import Push
 from push_predictor.types import Array
 
-Changes = Mapping[str, Array]  # by name of a parameter: what is added to its value at each push, (n,)
-
 # Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
 DIFFERENCE = 0.5
 TEXTBOOK_FRICTION = 0.3
 ANALYTICAL_ACCURACY = 1e-4  # of a displacement, relative
+
+
+class _Changed(NamedTuple):
+    """What is the same for all changes of some parameters; moved: see PushMechanics.shifted."""
+
+    shape: Shape
+    moved: Array
+    heading: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +45,7 @@ class FittedMechanics:
     mechanics: PushMechanics
     values: dict[str, float] = field(default_factory=dict)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    _shapes: dict[tuple[str, ...], Shape] = field(default_factory=dict, init=False, repr=False)
-    _differences: dict[tuple[tuple[str, ...], float], Array] = field(default_factory=dict, init=False, repr=False)
+    _changed: dict[tuple[tuple[str, ...], float], _Changed] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -56,47 +62,39 @@ class FittedMechanics:
     def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
         push = Push(inputs, duration, covariates or {})
-        return self.mechanics.displaced(self._row[None, None], push, self._shape)[:, 0]
-
-    def displacements(self, tried: Sequence[Changes], push: Push) -> Array:
-        """Displacements (k, n, 3) with each of k sets of changes of parameters, computed in one call.
-
-        The heading of a push follows from that of the slider where it is given.
-        """
-        values = np.empty((len(push.inputs), len(tried), len(TEXTBOOK)))
-        values[:] = self._row
-        for k, changes in enumerate(tried):
-            for name, change in changes.items():
-                values[:, k, COLUMN[name]] += change
-        given = self._covariates(push, {name for changes in tried for name in changes})
-        found = self.mechanics.displaced(values, Push(push.inputs, push.duration, given))
-        return np.ascontiguousarray(found.transpose(1, 0, 2))
+        return self.mechanics.displaced(self._rows, push, self._shape)[:, 0]
 
     def shifted(
-        self, names: tuple[str, ...], changes: Array, push: Push, difference: float = DIFFERENCE
+        self,
+        names: tuple[str, ...],
+        changes: Array,
+        push: Push,
+        difference: float = DIFFERENCE,
+        *,
+        derivatives: bool = True,
     ) -> tuple[Array, Array]:
         """What changes (n, q) of the parameters `names` shift the displacement by (n, 3), and derivatives (n, q, 3).
 
-        difference: step to both sides for a derivative, in prior standard deviations.
+        The heading of a push follows from that of the slider where it is given. difference: step to both sides for a
+        derivative, in prior standard deviations. Without derivatives there are none, (n, 0, 3).
         """
-        given = Push(push.inputs, push.duration, self._covariates(push, names))
-        moved = self._moved(names, difference)
-        shape = self._changed_shape(names, changes, difference)
-        found = self.mechanics.shifted(self._row, shape, changes, moved, given)
+        known = self._changed.get((names, difference))
+        if known is None or "rim_exponent" in names:
+            shape = self._changed_shape(names, changes, difference)
+            heading = any(BY_NAME[name].needs for name in (*self.values, *names))
+            known = _Changed(shape, self._moved(names, difference), heading)
+            self._changed[names, difference] = known
+        given = self._with_heading(push) if known.heading else push
+        found = self.mechanics.shifted(self._row, known.shape, changes, known.moved, given, derivatives=derivatives)
         return found[:, 0], found[:, 1:]
 
     def _changed_shape(self, names: tuple[str, ...], changes: Array, difference: float) -> Shape:
-        """Where no rim changes it is the same for all changes of these parameters."""
-        rim = "rim_exponent" in names
-        if rim or names not in self._shapes:
-            ends = np.tile(self._row, (2, 1))
-            for k, name in enumerate(names):
-                step = difference * BY_NAME[name].spread
-                ends[:, COLUMN[name]] += changes[:, k].min() - step, changes[:, k].max() + step
-            if rim:
-                return self.mechanics.shape_of(ends)
-            self._shapes[names] = self.mechanics.shape_of(ends)
-        return self._shapes[names]
+        """Of changes and of none; where no rim changes it is the same for all changes of these parameters."""
+        ends = np.tile(self._row, (2, 1))
+        for k, name in enumerate(names):
+            step = difference * BY_NAME[name].spread
+            ends[:, COLUMN[name]] += min(changes[:, k].min() - step, 0.0), max(changes[:, k].max() + step, 0.0)
+        return self.mechanics.shape_of(ends)
 
     @cached_property
     def _shape(self) -> Shape:
@@ -104,12 +102,9 @@ class FittedMechanics:
 
     def _moved(self, names: tuple[str, ...], difference: float) -> Array:
         """The parameters of a difference, see PushMechanics.shifted. No friction and no inertia is below zero."""
-        if (names, difference) not in self._differences:
-            steps = [difference * BY_NAME[name].spread for name in names]
-            least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
-            own = np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
-            self._differences[names, difference] = own
-        return self._differences[names, difference]
+        steps = [difference * BY_NAME[name].spread for name in names]
+        least = [-self.value(name) if BY_NAME[name].low == 0.0 else -np.inf for name in names]
+        return np.array([[COLUMN[name] for name in names], steps, least], dtype=np.float64)
 
     def value(self, name: str) -> float:
         """The value of a parameter: the fitted one, or the textbook's."""
@@ -135,25 +130,17 @@ class FittedMechanics:
             row[COLUMN[name]] = value
         return row
 
-    def _covariates(self, push: Push, names: Iterable[str]) -> dict[str, Array]:
-        """What the mechanics with changes of these parameters need of the covariates of pushes."""
-        given = push.covariates
-        used = {RECORDING: given[RECORDING]} if self.mechanics.supports and RECORDING in given else {}
-        if self._in_world or any(BY_NAME[name].needs for name in names):
-            used["push_heading"] = self._heading(push)
-        return used
-
     @cached_property
-    def _in_world(self) -> bool:
-        return any(BY_NAME[name].needs for name in self.values)
+    def _rows(self) -> Array:
+        return self._row[None, None]
 
-    def _heading(self, push: Push) -> Array:
+    def _with_heading(self, push: Push) -> Push:
+        """The pushes with their heading in the world, from that of the slider where it is given."""
         if "slider_heading" not in push.covariates:
-            return push.covariates["push_heading"]
+            return push
         normal = self.outline.inward_normal(push.inputs[:, 1])
-        return np.asarray(
-            push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
-        )
+        heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+        return Push(push.inputs, push.duration, {**push.covariates, "push_heading": heading})
 
 
 def analytical_mechanics(

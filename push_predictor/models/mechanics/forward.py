@@ -93,13 +93,15 @@ class PushMechanics:
             displacements(_writeable(values), self._pushes(shape, push), shape.slider, found)
         return found
 
-    def shifted(self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push) -> Array:
+    def shifted(
+        self, values: Array, shape: Shape, changes: Array, moved: Array, push: Push, *, derivatives: bool = True
+    ) -> Array:
         """What changes (n, q) of q parameters shift, and its derivatives by each of them, (n, 1 + q, 3).
 
         values (28,); shape: theirs with the changes, see shape_of. moved (3, q): index of the parameter, step of its
-        central difference, least change of it.
+        central difference, least change of it. Without derivatives (n, 1, 3).
         """
-        found = np.empty((len(changes), 1 + changes.shape[1], 3))
+        found = np.empty((len(changes), 1 + (changes.shape[1] if derivatives else 0), 3))
         if len(changes):
             shifts(values, _writeable(changes), moved, self._pushes(shape, push), shape.slider, found)
         return found
@@ -117,7 +119,7 @@ class PushMechanics:
                 self._tables[knots] = surface_tables(self._known, self.outline, knots)
         tables = self._tables[knots]
         slopes = tables.slopes if stretched else NO_SLOPES
-        surfaces = tables.cells, slopes, tables.quantities, tables.power
+        surfaces = tables.nodes, slopes, tables.quantities, tables.power
         return Shape(in_world, Slider(self.outline.boundary, *surfaces, self.pusher_radius, self.accuracy))
 
     def _pushes(self, shape: Shape, push: Push) -> Array:

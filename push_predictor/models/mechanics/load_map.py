@@ -50,19 +50,14 @@ class LoadMap:
     quantities: Array
 
     @cached_property
-    def cells(self) -> Array:
-        """Per cell of the table, bilinear polynomials (cells, 16): of the parts of the twist, and of the size."""
-        return _polynomials(self.nodes)
-
-    @cached_property
     def slopes(self) -> Array:
-        """Change of `cells` per unit of a and of b of direction-dependent friction, (2, cells, 16); see kernel/surface.
+        """Change of `nodes` per unit of a, then of b, of direction-dependent friction, (..., 8); see kernel/surface.
 
         Takes as long as `load_map`. Zero for few points of support: the flats and edges of their surfaces move, and a
         blend would not be convex.
         """
         if _every(self.centred) == 1:
-            return np.zeros((2, *self.cells.shape))
+            return np.zeros((*self.nodes.shape[:2], 8))
         every, h = _every(self.centred) * STRETCH_REFINED, STRETCH_STEP
 
         def nodes(a: float, b: float) -> Array:
@@ -70,7 +65,7 @@ class LoadMap:
             return _refined(_solved(shape, shape.length, every), every)
 
         by_a, by_b = nodes(h, 0.0) - nodes(-h, 0.0), nodes(0.0, h) - nodes(0.0, -h)
-        return np.stack([_polynomials(slope / (2.0 * h)) for slope in (by_a, by_b)])
+        return np.concatenate([by_a, by_b], axis=2) / (2.0 * h)
 
 
 def load_map(pressure: PressureDistribution) -> LoadMap:
@@ -112,14 +107,6 @@ def stretched_arms(centred: PressureDistribution, a: float, b: float) -> Pressur
 
 def _every(pressure: PressureDistribution) -> int:
     return REFINED if len(pressure.points) >= SMOOTH_POINTS else 1
-
-
-def _polynomials(nodes: Array) -> Array:
-    """Per cell, the bilinear polynomials (cells, 16) of nodes: of the three parts of the twist, then of the size."""
-    low, right = nodes[:-1, :-1], nodes[:-1, 1:] - nodes[:-1, :-1]
-    up, both = nodes[1:, :-1] - low, nodes[1:, 1:] - nodes[1:, :-1] - right
-    parts = np.stack([low, right, up, both], axis=2).reshape(-1, 4, 4)
-    return np.concatenate([parts[:, :, :3].reshape(-1, 12), parts[:, :, 3]], axis=1)
 
 
 def _solved(pressure: PressureDistribution, length: float, every: int) -> Array:

@@ -21,7 +21,7 @@ from push_predictor.types import Array
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 SQUARE_OF_SPREAD = 9.0 / 16.0  # mean square of a coordinate over c squared, of an even disc
-_NO_CELLS, NO_SLOPES = np.zeros((0, 0, 16)), np.zeros((0, 2, 0, 16))
+_NO_NODES, NO_SLOPES = np.zeros((0, 0, 0, 4)), np.zeros((0, 0, 0, 8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +88,13 @@ class SurfaceTables:
     power: float = 0.0
 
     @cached_property
-    def cells(self) -> Array:
-        """Those of all maps, (T, cells, 16)."""
-        return np.stack([one.cells for one in self.maps]) if self.maps else _NO_CELLS
+    def nodes(self) -> Array:
+        """Those of all maps, (T, ELEVATIONS, AZIMUTHS + 1, 4)."""
+        return np.stack([one.nodes for one in self.maps]) if self.maps else _NO_NODES
 
     @cached_property
     def slopes(self) -> Array:
-        """Those of all maps, (T, 2, cells, 16); each takes 0.1 s."""
+        """Those of all maps, (T, ELEVATIONS, AZIMUTHS + 1, 8); each takes 0.1 s."""
         return np.stack([one.slopes for one in self.maps]) if self.maps else NO_SLOPES
 
 

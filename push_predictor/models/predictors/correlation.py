@@ -26,6 +26,7 @@ import numpy as np
 
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.gaussian_process.ridge import DenseKernel
 from push_predictor.types import Array, IntArray
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
@@ -64,10 +65,10 @@ class Correlation:
         return correlations(self.sums(features, block), self.shrinkage)
 
     @cached_property
-    def kernel(self) -> ArdKernel:
+    def known(self) -> DenseKernel:
         """The weights of the rows as a kernel of the features."""
         size = self.features.shape[1]
-        return ArdKernel(np.full(size, np.log(self.bandwidth)), 0.0)
+        return DenseKernel(ArdKernel(np.full(size, np.log(self.bandwidth)), 0.0), self.features)
 
     @cached_property
     def products(self) -> Array:
@@ -80,7 +81,7 @@ class Correlation:
         sums = np.empty((len(features), 6))
         for start in range(0, len(features), step):
             part = slice(start, start + step)
-            weights = self.kernel.cross(features[part], self.features)
+            weights = self.known.cross(features[part])
             if block is not None:
                 weights[block[part, None] == (block if self.rows is None else block[self.rows])] = 0.0
             sums[part] = weights @ self.products

@@ -128,7 +128,7 @@ class GaussianProcessPredictor(BasePredictor):
                 covariance = covariance - learnt.process_covariance + process + deviation[:, :, None] * np.eye(3)
             square = (size * size)[:, :, None]
             mean, covariance, process = mean * size, covariance * square, process * square
-        return Moments(mean + self.displacement(push), covariance, process)
+        return Moments(mean if self.mean is None else mean + self.displacement(push), covariance, process)
 
     def displacement(self, push: Push) -> Array:
         """Displacement (n, 3) of the mean, zero if it has none."""
@@ -162,10 +162,8 @@ class GaussianProcessPredictor(BasePredictor):
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""
-        found = np.empty((4, len(latent[0].mean), len(latent)))
-        for k, p in enumerate(latent):
-            found[:, :, k] = p.mean, p.variance, p.log_noise_mean, p.log_noise_variance
-        joined, factor = LatentPrediction(*found), self.reported_sd**2
+        found = np.array([[p.mean, p.variance, p.log_noise_mean, p.log_noise_variance] for p in latent])
+        joined, factor = LatentPrediction(*found.transpose(1, 2, 0)), self.reported_sd**2
         mean = joined.mean * self.scaling.outcome_sd + self.scaling.outcome_mean
         return Moments(mean, *covariances(joined.variance * factor, joined.process_variance * factor, correlation))
 

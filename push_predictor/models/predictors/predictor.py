@@ -151,5 +151,6 @@ class MechanicsPredictor(BasePredictor):
     def moments(self, push: Push) -> Moments:
         """See BasePredictor."""
         mean = self.fitted.displacement(push.inputs, push.duration, push.covariates)
-        of_all = self.covariance[None].repeat(len(mean), axis=0)
-        return Moments(mean, of_all, of_all.copy())
+        of_all = np.empty((2, len(mean), 3, 3))
+        of_all[:] = self.covariance
+        return Moments(mean, *of_all)

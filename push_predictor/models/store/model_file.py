@@ -13,7 +13,6 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -177,7 +176,6 @@ def _predictor(
     for k, (found, column) in enumerate(zip(record["regressions"], outputs.T.copy(), strict=True)):
         given = {(cls, name): x for cls in REGRESSIONS for name, x in (("inputs", inputs), ("outputs", column))}
         regressions.append(Reader(arrays, given).read(found, of_regression, f"regressions.{k}"))
-        _check_lengthscales(vars(regressions[k].parameters), inputs, f"regressions.{k}.parameters")
     reader = Reader(arrays, {(Correlation, "features"): inputs})
     correlation = reader.read(record["correlation"], Correlation | None, "correlation")
     if correlation is not None and correlation.rows is not None:
@@ -188,13 +186,6 @@ def _predictor(
 def _outputs(base: GaussianProcessPredictor, training: PushTable) -> Array:
     """What the regressions of a base without effects were trained on (n, 3)."""
     return base.standardised(Push.of(training), training.outcomes)
-
-
-def _check_lengthscales(parameters: Mapping[str, Any], inputs: Array, place: str) -> None:
-    """Raise ValueError unless there is one length scale for each input; others would be broadcast."""
-    for name, values in parameters.items():
-        if name.endswith("log_lengthscales") and values.shape != inputs.shape[1:]:
-            raise ValueError(f"{place}.{name}: shape {values.shape} is not accepted, give {inputs.shape[1:]}")
 
 
 def _check_answers(model: PushModel) -> None:

@@ -147,7 +147,16 @@ def _correlation(a: SimpleNamespace) -> None:
         raise ValueError("rows: a number of a training row is negative")
 
 
+def _regression(a: SimpleNamespace) -> None:
+    """One length scale for each input; others would be broadcast."""
+    for name in ("log_lengthscales", "noise_log_lengthscales"):
+        found = getattr(a.parameters, name, a.inputs[0])
+        if found.shape != a.inputs.shape[1:]:
+            raise ValueError(f"parameters.{name}: shape {found.shape} is not accepted, give {a.inputs.shape[1:]}")
+
+
 def _sparse(a: SimpleNamespace) -> None:
+    _regression(a)
     for name in ("inducing_signal", "inducing_noise"):
         rows = getattr(a, name)
         if rows.ndim != 1 or np.any(rows < 0) or not 0 < len(np.unique(rows)) == len(rows):
@@ -238,6 +247,8 @@ CHECKS: dict[type, Callable[[SimpleNamespace], None]] = {
     PushTable: _table,
     Tails: _tails,
     Correlation: _correlation,
+    GaussianProcess: _regression,
+    VHGP: _regression,
     SparseVHGP: _sparse,
     FittedMechanics: _fitted,
     PushMechanics: _mechanics,

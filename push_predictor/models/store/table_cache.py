@@ -29,8 +29,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import load_model, model_digest
-from push_predictor.models.tabulated.prediction_table import table_from_nodes
-from push_predictor.models.tabulated.table_nodes import TableNodes
+from push_predictor.models.tabulated.prediction_table import TableNodes, table_from_nodes
 from push_predictor.models.tabulated.tabulated_model import (
     Probes,
     TableAccuracy,

@@ -85,7 +85,7 @@ def on_grid(regression: Regression) -> OnGrid:
         parameters, prior = regression.parameters, regression.parameters.kernel.variance
         signal = _of_function(regression.posterior, prior, _EPSILON * prior)
         return GridRegression(signal, 2.0 * parameters.log_noise_sd, None)
-    of_vhgp, (f, g) = regression.parameters, regression.functions()
+    of_vhgp, (f, g) = regression.parameters, regression.functions
     of_noise, nugget = of_vhgp.noise.variance, of_vhgp.nugget
     signal = _of_function(f, of_vhgp.signal.variance + of_vhgp.jitter, of_vhgp.jitter)
     noise = _of_function(g, of_noise + nugget, nugget + _EPSILON * of_noise)
@@ -94,7 +94,8 @@ def on_grid(regression: Regression) -> OnGrid:
 
 def _of_function(posterior: Posterior, prior_variance: float, least_variance: float) -> GridPosterior:
     if isinstance(posterior, InducedPosterior):  # needs no factorisation
-        kernel, inputs, root = posterior.kernel, posterior.inducing, posterior.kernel.variance * posterior.root
+        kernel, inputs = posterior.known.kernel, posterior.known.inputs
+        root = kernel.variance * posterior.root
         pivots = np.arange(len(inputs))
         return GridPosterior(kernel, inputs, posterior.weights, pivots, root, prior_variance, least_variance)
     known, noises = posterior.ridge.of_kernel, 1.0 / posterior.ridge.weights

@@ -25,11 +25,11 @@ from push_predictor.models.tabulated.grid_posterior import OnGrid, on_grid
 from push_predictor.models.tabulated.prediction_table import (
     FASTEST,
     PredictionTable,
+    TooFineError,
     narrow_box,
     prediction_table,
     wide_box,
 )
-from push_predictor.models.tabulated.table_nodes import TooFineError
 from push_predictor.types import Array, BoolArray
 
 COMPUTED = "computed: only what is learnt has a table"

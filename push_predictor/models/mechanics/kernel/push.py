@@ -14,7 +14,7 @@ from cython.cimports.push_predictor.geometry.boundary import Body, Contact, Near
 from cython.cimports.push_predictor.models.mechanics.kernel.surface import Surface, root_of
 from cython.cimports.push_predictor.models.mechanics.kernel.sweep import Common, Pose, Push, Tables, Values, swept
 
-CELLS = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # numbers of a table
+NODES = cython.declare(cython.Py_ssize_t, 145 * 49 * 4)  # numbers of a table
 QUANTITIES = cython.declare(cython.Py_ssize_t, 23)
 PARAMETERS = cython.declare(cython.int, 28)
 
@@ -29,7 +29,7 @@ class Slider:
     def __init__(
         self,
         boundary: cython.double[::1],
-        cells: cython.double[:, :, ::1],
+        nodes: cython.double[:, :, :, ::1],
         slopes: cython.double[:, :, :, ::1],
         quantities: cython.double[:, ::1],
         power: cython.double,
@@ -38,15 +38,15 @@ class Slider:
     ) -> None:
         """boundary: see Outline.boundary. pusher_radius m. accuracy: relative.
 
-        cells (T, 6912, 16), slopes (T, 2, 6912, 16) or empty where no parameter needs them, quantities (T, 23): see
+        nodes (T, 49, 145, 4), slopes (T, 49, 145, 8) or empty where no parameter needs them, quantities (T, 23): see
         SurfaceTables; power: of the power law where there is no table, else 0.
         """
-        arrays = boundary.base, cells.base, slopes.base, quantities.base  # pointers lead into them
+        arrays = boundary.base, nodes.base, slopes.base, quantities.base  # pointers lead into them
         self._given = (*arrays, power, pusher_radius, accuracy)
         self.common.body = body_of(cython.address(boundary[0]))
         self.common.pusher_radius, self.common.accuracy = pusher_radius, accuracy
         tables: cython.pointer(Tables) = cython.address(self.common.tables)
-        tables.cells = cython.address(cells[0, 0, 0]) if cells.shape[0] else cython.NULL
+        tables.nodes = cython.address(nodes[0, 0, 0, 0]) if nodes.shape[0] else cython.NULL
         tables.slopes = cython.address(slopes[0, 0, 0, 0]) if slopes.shape[0] else cython.NULL
         tables.quantities, tables.count = cython.address(quantities[0, 0]), quantities.shape[0]
         tables.power, tables.known = power, 0
@@ -91,7 +91,7 @@ def shifts(
     """Compute what changes (n, q) of q parameters shift, and its derivatives by each of them, by central differences.
 
     values (28,). moved (3, q): number of the parameter, step of its difference, least change of it. found
-    (n, 1 + q, 3) is written: the shift, then the derivatives. The rest as in `displacements`.
+    (n, 1 + q, 3) is written: the shift, then the derivatives; (n, 1, 3): the shift. The rest as in `displacements`.
     """
     common: cython.pointer(Common) = cython.address(slider.common)
     own: cython.double[28]
@@ -119,7 +119,7 @@ def shifts(
                 if end == 0:
                     for k in range(changes.shape[1]):
                         own[cython.cast(cython.Py_ssize_t, moved[0, k])] += changes[n, k]
-            for k in range(changes.shape[1]):
+            for k in range(found.shape[1] - 1):
                 column = cython.cast(cython.Py_ssize_t, moved[0, k])
                 changed: cython.double = own[column]
                 least: cython.double = values[column] + moved[2, k]
@@ -290,14 +290,14 @@ def _surface(tables: cython.pointer(Tables), number: cython.double, push: cython
     surface.length = (one[2] + blend * (other[2] - one[2])) * spread
     surface.reach_low, surface.reach_high = one + 6, other + 6
     surface.low = surface.high = surface.slopes_low = surface.slopes_high = cython.NULL
-    if tables.cells != cython.NULL:
-        surface.low = surface.high = tables.cells + CELLS * low
+    if tables.nodes != cython.NULL:
+        surface.low = surface.high = tables.nodes + NODES * low
         if blend > 0.0:
-            surface.high = surface.low + CELLS
+            surface.high = surface.low + NODES
     if tables.slopes != cython.NULL:
-        surface.slopes_low = surface.slopes_high = tables.slopes + 2 * CELLS * low
+        surface.slopes_low = surface.slopes_high = tables.slopes + 2 * NODES * low
         if blend > 0.0:
-            surface.slopes_high = surface.slopes_low + 2 * CELLS
+            surface.slopes_high = surface.slopes_low + 2 * NODES
     push.centre_x = one[0] + blend * (other[0] - one[0]) + values.centre_x
     push.centre_y = one[1] + blend * (other[1] - one[1]) + values.centre_y
     square: cython.double = spread * spread

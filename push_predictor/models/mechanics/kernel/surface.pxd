@@ -8,9 +8,9 @@ cdef struct Three:  # a load (force x, y, moment over length), or a twist (vx, v
 
 cdef struct Surface:
     # The limit surface of one push: a blend of two tables, or a power law where there is none.
-    double* low  # 16 numbers per cell of the table
+    double* low  # 4 numbers per node of the table
     double* high
-    double* slopes_low  # their change per unit of a, then of b, of direction-dependent friction; NULL where there is none
+    double* slopes_low  # per node, 4 changes by a, then 4 by b, of direction-dependent friction; NULL where there is none
     double* slopes_high
     double* reach_low  # shares of the length by the direction of the arm
     double* reach_high

@@ -22,8 +22,6 @@ from cython.cimports.push_predictor.models.mechanics.kernel.surface import Actin
 
 AZIMUTHS = cython.declare(cython.int, 144)  # as in load_map, which a test compares
 ELEVATIONS = cython.declare(cython.int, 49)
-CELL = cython.declare(cython.int, 16)
-SLOPES = cython.declare(cython.Py_ssize_t, 144 * 48 * 16)  # from the slopes by a to those by b
 DIRECTIONS = cython.declare(cython.int, 16)  # of arms, over half a turn
 MOST_STRETCH = cython.declare(cython.double, 0.95)  # of (a, b): at 1 the friction along one direction is infinite
 PULL_ROUNDS = cython.declare(cython.int, 4)  # the first is exact on an ellipsoid
@@ -58,14 +56,14 @@ def answer(load: Three, surface: cython.pointer(Surface), root: cython.pointer(R
     # What is not a number has no cell: any, since the answer is no number either.
     column = 0 if column < 0 else (AZIMUTHS - 1 if column > AZIMUTHS - 1 else column)
     row = 0 if row < 0 else (ELEVATIONS - 2 if row > ELEVATIONS - 2 else row)
-    place: cython.Py_ssize_t = CELL * (row * AZIMUTHS + column)
+    place: cython.Py_ssize_t = row * (AZIMUTHS + 1) + column
     right: cython.double = turn - column
     up: cython.double = rise - row
     size: cython.double = sqrt(square + m * m)
-    found: Answer = _of_cell(surface.low + place, _slopes(surface.slopes_low, place, root), root, right, up)
+    found: Answer = _of_cell(surface.low, surface.slopes_low, place, root, right, up)
     found.gauge = size / found.gauge
     if surface.share > 0.0:
-        other: Answer = _of_cell(surface.high + place, _slopes(surface.slopes_high, place, root), root, right, up)
+        other: Answer = _of_cell(surface.high, surface.slopes_high, place, root, right, up)
         found.twist.x += surface.share * (other.twist.x - found.twist.x)
         found.twist.y += surface.share * (other.twist.y - found.twist.y)
         found.twist.m += surface.share * (other.twist.m - found.twist.m)
@@ -80,38 +78,38 @@ def answer(load: Three, surface: cython.pointer(Surface), root: cython.pointer(R
 @cython.nogil
 @cython.exceptval(check=False)
 @cython.inline
-def _slopes(slopes: cython.p_double, place: cython.Py_ssize_t, root: cython.pointer(Root)) -> cython.p_double:
-    return slopes + place if root.needed and slopes != cython.NULL else cython.NULL
+def _of_cell(
+    nodes: cython.p_double,
+    slopes: cython.p_double,
+    place: cython.Py_ssize_t,
+    root: cython.pointer(Root),
+    right: cython.double,
+    up: cython.double,
+) -> Answer:
+    """Unit twist, and in place of the gauge the size of the load on the surface, in the cell above a node."""
+    found: Answer
+    part: cython.double[4]
+    k: cython.Py_ssize_t
+    for k in range(4):
+        part[k] = _between(nodes + 4 * place + k, 4, right, up)
+    if root.needed and slopes != cython.NULL:
+        for k in range(4):
+            by_a: cython.double = _between(slopes + 8 * place + k, 8, right, up)
+            part[k] += root.a * by_a + root.b * _between(slopes + 8 * place + 4 + k, 8, right, up)
+    found.twist.x, found.twist.y, found.twist.m, found.gauge = part[0], part[1], part[2], part[3]
+    return found
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 @cython.inline
-def _of_cell(
-    cell: cython.p_double,
-    slopes: cython.p_double,
-    root: cython.pointer(Root),
-    right: cython.double,
-    up: cython.double,
-) -> Answer:
-    """Unit twist, and in place of the gauge the size of the load on the surface: bilinear polynomials of the cell."""
-    found: Answer
-    both: cython.double = right * up
-    found.twist.x = cell[0] + right * cell[3] + up * cell[6] + both * cell[9]
-    found.twist.y = cell[1] + right * cell[4] + up * cell[7] + both * cell[10]
-    found.twist.m = cell[2] + right * cell[5] + up * cell[8] + both * cell[11]
-    found.gauge = cell[12] + right * cell[13] + up * cell[14] + both * cell[15]
-    if slopes != cython.NULL:
-        nothing: Root
-        nothing.needed = False
-        by_a: Answer = _of_cell(slopes, cython.NULL, cython.address(nothing), right, up)
-        by_b: Answer = _of_cell(slopes + SLOPES, cython.NULL, cython.address(nothing), right, up)
-        found.twist.x += root.a * by_a.twist.x + root.b * by_b.twist.x
-        found.twist.y += root.a * by_a.twist.y + root.b * by_b.twist.y
-        found.twist.m += root.a * by_a.twist.m + root.b * by_b.twist.m
-        found.gauge += root.a * by_a.gauge + root.b * by_b.gauge
-    return found
+def _between(node: cython.p_double, size: cython.Py_ssize_t, right: cython.double, up: cython.double) -> cython.double:
+    """A number of the nodes, `size` of each, interpolated between four of them."""
+    above: cython.p_double = node + size * (AZIMUTHS + 1)
+    across: cython.double = node[size] - node[0]
+    both: cython.double = above[size] - above[0] - across
+    return node[0] + right * across + up * (above[0] - node[0]) + right * up * both
 
 
 @cython.cfunc

@@ -42,7 +42,7 @@ cdef struct Step:
 
 cdef struct Tables:
     # Limit surfaces of all pushes of a batch: see LoadMap.
-    double* cells
+    double* nodes
     double* slopes
     double* quantities
     double power
