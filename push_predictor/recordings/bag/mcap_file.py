@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, TypeAlias
+from typing import BinaryIO, Final, TypeAlias
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, McapRecord, Metadata, MetadataIndex, Schema, Statistics
@@ -38,13 +38,14 @@ from push_predictor.recordings.bag.messages import Dated, Messages, RawMessage, 
 
 _Bytes: TypeAlias = bytes | bytearray
 _Wanted: TypeAlias = dict[int, tuple[str, str]]  # topic and type by channel
-_MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE = struct.Struct("<BQHIQQ")  # with its head
+_MESSAGE_CODE: Final = int(Opcode.MESSAGE)
 _MESSAGE_INDEX = struct.Struct("<HI")
 _DATA_END = struct.Struct("<BQI")
 _FOOTER = struct.Struct("<BQQQI8s")
 _ENDS = {(Opcode.DATA_END, 4), (Opcode.FOOTER, 20)}
-_DESCRIPTIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata}
-_READ = frozenset({*_DESCRIPTIONS, Opcode.MESSAGE})
+_DESCRIPTIONS = {int(Opcode.SCHEMA): Schema, int(Opcode.CHANNEL): Channel, int(Opcode.METADATA): Metadata}
+_READ = frozenset({*_DESCRIPTIONS, _MESSAGE_CODE})
 _WITH_LENGTHS = (Opcode.CHUNK, Opcode.MESSAGE_INDEX)  # state their length twice, which is compared
 _LARGE = 1 << 16  # bytes; a longer record with a doubtful length is not read
 MOST_NOTES = 50  # a file can have a million damaged records
@@ -119,24 +120,31 @@ class McapFile:
         seen, undone, unwanted = 0, 0, set[int]()
         try:
             while at + HEAD.size <= size:
-                opcode, length = HEAD.unpack_from(content, at)
-                start, end = at + HEAD.size, at + HEAD.size + length
+                if (opcode := content[at]) == _MESSAGE_CODE:
+                    if at + _MESSAGE.size > size:
+                        break
+                    _, length, number, _, time, _ = _MESSAGE.unpack_from(content, at)
+                else:
+                    _, length = HEAD.unpack_from(content, at)
+                end = at + HEAD.size + length
                 if end > size:
                     break
-                if opcode == Opcode.MESSAGE:
-                    if length < _MESSAGE.size:
-                        raise ValueError(f"a message has {length} bytes, its header alone needs {_MESSAGE.size}")
+                if opcode == _MESSAGE_CODE:
+                    start = at + _MESSAGE.size
+                    if end < start:
+                        raise ValueError(
+                            f"a message has {length} bytes, its header alone needs {start - at - HEAD.size}"
+                        )
                     seen += 1
-                    number, _, time, _ = _MESSAGE.unpack_from(content, start)
-                    if number in wanted:
+                    if (of := wanted.get(number)) is None:
+                        unwanted.add(number)
+                    else:
                         try:
-                            yield wanted[number], time, self._unpack(content[start + _MESSAGE.size : end])
+                            yield of, time, self._unpack(content[start:end])
                         except UNREADABLE:
                             undone += 1
-                    else:
-                        unwanted.add(number)
                 elif opcode in _DESCRIPTIONS:
-                    channel = self._add(parse(_DESCRIPTIONS[opcode], content[start:end]), offset)
+                    channel = self._add(parse(_DESCRIPTIONS[opcode], content[at + HEAD.size : end]), offset)
                     wanted.update(self._wanted(topics, [channel] if channel else []))
                 at = end
             if at != size and offset != self._cut:

@@ -39,7 +39,7 @@ class ContactSample(NamedTuple):
     gap: float
     height: float
     closing_speed: float
-    force: Array | None
+    force: tuple[float, float] | None
     speed: float
     at_speed: bool
     in_break: bool
@@ -67,7 +67,7 @@ def contact_samples(
         gap.tolist(),
         height.tolist(),
         closing_speed.tolist(),
-        (force if measured else None for force, measured in zip(forces, known.tolist(), strict=True)),
+        ((x, y) if measured else None for x, y, measured in zip(*forces.T.tolist(), known.tolist(), strict=True)),
         speed.tolist(),
         at_speed.tolist(),
         in_break.tolist(),
