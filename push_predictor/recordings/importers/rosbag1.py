@@ -85,12 +85,12 @@ def import_rosbag1(sources: Sequence[Path], staging: Staging, rig: Rig | None = 
 
 
 class _Logged(NamedTuple):
-    """Numbers (n, k) in the messages of a topic that contain them; count: of all its messages.
+    """Numbers (n, k) in the messages of a topic that contain them; messages: how many it has in all.
 
     time, stamp (n,) ns: by the clock of the bag, and in the header, where there is one.
     """
 
-    count: int
+    messages: int
     time: IntArray
     stamp: IntArray
     values: Array
@@ -107,7 +107,7 @@ def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logg
     for topic, paths in fields.items():
         tops = ["header", *(path.partition(".")[0].partition("[")[0] for path in paths)]
         readers[topic] = BlockReader(bag.topics[topic], definitions_of(bag.topics[topic], bag.schemas), tops)
-    counts, parts = Counter[str](), defaultdict[str, list[Array]](list)
+    counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
     for messages in gathered((message[:2], *message[2:]) for message in bag.messages(fields)):
         topic = messages.topic
         for block in readers[topic].blocks(messages):
@@ -185,8 +185,8 @@ def _report(path: Path, netft: _Logged, rig: Rig | None, notes: Notes) -> None:
 def _tracked(path: Path, mocap: _Logged, notes: Notes) -> Samples:
     """x, y (m) and heading of the tracked body."""
     tracked = np.abs(np.linalg.norm(mocap.values[:, 2:], axis=1) - 1.0) < UNIT
-    if lost := mocap.count - int(np.sum(tracked)):
-        notes.dropped.append(f"{path}: /Mocap: {lost} of {mocap.count} frames in which the body was not tracked")
+    if lost := mocap.messages - int(np.sum(tracked)):
+        notes.dropped.append(f"{path}: /Mocap: {lost} of {mocap.messages} frames in which the body was not tracked")
     x, y, *quaternion = mocap.values[tracked].T
     heading = yaw_of_quaternion(*quaternion)
     return Samples(mocap.time[tracked], np.column_stack([MILLIMETRE * x, MILLIMETRE * y, heading]))

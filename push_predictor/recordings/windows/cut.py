@@ -153,7 +153,7 @@ def pusher_motion(pusher: Track, begin: Array) -> tuple[Array, Array]:
 def _rows(first: IntArray, last: IntArray) -> IntArray:
     """The indices from each first to before each last, one after the other."""
     count = last - first
-    return np.arange(int(count.sum())) + np.repeat(first - np.cumsum(count) + count, count)
+    return np.asarray(np.arange(int(count.sum())) + np.repeat(first - np.cumsum(count) + count, count))
 
 
 def _means(values: Array, count: IntArray) -> Array:
@@ -186,7 +186,7 @@ def _faults(rig: Rig, motions: _Motions) -> list[str]:
     before, after = (rig.outline.project(to_body(motions.tips[k], motions.poses[k])).distance for k in (0, 1))
     entered = before - after > np.maximum(ENTERED, ENTERED_SHARE * driven)
     outran = moved > OUTRAN + OUTRAN_SHARE * driven
-    return np.where(entered, "left_behind", np.where(outran, "outran", "")).tolist()
+    return list(np.where(entered, "left_behind", np.where(outran, "outran", "")))
 
 
 def _window(
