@@ -20,9 +20,8 @@ from push_predictor.online.child_process import start_child
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording, joined
+from push_predictor.recordings.streams import Recording, joined, set_back
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.clock_set import set_back
 
 NICENESS = 5  # the samples come first; on a busy machine a lower priority would never be served
 PENDING = "not checked yet"

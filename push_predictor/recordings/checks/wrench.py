@@ -14,7 +14,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity
+from push_predictor.recordings.checks.motion import Motion, body_velocity, sums_by_push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -169,7 +169,7 @@ def _slope(inputs: Array, values: Array, push: IntArray) -> tuple[float, float]:
         coefficients = bread @ (inputs.T @ (weight * values))
         error = values - inputs @ coefficients
         weight = 1.0 / np.sqrt(1.0 + (error / OUTLYING) ** 2)
-    scores = np.array([inputs[push == one].T @ (weight * error)[push == one] for one in np.unique(push)])
+    scores = sums_by_push(inputs * (weight * error)[:, None], push)
     return float(coefficients[0]), float(np.sqrt((bread @ scores.T @ scores @ bread)[0, 0]))
 
 
