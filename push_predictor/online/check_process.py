@@ -16,9 +16,8 @@ from push_predictor.online.child_process import Child
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording, joined
+from push_predictor.recordings.streams import Recording, joined, set_back
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.clock_set import set_back
 
 PENDING = "not checked yet"
 FIRST = 1000  # samples of the slider's pose before the first check

@@ -1,11 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How long a stream may be without a sample until that counts as a dropout; read and live streams alike."""
+"""When a stream has a dropout, and when its clock was set back; read and live streams alike."""
 
 NANOSECOND = 1e-9  # s
 SHORTEST_DROPOUT = 0.020  # s
 DROPOUT_PERIODS = 4.0  # usual intervals between two samples
+CLOCK_SET = 1_000_000_000  # ns by which stamps go back where a replay loops, or a simulation is restarted
 
 
 def longest_interval(period: float) -> float:

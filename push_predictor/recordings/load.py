@@ -15,7 +15,7 @@ import numpy as np
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
-from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
+from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, rig_path
@@ -56,13 +56,11 @@ def load_data(
     return concatenate([table for table in distinct_pushes(names, tables) if len(table)])
 
 
-def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
-    """The rig of the data: from rig_file if given, else from the recordings and the tables' NAME.rig.yaml.
+def load_rig_for(paths: Sequence[Path]) -> Rig:
+    """The rig of the data, from the recordings and the tables' NAME.rig.yaml.
 
     These must have the same outline and pusher. Raises RigError that names the path, the key and how to give it.
     """
-    if rig_file is not None:
-        return load_rig(Path(rig_file))
     if not paths:
         raise RigError(f"{RECORD_NAME}: neither data nor a rig was given; {HOW_TO_GIVE}")
     first, *others = [(path, required_rig(Path(path))) for path in paths]

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
@@ -66,6 +67,11 @@ def joined(streams: Sequence[Stream]) -> Stream:
         name: None if any(part is None for part in parts) else np.concatenate(parts) for name, parts in columns.items()
     }
     return replace(streams[0], **whole)
+
+
+def set_back(before: PoseStream, after: PoseStream) -> bool:
+    """Whether the clock was set back between two portions of a stream."""
+    return len(before) > 0 and len(after) > 0 and int(before.stamp[-1]) - int(after.stamp[0]) > CLOCK_SET
 
 
 @dataclass(frozen=True, eq=False)

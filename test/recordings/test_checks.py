@@ -40,10 +40,13 @@ from mistakes import (
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import swapped
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
@@ -56,6 +59,10 @@ PUSHED = ("circle_pu", ONE_SIDE)  # whose forces are altered
 SLIDERS = [name for name in BAGS if name != "square_abs_train"]  # which has the slider and surface of another
 FURTHER = ["ellipse_plywood", ONE_SIDE]  # the mistakes of a third are in the list
 FURTHER_PUSHED = ["circle_pu"]
+
+
+def of_force(recording: Recording, rig: Rig) -> list[Finding]:
+    return wrench_findings(motion_of(recording, rig), rig)
 
 
 def bag_apothem(name: str) -> float:
@@ -316,7 +323,7 @@ def test_a_heading_in_degrees_is_refused(name: str) -> None:
     lambda recording: force_constant(recording, 2.0),
 ])  # fmt: skip
 def test_a_force_that_has_nothing_to_do_with_the_push_is_named(name: str, alter: Mistake) -> None:
-    (finding,) = wrench_findings(alter(sample(name)), rig_of(name))
+    (finding,) = of_force(alter(sample(name)), rig_of(name))
     assert (finding.name, finding.severity) == ("wrench_unrelated", "warning")
 
 
@@ -327,26 +334,26 @@ def test_a_force_that_has_nothing_to_do_with_the_push_is_named(name: str, alter:
 ])  # fmt: skip
 def test_a_force_that_is_absent_or_in_another_unit_is_named(name: str, factor: float, finding: str) -> None:
     """In N, kN, kgf, gf or mN."""
-    assert [each.name for each in wrench_findings(force_scaled(sample(name), factor), rig_of(name))] == [finding]
+    assert [each.name for each in of_force(force_scaled(sample(name), factor), rig_of(name))] == [finding]
 
 
 def test_a_slider_of_unknown_mass_may_be_light_or_heavy() -> None:
     anything = replace(rig_of(SMALL), object_mass=None)
-    assert all(wrench_findings(force_scaled(bag(SMALL), factor), anything) == [] for factor in (0.1, 30.0))
+    assert all(of_force(force_scaled(bag(SMALL), factor), anything) == [] for factor in (0.1, 30.0))
 
 
 def test_the_force_of_a_light_slider_is_judged_by_its_weight() -> None:
     """The forces that a slider of 98 g with this friction gives, of 0.12 N in the median."""
     light = replace(rig_of(SMALL), object_mass=rig_of(SMALL).object_mass / 10.0)
-    assert wrench_findings(force_scaled(bag(SMALL), 0.1), light) == []
-    assert wrench_findings(force_scaled(bag(SMALL), 0.1), rig_of(SMALL)) != []
+    assert of_force(force_scaled(bag(SMALL), 0.1), light) == []
+    assert of_force(force_scaled(bag(SMALL), 0.1), rig_of(SMALL)) != []
 
 
 def test_without_friction_any_force_below_three_weights_is_plausible() -> None:
     unknown = replace(rig_of(SMALL), surface_friction=None)
-    assert wrench_findings(force_scaled(bag(SMALL), 20.0), unknown) == []
-    assert [each.name for each in wrench_findings(force_scaled(bag(SMALL), 30.0), unknown)] == ["wrench_units"]
-    assert [each.name for each in wrench_findings(force_scaled(bag(SMALL), 6.0), rig_of(SMALL))] == ["wrench_units"]
+    assert of_force(force_scaled(bag(SMALL), 20.0), unknown) == []
+    assert [each.name for each in of_force(force_scaled(bag(SMALL), 30.0), unknown)] == ["wrench_units"]
+    assert [each.name for each in of_force(force_scaled(bag(SMALL), 6.0), rig_of(SMALL))] == ["wrench_units"]
 
 
 @pytest.mark.parametrize("name", MISTAKES)

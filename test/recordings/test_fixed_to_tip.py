@@ -13,6 +13,7 @@ from mistakes import on_hand, stream_part
 from synthetic import RADIUS, Push, translating_push
 
 from push_predictor.recordings.checks.check import fixed_to_tip
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import Recording
 
@@ -22,7 +23,7 @@ AHEAD = np.array([1.0, 0.0])  # the direction of the push, against the first sid
 
 
 def refused(recording: Recording) -> bool:
-    return fixed_to_tip(recording, require_rig(recording)) is not None
+    return fixed_to_tip(motion_of(recording, require_rig(recording)), require_rig(recording)) is not None
 
 
 def trimmed(recording: Recording) -> Recording:
@@ -41,7 +42,8 @@ def test_a_slider_that_is_pushed_from_first_to_last_is_no_body_on_the_hand(cut: 
 def test_a_body_that_never_touches_the_tip_is_refused_without_a_way_back() -> None:
     push = trimmed(translating_push(LONG))
     assert not refused(on_hand(push, tuple(TOUCHING * AHEAD)))  # nothing distinguishes it from a slider
-    finding = fixed_to_tip(on_hand(push, tuple((TOUCHING + 0.03) * AHEAD)), require_rig(push))
+    rig = require_rig(push)
+    finding = fixed_to_tip(motion_of(on_hand(push, tuple((TOUCHING + 0.03) * AHEAD)), rig), rig)
     assert finding is not None and finding.name == "another_body" and finding.severity == "refused"
     assert finding.values["spread"].value < 1e-3
 

@@ -107,6 +107,7 @@ def test_mcube_bag_has_the_frames_of_the_text_files(tmp_path: Path) -> None:
     recording = read_recording(report.written[0])
     assert recording.rig is not None and recording.rig.shape == "steel_block" and recording.wrench is not None
     gap = recording.slider.y[200] - np.interp(recording.slider.stamp[200], recording.pusher.stamp, recording.pusher.y)
+    assert not any("out of order" in each for each in report.repaired)
     assert gap == pytest.approx(0.0489 + 0.004745, abs=1e-5)
     assert recording.wrench.fy[250] == pytest.approx(-2.0) and recording.wrench.fx[250] == pytest.approx(0.0)
 

@@ -23,6 +23,7 @@ from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.outline_findings import outline_findings
 from push_predictor.recordings.checks.outline_fit import fit_outline
 from push_predictor.recordings.rig import Rig
@@ -220,7 +221,7 @@ def test_a_tracker_with_noise_and_offsets_gives_no_finding(name: str) -> None:
 
 @pytest.mark.parametrize(("off", "names"), [(0.0007, []), (0.0015, ["outline_shape"])])
 def test_a_single_push_needs_to_be_far_off(off: float, names: list[str]) -> None:
-    contacts, rig = contacts_of(bag(ROUND), rig_of(ROUND)), rig_of(ROUND)
+    contacts, rig = contacts_of(motion_of(bag(ROUND), rig_of(ROUND))), rig_of(ROUND)
     assert contacts is not None
     away = np.where(contacts.push == contacts.push[-1], off, 0.0) / np.linalg.norm(contacts.tips, axis=1)
     moved = replace(contacts, tips=contacts.tips * (1.0 + away[:, None]))

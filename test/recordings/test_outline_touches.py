@@ -13,6 +13,7 @@ from checked_bags import bag, rig_of
 
 from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem
 
 CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06])
@@ -21,7 +22,7 @@ NEAR_CORNERS = 0.02  # share of the tips whose nearest side changes within a ste
 
 
 def problem_of(name: str, turn: float = 0.0) -> Problem:
-    rig, contacts = rig_of(name), contacts_of(bag(name), rig_of(name))
+    rig, contacts = rig_of(name), contacts_of(motion_of(bag(name), rig_of(name)))
     assert contacts is not None
     return Problem(contacts, replace(rig, outline=transformed(rig.outline, turn)), SIMILARITY)
 

@@ -16,9 +16,11 @@ from synthetic import START, Push, moved, pose_stream, rows, stamps, translating
 
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.contact import ContactSample
+from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_segmenter import TARE_SAMPLES, PushSegmenter
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
+from push_predictor.recordings.windows.track import Track
 
 
 def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
@@ -191,22 +193,22 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
 @pytest.mark.parametrize("gap", [0.0005, 0.1])  # at rest in contact, moving freely
 def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> None:
     segmenter = PushSegmenter(WindowOptions())
-    rest = ContactSample(0, 0.0, gap, 0.0, 0.0, np.zeros(2), 0.0, False, False, False, False)
+    rest = ContactSample(0, 0.0, gap, 0.0, 0.0, (0.0, 0.0), 0.0, False, False, False, False)
     for k, force in enumerate([*np.full(20, 1.0), *np.linspace(1.0, 2.0, TARE_SAMPLES)]):
-        segmenter.step(rest._replace(stamp=4_000_000 * k, time=0.004 * k, force=np.array([force, 0.0])))
-    pushing = rest._replace(gap=0.0005, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
+        segmenter.step(rest._replace(stamp=4_000_000 * k, time=0.004 * k, force=(force, 0.0)))
+    pushing = rest._replace(gap=0.0005, force=(5.0, 0.0), speed=0.02, at_speed=True)
     segmenter.step(pushing._replace(stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
     assert segmenter.push is not None and segmenter.push.tare is not None
-    np.testing.assert_allclose(segmenter.push.tare, [1.5, 0.0])
+    assert segmenter.push.tare == pytest.approx((1.5, 0.0))
 
 
 def test_a_window_may_end_with_the_last_sample_of_a_push() -> None:
     segmenter, period, found = PushSegmenter(WindowOptions(duration=0.2)), 10_000_000, []
-    free = ContactSample(0, 0.0, 0.1, 0.0, 0.0, np.zeros(2), 0.0, False, False, False, False)
+    free = ContactSample(0, 0.0, 0.1, 0.0, 0.0, (0.0, 0.0), 0.0, False, False, False, False)
     for k in range(26):  # five in free motion, then a window of 20 periods from the sixth to the last
-        sample = free if k < 5 else free._replace(gap=0.0, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
+        sample = free if k < 5 else free._replace(gap=0.0, force=(5.0, 0.0), speed=0.02, at_speed=True)
         found += segmenter.step(sample._replace(stamp=k * period, time=1e-9 * k * period))
-    assert found == [(5 * period, 25 * period)]
+    assert [each[:2] for each in found] == [(5 * period, 25 * period)]
 
 
 def test_two_contacts_are_two_pushes() -> None:
@@ -228,9 +230,11 @@ def test_two_contacts_are_two_pushes() -> None:
     both = replace(
         first, slider=joined(first.slider, second.slider), pusher=joined(first.pusher, second.pusher), wrench=wrench
     )
-    table = windows_to_table(windows_of(both))
-    assert len(table.pushes) == 2
-    assert len(table) == 2 * len(windows_of(first))
+    windows, of_one = windows_of(both), len(windows_of(first))
+    assert len(windows_to_table(windows).pushes) == 2
+    assert [window.index for window in windows] == 2 * list(range(of_one))
+    slid = np.cumsum([0.0, *(np.hypot(*window.displacement[:2]) for window in windows)])
+    assert [window.covariates["slid_distance"] for window in windows] == pytest.approx(slid[:-1])
 
 
 def test_short_stride_gives_overlapping_windows() -> None:
@@ -274,14 +278,34 @@ def test_contact_at_a_vertex_belongs_to_the_edge_it_slid_along() -> None:
     # The slider recedes as fast as the tip advances, while the tip slides along the first side and beyond its end.
     speed = 0.025
     advance = speed * (time - 0.5)
-    y = -0.035 - speed * np.clip(time - 0.5, 0.0, 0.52)
+    y = -0.035 - speed * np.clip(time - 0.5, 0.0, 0.6)  # there it faces the next side more
     pusher = pose_stream(time, np.column_stack([advance - 0.045 - rig.pusher_radius, y]), np.zeros_like(time))
     slider = pose_stream(time, np.column_stack([advance, np.zeros_like(time)]), np.zeros_like(time))
     sliding = replace(recording, slider=slider, pusher=pusher, wrench=None)
-    table = windows_to_table(windows_of(sliding, WindowOptions(touch_gap_alone=0.002)))
+    table = windows_to_table(windows_of(sliding, WindowOptions(touch_gap_alone=0.003)))
     beyond = table.inputs[:, 1] > 0.2499
     assert np.sum(beyond) >= 2
     assert np.all(table.covariates["edge"] == 0.0) and np.all(table.inputs[:, 1] < 0.25)
+
+
+def test_the_force_on_the_slider_is_along_the_normal_and_to_its_left() -> None:
+    recording = translating_push()
+    assert recording.wrench is not None
+    sideways = replace(recording.wrench, fy=np.where(recording.wrench.fx != 0.0, 0.5, 0.0))
+    for window in windows_of(replace(recording, wrench=sideways)):
+        assert window.covariates["normal_force"] > 0.0
+        assert window.covariates["tangential_force"] == pytest.approx(-0.5)
+
+
+def test_lines_through_the_tip_give_its_place_and_velocity_between_samples() -> None:
+    pusher = Track(3, position=True)
+    time = np.arange(100) * 0.004
+    tip = np.column_stack([0.03 * time, 0.1 - 0.02 * time, 0.0 * time])
+    pusher.extend(pusher.order.take(np.rint(1e9 * time).astype(np.int64), tip, True), 0)
+    begin = np.array([0.0413, 0.2001, 0.3])
+    place, velocity = pusher_motion(pusher, begin)
+    np.testing.assert_allclose(place, np.column_stack([0.03 * begin, 0.1 - 0.02 * begin]), atol=1e-12)
+    np.testing.assert_allclose(velocity, np.tile([0.03, -0.02], (3, 1)), atol=1e-10)
 
 
 def test_memory_stays_bounded_over_a_long_stream() -> None:

@@ -11,12 +11,16 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator
+from array import array
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
 from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, TypeAlias
+from typing import BinaryIO, Final, TypeAlias
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, McapRecord, Metadata, MetadataIndex, Schema, Statistics
 from mcap.stream_reader import StreamReader
@@ -34,20 +38,60 @@ from push_predictor.recordings.bag.mcap_records import (
     read_at,
     unpack_chunk,
 )
-from push_predictor.recordings.bag.messages import Dated, Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import Messages, RawMessage
+from push_predictor.types import IntArray
 
 _Bytes: TypeAlias = bytes | bytearray
-_Wanted: TypeAlias = dict[int, tuple[str, str]]  # topic and type by channel
-_MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE = struct.Struct("<BQHIQQ")  # with its head
+_MESSAGE_CODE: Final = int(Opcode.MESSAGE)
+_PLACE = struct.Struct("=4Q")  # of _Page.places
 _MESSAGE_INDEX = struct.Struct("<HI")
 _DATA_END = struct.Struct("<BQI")
 _FOOTER = struct.Struct("<BQQQI8s")
 _ENDS = {(Opcode.DATA_END, 4), (Opcode.FOOTER, 20)}
-_DESCRIPTIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata}
-_READ = frozenset({*_DESCRIPTIONS, Opcode.MESSAGE})
+_DESCRIPTIONS = {int(Opcode.SCHEMA): Schema, int(Opcode.CHANNEL): Channel, int(Opcode.METADATA): Metadata}
+_READ = frozenset({*_DESCRIPTIONS, _MESSAGE_CODE})
 _WITH_LENGTHS = (Opcode.CHUNK, Opcode.MESSAGE_INDEX)  # state their length twice, which is compared
 _LARGE = 1 << 16  # bytes; a longer record with a doubtful length is not read
 MOST_NOTES = 50  # a file can have a million damaged records
+
+
+class _Page:
+    """Consecutive records, and the messages among them.
+
+    places: channel, time, begin and end in `records` of one message after the other. undone: number of messages that
+    cannot be decompressed, by the offset of their record or chunk.
+    """
+
+    def __init__(self) -> None:
+        self.records: _Bytes = b""
+        self.places = array("Q")
+        self.undone: Counter[int] = Counter()
+        self._begins, self._offsets = list[int](), list[int]()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the records."""
+        return len(self.records)
+
+    def add(self, content: _Bytes, offset: int) -> None:
+        """Add records from an offset of the file."""
+        if content:
+            self._begins.append(self.size)
+            self._offsets.append(offset)
+            self.records = self.records + content if self.records else content
+
+    def offset_of(self, place: int) -> int:
+        """Where in the file the records at a place begin."""
+        return self._offsets[bisect_right(self._begins, place) - 1]
+
+    def joined(self, start: IntArray, length: IntArray) -> bytes:
+        """Parts of the records one after the other; most messages of a topic have one length."""
+        if (length == length[0]).all():
+            bytes_from = np.lib.stride_tricks.sliding_window_view(np.frombuffer(self.records, np.uint8), int(length[0]))
+            return bytes_from[start].tobytes()
+        spans = zip(start.tolist(), (start + length).tolist(), strict=True)
+        return b"".join([self.records[begin:end] for begin, end in spans])
 
 
 class McapFile:
@@ -80,80 +124,104 @@ class McapFile:
         with path.open("rb") as stream:
             complete = self._read_end(stream)
         if not complete:
-            for _ in self.messages(topics=()):
-                pass
+            for page in self._pages(topics=()):
+                self._leave(page)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note.
 
         One chunk at a time is in memory.
         """
-        return (RawMessage(*of, time, data) for of, time, data in self._read(topics))
+        for page in self._pages(topics):
+            wanted = self._wanted(topics)
+            for number, time, start, end in _PLACE.iter_unpack(page.places):
+                if number in wanted and (data := self._unpacked(page, start, end)) is not None:
+                    yield RawMessage(*wanted[number], time, data)
+            self._leave(page)
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """The same of the given topics, those of a topic and type at once."""
-        return gathered(self._read(topics))
+        for page in self._pages(topics):
+            places = np.frombuffer(page.places, np.int64).reshape(-1, 4)  # damaged times have more than 63 bits
+            for number, of in self._wanted(topics).items():
+                _, time, start, end = places[places[:, 0] == number].T
+                if self._unpack is bytes and len(time):
+                    yield Messages(*of, time, page.joined(start, end - start), end - start)
+                elif len(time):
+                    spans = zip(start.tolist(), end.tolist(), strict=True)
+                    data = {row: self._unpacked(page, *span) for row, span in enumerate(spans)}
+                    known = {row: each for row, each in data.items() if each is not None}
+                    yield Messages.of(*of, time[list(known)], list(known.values()))
+            self._leave(page)
 
-    def _read(self, topics: Collection[str] | None) -> Iterator[Dated]:
-        wanted = self._wanted(topics, self._channels.values())
-        seen, chunks = 0, list[int]()
+    def _pages(self, topics: Collection[str] | None) -> Iterator[_Page]:
+        """All records: those of a chunk as a page, others as pages of some length."""
+        seen, chunks, page = 0, list[int](), _Page()
         with self.path.open("rb") as stream:
             for opcode, offset, content in self._records(stream):
                 if opcode == Opcode.DATA_END:
                     self._check_end(stream, offset, chunks)
                 elif opcode == Opcode.CHUNK:
                     chunks.append(offset)
-                seen += yield from self._messages(content, offset, topics, wanted)
+                seen += self._find(content, offset, page, topics)
+                page.add(content, offset)
                 del content  # before the next chunk is read
+                if opcode == Opcode.CHUNK or page.size >= _LARGE:
+                    yield page
+                    page = _Page()
+            yield page
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
-    def _messages(
-        self, content: _Bytes, offset: int, topics: Collection[str] | None, wanted: _Wanted
-    ) -> Generator[Dated, None, int]:
-        """The wanted messages among consecutive records; returns the number of all messages.
+    def _find(self, content: _Bytes, offset: int, page: _Page, topics: Collection[str] | None) -> int:
+        """Add the places of the messages among consecutive records to a page; returns their number.
 
         The channels, schemas and metadata among the records are stored.
         """
-        size, at = len(content), 0
-        seen, undone, unwanted = 0, 0, set[int]()
+        size, at, base, before = len(content), 0, page.size, len(page.places)
+        head, least, unpack, found = HEAD.size, _MESSAGE.size, _MESSAGE.unpack_from, page.places.extend
         try:
-            while at + HEAD.size <= size:
-                opcode, length = HEAD.unpack_from(content, at)
-                start, end = at + HEAD.size, at + HEAD.size + length
-                if end > size:
+            while at + head <= size:
+                start = at
+                if content[start] != _MESSAGE_CODE:
+                    opcode, length = HEAD.unpack_from(content, start)
+                    if (at := start + head + length) <= size and opcode in _DESCRIPTIONS:
+                        self._add(parse(_DESCRIPTIONS[opcode], content[start + head : at]), offset)
+                elif start + least <= size:
+                    _, length, number, _, time, _ = unpack(content, start)
+                    if length < least - head:
+                        raise ValueError(f"a message has {length} bytes, its header alone needs {least - head}")
+                    if (at := start + head + length) <= size:
+                        found((number, time, base + start + least, base + at))
+                else:
                     break
-                if opcode == Opcode.MESSAGE:
-                    if length < _MESSAGE.size:
-                        raise ValueError(f"a message has {length} bytes, its header alone needs {_MESSAGE.size}")
-                    seen += 1
-                    number, _, time, _ = _MESSAGE.unpack_from(content, start)
-                    if number in wanted:
-                        try:
-                            yield wanted[number], time, self._unpack(content[start + _MESSAGE.size : end])
-                        except UNREADABLE:
-                            undone += 1
-                    else:
-                        unwanted.add(number)
-                elif opcode in _DESCRIPTIONS:
-                    channel = self._add(parse(_DESCRIPTIONS[opcode], content[start:end]), offset)
-                    wanted.update(self._wanted(topics, [channel] if channel else []))
-                at = end
             if at != size and offset != self._cut:
-                raise ValueError(f"the last whole record of a chunk ends at byte {at} of {size}")
+                raise ValueError(f"the last record of a chunk ends at byte {at} of {size}")
         except UNREADABLE as error:
             self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
-        if undone:
-            self._note(offset, f"{undone} messages cannot be decompressed and were skipped")
-        for number in sorted(unwanted):
+        for number in sorted(set(page.places[before::4])):
             self._check_unwanted(number, topics, offset)
-        return seen
+        return (len(page.places) - before) // 4
+
+    def _unpacked(self, page: _Page, start: int, end: int) -> bytes | None:
+        """A message as CDR, None if it cannot be decompressed."""
+        try:
+            return self._unpack(page.records[start:end])
+        except UNREADABLE:
+            page.undone[page.offset_of(start)] += 1
+            return None
+
+    def _leave(self, page: _Page) -> None:
+        """Note what could not be decompressed; the next chunk is read when this one is no longer in memory."""
+        for offset, count in page.undone.items():
+            self._note(offset, f"{count} messages cannot be decompressed and were skipped")
+        page.records = b""
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a message that is wanted but cannot be decoded; others are ignored."""
         if (known := self._channels.get(channel)) is None:
             self._note(offset, f"channel {channel} has no description; its messages were skipped")
-        elif topics and known.topic in topics:
+        elif topics and known.topic in topics and known.message_encoding != "cdr":
             self._note(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
 
     # --- the records of the data ---
@@ -229,16 +297,16 @@ class McapFile:
 
     # --- descriptions ---
 
-    def _wanted(self, topics: Collection[str] | None, channels: Iterable[Channel]) -> _Wanted:
-        """The CDR channels among those given, of all topics or of the given ones."""
+    def _wanted(self, topics: Collection[str] | None) -> dict[int, tuple[str, str]]:
+        """Topic and type by CDR channel, of all topics or of the given ones."""
         return {
             channel.id: (channel.topic, self._types.get(channel.schema_id, ""))
-            for channel in channels
+            for channel in self._channels.values()
             if channel.message_encoding == "cdr" and (topics is None or channel.topic in topics)
         }
 
-    def _add(self, record: McapRecord, offset: int) -> Channel | None:
-        """Store a description; returns the first description of a channel."""
+    def _add(self, record: McapRecord, offset: int) -> None:
+        """Store a description, of a channel the first."""
         if isinstance(record, Schema):
             self._types.setdefault(record.id, record.name)
             self.schemas.setdefault(record.name, record.data.decode(errors="replace"))
@@ -250,8 +318,6 @@ class McapFile:
                 self._note(offset, f"channel {record.id} has a second, different description; the first one is used")
             self.topics.setdefault(known.topic, self._types.get(known.schema_id, ""))
             self.qos.setdefault(known.topic, known.metadata.get("offered_qos_profiles", ""))
-            return known
-        return None
 
     # --- the end of the file ---
 

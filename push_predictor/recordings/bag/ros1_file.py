@@ -16,7 +16,7 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.messages import RawMessage
 
 MAGIC = b"#ROSBAG"
-DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
+_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
 _CAPITAL_PACKAGE = re.compile(r"\b([A-Z]\w*)/")  # allowed in ROS 1, not in ROS 2, which rosbags follows
 
 
@@ -31,7 +31,7 @@ class Ros1File:
         self.notes: list[str] = []
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, Mapping[str, str]] = {}
-        with opened_ros1(path) as reader:
+        with _opened(path) as reader:
             from rosbags.typesys import Stores, get_typestore
 
             # The types of ROS 2, because their headers have no `seq`, which rosbags then leaves out.
@@ -45,7 +45,7 @@ class Ros1File:
         from rosbags.serde import SerdeError
 
         read = undone = 0
-        with opened_ros1(self.path) as reader:
+        with _opened(self.path) as reader:
             wanted = [c for c in reader.connections if topics is None or c.topic in topics]
             messages = reader.messages(connections=wanted) if wanted else iter(())
             while True:
@@ -53,14 +53,14 @@ class Ros1File:
                     c, time, data = next(messages)
                 except StopIteration:
                     break
-                except (ReaderError, *DAMAGE) as error:
+                except (ReaderError, *_DAMAGE) as error:
                     self._note(f"damaged after {read} messages ({error or type(error).__name__}); the rest is not read")
                     break
                 read += 1
-                kind = lower_package(c.msgtype)
+                kind = _lower_package(c.msgtype)
                 try:
                     yield RawMessage(c.topic, kind, time, bytes(self._store.ros1_to_cdr(data, kind)))
-                except (SerdeError, *DAMAGE):
+                except (SerdeError, *_DAMAGE):
                     undone += 1
         if undone:
             self._note(f"{undone} messages do not fit the definition of their type and were skipped")
@@ -69,12 +69,12 @@ class Ros1File:
         """The type of a connection, known to the store from now on."""
         from rosbags.typesys import TypesysError, get_types_from_msg
 
-        kind = lower_package(connection.msgtype)
+        kind = _lower_package(connection.msgtype)
         if kind not in self._store.types:
             try:
-                found = get_types_from_msg(lower_package(connection.msgdef.data), kind)
+                found = get_types_from_msg(_lower_package(connection.msgdef.data), kind)
                 self._store.register({name: fields for name, fields in found.items() if name not in self._store.types})
-            except (TypesysError, *DAMAGE) as error:
+            except (TypesysError, *_DAMAGE) as error:
                 self._note(f"{connection.topic}: the definition of {kind} cannot be read ({error})")
         return kind
 
@@ -87,7 +87,7 @@ class Ros1File:
 
 
 @contextmanager
-def opened_ros1(path: Path) -> Iterator[Any]:
+def _opened(path: Path) -> Iterator[Any]:
     """An open `rosbags` reader of a ROS 1 bag.
 
     Raises RecordingError without the package, and for a file that is missing or cannot be opened.
@@ -101,7 +101,7 @@ def opened_ros1(path: Path) -> Iterator[Any]:
     try:
         reader = Reader(path)
         reader.open()
-    except (ReaderError, *DAMAGE) as error:
+    except (ReaderError, *_DAMAGE) as error:
         raise RecordingError(f"{path}: the ROS 1 bag cannot be opened ({error})") from None
     try:
         yield reader
@@ -109,6 +109,6 @@ def opened_ros1(path: Path) -> Iterator[Any]:
         reader.close()
 
 
-def lower_package(text: str) -> str:
+def _lower_package(text: str) -> str:
     """A type's name or definition with packages in lower case."""
     return _CAPITAL_PACKAGE.sub(lambda match: match[1].lower() + "/", text)

@@ -33,13 +33,14 @@ def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
     """The probable mistakes of a recording, none if it is sound. Wrong units hide the other mistakes."""
     if wrong_units := stream_units(recording, rig):
         return tuple(wrong_units)
-    if held := fixed_to_tip(recording, rig):
+    motion = motion_of(recording, rig)
+    if held := fixed_to_tip(motion, rig):
         return (held,)
     oriented = orientation_finding(recording.slider)
     # A tip has a constant heading too: the exchange of topics explains more.
-    if oriented is not None and oriented.severity == "refused" and not tip_follows(recording, rig):
+    if oriented is not None and oriented.severity == "refused" and not tip_follows(motion, recording, rig):
         return (oriented,)
-    frames = frame_findings(recording, rig)
+    frames = frame_findings(recording, rig, motion)
     if any(finding.name == "topics_swapped" for finding in frames):
         return tuple(frames)
     if oriented is not None and oriented.severity == "refused":
@@ -48,7 +49,7 @@ def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
         return tuple(frames)
     found = frames if oriented is None else [oriented, *frames]
     outlined = all(finding.severity == "note" for finding in found)
-    return (*found, *wrench_findings(recording, rig, outlined), *_stamp_findings(recording))
+    return (*found, *wrench_findings(motion, rig, outlined), *_stamp_findings(recording))
 
 
 def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:
@@ -56,13 +57,13 @@ def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]
     return tuple(table_units(table, rig) or table_signs(table, rig))
 
 
-def fixed_to_tip(recording: Recording, rig: Rig) -> Finding | None:
+def fixed_to_tip(motion: Motion | None, rig: Rig) -> Finding | None:
     """A refusal if the tracked body is fixed to the robot's hand instead of lying on the surface.
 
     In the frame of such a body the tip rests, also while it is lifted, or moves away from the body. A pushed slider
     stays where it is then.
     """
-    if (motion := motion_of(recording, rig)) is None or not motion.moving.any():
+    if motion is None or not motion.moving.any():
         return None
     tips = to_body(motion.tip, motion.slider)
     place, spread = np.median(tips, axis=0), _spread(tips)

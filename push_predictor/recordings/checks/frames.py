@@ -16,7 +16,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
 from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
 from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
 from push_predictor.recordings.rig import Rig
@@ -73,28 +73,33 @@ MIRRORS = {
 }
 
 
-def frame_findings(recording: Recording, rig: Rig) -> list[Finding]:
-    """Findings about topics, frames, outline and clocks. Lengths in m, angles in rad, times in s."""
-    if (contacts := contacts_of(recording, rig)) is None:
-        return _without_contact(recording, rig)
+def frame_findings(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
+    """Findings about topics, frames, outline and clocks. Lengths in m, angles in rad, times in s.
+
+    motion: that of the recording.
+    """
+    if (contacts := contacts_of(motion)) is None:
+        return _without_contact(recording, rig, motion)
     fit = fit_outline(contacts, rig)
-    if rig.outline.rotational_symmetry == 0 and _leads(recording, rig) > AT_REST > 3.0 * _leads(
-        swapped(recording), rig
+    if rig.outline.rotational_symmetry == 0 and _leads(motion) > AT_REST > 3.0 * _leads(
+        motion_of(swapped(recording), rig)
     ):
         return [_swapped(fit.gap)]
     if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
     if fit.gap >= LARGE_GAP or _is_implausible(fit, rig):
-        return _findings_of_large_gap(recording, rig, contacts, fit)
+        return _findings_of_large_gap(recording, rig, motion, contacts, fit)
     found = outline_findings(contacts, rig, fit)
     return found and (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found)
 
 
-def _findings_of_large_gap(recording: Recording, rig: Rig, contacts: Contacts, fit: OutlineFit) -> list[Finding]:
+def _findings_of_large_gap(
+    recording: Recording, rig: Rig, motion: Motion | None, contacts: Contacts, fit: OutlineFit
+) -> list[Finding]:
     """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
     far = FAR * rig.outline.reach
     explained = min(BETTER * fit.gap, far)
-    if tip_follows(recording, rig) and _gap(swapped(recording), rig) < explained:
+    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < explained:
         return [_swapped(fit.gap)]
     mirrors = _mirror_gaps(contacts, rig)
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
@@ -116,9 +121,8 @@ def swapped(recording: Recording) -> Recording:
     return replace(recording, slider=recording.pusher, pusher=recording.slider)
 
 
-def contacts_of(recording: Recording, rig: Rig) -> Contacts | None:
+def contacts_of(motion: Motion | None) -> Contacts | None:
     """The samples in contact, None if there are too few."""
-    motion = motion_of(recording, rig)
     if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
         return None
     touch = motion.contact
@@ -128,7 +132,7 @@ def contacts_of(recording: Recording, rig: Rig) -> Contacts | None:
 
 def _gap(recording: Recording, rig: Rig) -> float:
     """The gap (m) that the best plausible correction leaves, infinity without one."""
-    contacts = contacts_of(recording, rig)
+    contacts = contacts_of(motion_of(recording, rig))
     return np.inf if contacts is None else _gap_of(contacts, rig)
 
 
@@ -151,20 +155,19 @@ def _gap_as_recorded(contacts: Contacts, rig: Rig) -> float:
     return float(np.median(np.abs(rig.outline.project(contacts.tips).distance - rig.pusher_radius)))
 
 
-def _leads(recording: Recording, rig: Rig) -> float:
+def _leads(motion: Motion | None) -> float:
     """Share of the slider's motion while the tip rests. A circle and its tip exchanged leave the same gap."""
-    motion = motion_of(recording, rig)
     if motion is None or not motion.moving.any():
         return 0.0
     return float(np.mean(motion.tip_speed[motion.moving] < WindowOptions().least_speed))
 
 
-def tip_follows(recording: Recording, rig: Rig) -> bool:
+def tip_follows(motion: Motion | None, recording: Recording, rig: Rig) -> bool:
     """Whether the tip rests more often while the slider moves than the other way round, as after an exchange.
 
     Without this evidence, a circle in a world frame shifted by some millimetres fits better as its own tip.
     """
-    return _leads(recording, rig) > _leads(swapped(recording), rig)
+    return _leads(motion) > _leads(motion_of(swapped(recording), rig))
 
 
 def _is_implausible(fit: OutlineFit, rig: Rig) -> bool:
@@ -191,8 +194,8 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
     return [_outline_mirrored(gap, fit.gap), *outline_findings(contacts, image, fit)]
 
 
-def _without_contact(recording: Recording, rig: Rig) -> list[Finding]:
-    if tip_follows(recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
+def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
+    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
         return [_swapped(np.inf)]
     sentence = "The slider never moves while the lowered tip moves: no push was recorded."
     return [Finding("no_contact", "refused", sentence, TOPICS)]

@@ -118,6 +118,12 @@ def body_velocity(motion: Motion) -> Array:
     return rotate(motion.tip_velocity, -motion.slider[:, 2])
 
 
+def sums_by_push(values: Array, push: IntArray) -> Array:
+    """Sums (m, k) of n rows of values (n, k) over each of the m pushes with numbers (n,)."""
+    number = np.unique(push, return_inverse=True)[1]
+    return np.column_stack([np.bincount(number, column) for column in values.T])
+
+
 def contact_fit(recording: Recording, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
     """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
     motion = motion_of(recording, rig)

@@ -21,6 +21,7 @@ from scipy.optimize import least_squares
 from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.geometry.shapes import near_symmetry, stretched, transformed
+from push_predictor.recordings.checks.motion import sums_by_push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -279,8 +280,8 @@ class Problem:
         weight = 1.0 / np.sqrt(1.0 + (gap / NOISE) ** 2)
         noise = max(float(np.median(np.abs(gap))) * 1.5, 1e-5)
         bread = np.linalg.inv(slope.T @ (weight[:, None] * slope) + np.diag(noise**2 / weak**2))
-        scores = [slope[self.push == one].T @ (weight * gap)[self.push == one] for one in np.unique(self.push)]
-        meat = np.sum([np.outer(score, score) for score in scores], axis=0)
+        scores = sums_by_push(slope * (weight * gap)[:, None], self.push)
+        meat = scores.T @ scores
         few = len(scores) / max(len(scores) - len(weak), 1)
         prior = noise**2 * bread @ np.diag(noise**2 / weak**2) @ bread
         return self._full(np.sqrt(np.diag(few * bread @ meat @ bread) + np.diag(prior)))

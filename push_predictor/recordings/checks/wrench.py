@@ -14,9 +14,8 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, body_velocity, sums_by_push
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording
 from push_predictor.types import Array, BoolArray, IntArray
 
 LEAST_FORCE = 0.3  # N
@@ -43,9 +42,8 @@ AXES = "Give the force along the world's axes, or state the sensor's: --wrench-f
 TOPIC = "Check the wrench topic, its stamps and its zero."
 
 
-def wrench_findings(recording: Recording, rig: Rig, outlined: bool = True) -> list[Finding]:
+def wrench_findings(motion: Motion | None, rig: Rig, outlined: bool = True) -> list[Finding]:
     """Findings about the wrench; empty without one. outlined: whether the outline shows where the tip is in contact."""
-    motion = motion_of(recording, rig)
     if motion is None:
         return []
     size = np.hypot(*motion.force.T)
@@ -171,7 +169,7 @@ def _slope(inputs: Array, values: Array, push: IntArray) -> tuple[float, float]:
         coefficients = bread @ (inputs.T @ (weight * values))
         error = values - inputs @ coefficients
         weight = 1.0 / np.sqrt(1.0 + (error / OUTLYING) ** 2)
-    scores = np.array([inputs[push == one].T @ (weight * error)[push == one] for one in np.unique(push)])
+    scores = sums_by_push(inputs * (weight * error)[:, None], push)
     return float(coefficients[0]), float(np.sqrt((bread @ scores.T @ scores @ bread)[0, 0]))
 
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, joined
+from push_predictor.recordings.streams import PoseStream, joined, set_back
 from push_predictor.recordings.windows.clock_session import free_motion
-from push_predictor.recordings.windows.clock_set import set_back
 from push_predictor.types import Array, IntArray
 
 FIRST = 50  # wrenches before the first attempt

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM, Rules, broken, usable
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.fields.sources import POSE_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
-from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, IntArray
 
 Names: TypeAlias = NDArray[np.str_]

@@ -15,8 +15,8 @@ import numpy as np
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM
 from push_predictor.recordings.decoder.topic_input import LIMIT
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree, joined, read_tree
-from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, BoolArray, IntArray
 
 SET_BACK = "clock set back"

@@ -22,6 +22,7 @@ from push_predictor.recordings.decoder.rules import (
 )
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.pose_rows import at_tip, normalised, poses_at
 from push_predictor.recordings.fields.sources import WRENCH_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
@@ -29,7 +30,6 @@ from push_predictor.recordings.fields.wrench_bias import LEAST_FREE, WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import WrenchStream
 from push_predictor.recordings.topics import FREE_MOTION, WORLD_AXES, Topics
-from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, BoolArray, IntArray
 
 UNKNOWN_BIAS = (

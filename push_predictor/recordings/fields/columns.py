@@ -68,13 +68,14 @@ class Block:
         with np.errstate(invalid="ignore"):  # widening a signalling NaN
             return np.asarray(column.view(f"{self.order}{code}").astype(np.float64))
 
-    def text(self, path: str) -> list[str]:
-        """The texts (n,) of a field."""
+    def text(self, path: str) -> tuple[list[str], IntArray]:
+        """The different texts of a field, and which of them each of the n messages has."""
         at, length = self.layout.texts[path]
-        column = self.data[:, at : at + length]
-        if len(column) and (column == column[0]).all():
-            return [_decoded(column[0])] * len(column)
-        return [_decoded(row) for row in column]
+        column = np.ascontiguousarray(self.data[:, at : at + length])
+        if not length or (column == column[0]).all():
+            return [_decoded(column[0])], np.zeros(len(column), np.int64)
+        different, number = np.unique(column, axis=0, return_inverse=True)
+        return [_decoded(row) for row in different], number.reshape(-1)
 
 
 class BlockReader:

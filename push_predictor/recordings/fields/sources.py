@@ -160,8 +160,8 @@ class FieldReader:
             values[rows], valid[rows] = block.numbers(paths), True
             if self._header:
                 stamp[rows], valid[rows] = header_stamps(block, self._header)
-                names = block.text(f"{self._header}.frame_id")
-                frame[rows] = [frames.setdefault(name, len(frames)) for name in names]
+                names, number = block.text(f"{self._header}.frame_id")
+                frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
         return Columns(stamp, values, valid, frame, tuple(frames))
 
 

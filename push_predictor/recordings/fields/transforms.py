@@ -169,8 +169,8 @@ def _parts(block: Block, path: str, static: bool) -> Iterator[tuple[str, _Part]]
     poses = block.numbers(block.paths(f"{path}.transform"))
     # ROS 1 writes names of frames with a leading slash as well.
     parents, children = (
-        np.array([name.strip("/") for name in block.text(f"{path}.{field}")])
-        for field in ("header.frame_id", "child_frame_id")
+        np.array([name.strip("/") for name in names])[number]
+        for names, number in (block.text(f"{path}.{field}") for field in ("header.frame_id", "child_frame_id"))
     )
     for child in sorted(set(children[valid].tolist())):
         chosen = valid & (children == child)

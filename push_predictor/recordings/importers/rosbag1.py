@@ -10,22 +10,27 @@ the caller gives one, in the tracked body's frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, yaw_of_quaternion
-from push_predictor.recordings.bag.ros1_file import DAMAGE, lower_package, opened_ros1
+from push_predictor.recordings.bag.message_types import short_name
+from push_predictor.recordings.bag.messages import gathered
+from push_predictor.recordings.bag.ros1_file import Ros1File
+from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.fields.columns import BlockReader
+from push_predictor.recordings.fields.sources import definitions_of, header_stamps
 from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_repeats
 from push_predictor.recordings.importers.mcube import assemble, block_of
 from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name, sources_in
 from push_predictor.recordings.rig import HOW_TO_GIVE, Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
-from push_predictor.types import IntArray
+from push_predictor.types import Array, IntArray
 
 TRANSFORM = "geometry_msgs/TransformStamped"
 FORCE = "/netft_data"
@@ -36,6 +41,13 @@ ACCEPTED = (
     "robot_comm/robot_CartesianLog)"
 )
 MLAB = ("/Mocap", FORCE, "/robot_CartesianLog")
+TRANSLATION = ("transform.translation.x", "transform.translation.y", "transform.rotation.z", "transform.rotation.w")
+WRENCH = ("wrench.force.x", "wrench.force.y", "wrench.torque.z")
+POSITION = tuple(f"pose.position.{axis}" for axis in "xyz")
+BODY_POSE = tuple(
+    f"body_poses[0].{name}" for name in ("position.x", "position.y", *(f"orientation.{k}" for k in "xyzw"))
+)
+TOOL = ("x", "y", "z", "qz", "q0")
 MILLIMETRE = 1e-3
 UNIT = 0.02  # largest error of a quaternion's norm; a larger one marks an untracked frame
 PAUSE = 0.3  # s
@@ -58,25 +70,69 @@ def import_rosbag1(sources: Sequence[Path], staging: Staging, rig: Rig | None = 
     """
     notes = Notes()
     for path in staging.in_turn(sources_in(sources, "*.bag")):
-        topics = bag_topics(path)
-        if body := _vicon_body(topics):
-            staging.recording(read_mcube_bag(path, body, rig, notes), pushes=1)
-        elif all(topic in topics for topic in MLAB):
-            staging.recording(read_mlab_bag(path, bag_messages(path, MLAB), rig, notes), pushes=0)
+        try:
+            bag = Ros1File(path)
+        except RecordingError as error:
+            raise ImportSourceError(str(error)) from None
+        if body := _vicon_body(bag.topics):
+            staging.recording(_mcube_recording(bag, body, rig, notes), pushes=1)
+        elif all(topic in bag.topics for topic in MLAB):
+            staging.recording(_mlab_recording(bag, rig, notes), pushes=0)
         else:
-            found = ", ".join(f"{topic} {kind}" for topic, kind in sorted(topics.items())) or "none"
+            found = ", ".join(f"{topic} {short_name(kind)}" for topic, kind in sorted(bag.topics.items())) or "none"
             raise ImportSourceError(f"{path}: topics found: {found}; accepted: {ACCEPTED}")
     return staging.report("rosbag1", notes)
 
 
-def read_mcube_bag(path: Path, body_topic: str, rig: Rig | None, notes: Notes) -> Recording:
-    """A bag of the MCube lab's rig. Raises ImportSourceError."""
-    messages = bag_messages(path, (body_topic, FORCE, TIP))
-    raw = {
-        topic: in_order(samples_of(messages[topic], values, header_time), f"{path}: {topic}", notes)
-        for topic, values in ((body_topic, _transform), (FORCE, _wrench), (TIP, _position))
-    }
-    leads = "; ".join(f"{topic} {-1e3 * header_lead(messages[topic])[1]:.1f} ms" for topic in raw)
+class _Logged(NamedTuple):
+    """Numbers (n, k) in the messages of a topic that contain them; messages: how many it has in all.
+
+    time, stamp (n,) ns: by the clock of the bag, and in the header, where there is one.
+    """
+
+    messages: int
+    time: IntArray
+    stamp: IntArray
+    values: Array
+
+    @property
+    def lead(self) -> Array:
+        """Header stamp minus bag time (n,), s."""
+        return np.asarray((self.stamp - self.time) * NANOSECOND)
+
+
+def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logged]:
+    """The numbers in fields of topics, {topic: paths}. Raises ImportSourceError if a message cannot be read."""
+    readers = {}
+    for topic, paths in fields.items():
+        tops = ["header", *(path.partition(".")[0].partition("[")[0] for path in paths)]
+        readers[topic] = BlockReader(bag.topics[topic], definitions_of(bag.topics[topic], bag.schemas), tops)
+    counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
+    for messages in gathered((message[:2], *message[2:]) for message in bag.messages(fields)):
+        topic = messages.topic
+        for block in readers[topic].blocks(messages):
+            if block.layout.numbers.keys() >= set(fields[topic]):
+                time = messages.times[block.rows]
+                stamp = header_stamps(block, "header")[0] if "header.stamp.sec" in block.layout.numbers else time
+                order = counts[topic] + block.rows
+                parts[topic].append((order, time, stamp, block.numbers(fields[topic])))
+        counts[topic] += len(messages)
+    if bag.notes:
+        raise ImportSourceError(bag.notes[0])
+    found = {}
+    for topic, paths in fields.items():
+        nothing = (*np.empty((3, 0), np.int64), np.empty((0, len(paths))))
+        order, time, stamp, values = (np.concatenate(of) for of in zip(nothing, *parts[topic], strict=True))
+        rows = np.argsort(order)
+        found[topic] = _Logged(counts[topic], time[rows], stamp[rows], values[rows])
+    return found
+
+
+def _mcube_recording(bag: Ros1File, body_topic: str, rig: Rig | None, notes: Notes) -> Recording:
+    """The recording in a bag of the MCube lab's rig. Raises ImportSourceError."""
+    path, read = bag.path, _read(bag, {body_topic: TRANSLATION, FORCE: WRENCH, TIP: POSITION})
+    raw = {topic: in_order(Samples(of.stamp, of.values), f"{path}: {topic}", notes) for topic, of in read.items()}
+    leads = "; ".join(f"{topic} {-1e3 * np.median(of.lead):.1f} ms" for topic, of in read.items())
     notes.assume(f"{path}: header stamps are used. The bag's clock is later by a median of {leads}")
     x, y, z, w = raw[body_topic].values.T
     body = Samples(raw[body_topic].stamp, np.column_stack([x, y, np.unwrap(twist(z, w))]))
@@ -84,104 +140,21 @@ def read_mcube_bag(path: Path, body_topic: str, rig: Rig | None, notes: Notes) -
     return assemble(safe_name(path.stem), str(path), block, rig, body, raw[TIP], raw[FORCE], notes)
 
 
-def _vicon_body(topics: dict[str, str]) -> str | None:
+def _vicon_body(topics: Mapping[str, str]) -> str | None:
     """The topic of the single tracked body of an mcube bag, None for other bags."""
-    bodies = [topic for topic, kind in topics.items() if topic.startswith("/vicon/") and kind == TRANSFORM]
+    bodies = [topic for topic, kind in topics.items() if topic.startswith("/vicon/") and short_name(kind) == TRANSFORM]
     return bodies[0] if len(bodies) == 1 and FORCE in topics and TIP in topics else None
 
 
-def _transform(message: Any) -> tuple[float, float, float, float]:
-    pose = message.transform
-    return pose.translation.x, pose.translation.y, pose.rotation.z, pose.rotation.w
-
-
-def _wrench(message: Any) -> tuple[float, float, float]:
-    wrench = message.wrench
-    return wrench.force.x, wrench.force.y, wrench.torque.z
-
-
-def _position(message: Any) -> tuple[float, float, float]:
-    position = message.pose.position
-    return position.x, position.y, position.z
-
-
-class Stamped(NamedTuple):
-    """A message and its bag time (ns)."""
-
-    time: int
-    message: Any
-
-
-def bag_topics(path: Path) -> dict[str, str]:
-    """Topics and their types, ROS 1 names. Raises ImportSourceError if the bag cannot be opened."""
-    with _opened(path) as reader:
-        return {c.topic: c.msgtype.replace("/msg/", "/") for c in reader.connections}
-
-
-def bag_messages(path: Path, topics: Collection[str]) -> dict[str, list[Stamped]]:
-    """All messages of the given topics in the bag's order. Raises ImportSourceError if one cannot be read."""
-    from rosbags.rosbag1 import ReaderError
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    found: dict[str, list[Stamped]] = {topic: [] for topic in topics}
-    with _opened(path) as reader:
-        wanted = [c for c in reader.connections if c.topic in found]
-        count = 0
-        try:
-            for c in wanted:
-                if (name := lower_package(c.msgtype)) not in store.types:
-                    store.register(get_types_from_msg(lower_package(c.msgdef.data), name))
-            for c, time, data in reader.messages(connections=wanted):
-                found[c.topic].append(Stamped(time, store.deserialize_ros1(data, lower_package(c.msgtype))))
-                count += 1
-        except (ReaderError, SerdeError, TypesysError, *DAMAGE) as error:
-            reason = f"{type(error).__name__}: {error}"
-            raise ImportSourceError(f"{path}: message {count} cannot be read ({reason})") from None
-    return found
-
-
-def samples_of(
-    messages: Sequence[Stamped], values: Callable[[Any], Sequence[float]], stamp: Callable[[Stamped], int]
-) -> Samples:
-    """Stamps (n,) and values (n, k) of messages."""
-    stamps = np.array([stamp(item) for item in messages], dtype=np.int64)
-    rows = np.array([values(item.message) for item in messages], dtype=np.float64)
-    return Samples(stamps, rows.reshape(len(stamps), -1))
-
-
-def bag_time(item: Stamped) -> int:
-    """The time at which the bag recorded the message, ns."""
-    return item.time
-
-
-def header_time(item: Stamped) -> int:
-    """The header stamp, ns."""
-    return int(item.message.header.stamp.sec) * 1_000_000_000 + int(item.message.header.stamp.nanosec)
-
-
-def header_lead(messages: Sequence[Stamped]) -> tuple[float, float, float]:
-    """Header stamp minus bag time, s: minimum, median, maximum."""
-    lead = [(header_time(item) - item.time) * 1e-9 for item in messages]
-    return float(np.min(lead)), float(np.median(lead)), float(np.max(lead))
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    try:
-        with opened_ros1(path) as reader:
-            yield reader
-    except RecordingError as error:
-        raise ImportSourceError(str(error)) from None
-
-
-def read_mlab_bag(path: Path, messages: Mapping[str, Sequence[Stamped]], rig: Rig | None, notes: Notes) -> Recording:
-    """A recording from the messages of MLAB. Raises ImportSourceError."""
-    mocap, netft, robot = (messages[topic] for topic in MLAB)
-    body = in_order(samples_of(_tracked(path, mocap, notes), _body, bag_time), f"{path}: /Mocap", notes)
-    force = in_order(samples_of(netft, _wrench, bag_time), f"{path}: /netft_data", notes)
-    tool = in_order(samples_of(robot, _tool, bag_time), f"{path}: /robot_CartesianLog", notes)
+def _mlab_recording(bag: Ros1File, rig: Rig | None, notes: Notes) -> Recording:
+    """The recording in a bag of MLAB. Raises ImportSourceError."""
+    path, read = bag.path, _read(bag, dict(zip(MLAB, (BODY_POSE, WRENCH, TOOL), strict=True)))
+    mocap, netft, robot = (read[topic] for topic in MLAB)
+    body = in_order(_tracked(path, mocap, notes), f"{path}: /Mocap", notes)
+    force = in_order(Samples(netft.time, netft.values), f"{path}: /netft_data", notes)
+    tool = in_order(Samples(robot.time, robot.values), f"{path}: /robot_CartesianLog", notes)
+    x, y, z, qz, q0 = tool.values.T
+    tool = tool._replace(values=np.column_stack([MILLIMETRE * x, MILLIMETRE * y, MILLIMETRE * z, twist(qz, q0)]))
     require_overlap({"slider": body.stamp, "pusher": tool.stamp, "force": force.stamp}, str(path))
     _report(path, netft, rig, notes)
     wrench = _on_pusher(force, tool, path, notes)
@@ -197,11 +170,11 @@ def read_mlab_bag(path: Path, messages: Mapping[str, Sequence[Stamped]], rig: Ri
     )
 
 
-def _report(path: Path, netft: Sequence[Stamped], rig: Rig | None, notes: Notes) -> None:
-    least, median, most = header_lead(netft)
+def _report(path: Path, netft: _Logged, rig: Rig | None, notes: Notes) -> None:
+    lead = netft.lead
     notes.repaired.append(
-        f"{path}: /netft_data header stamps lead the bag's clock by {median:.3f} s ({least:.3f} to {most:.3f}); "
-        "bag time is used for all streams, because the robot's log has no other time"
+        f"{path}: /netft_data header stamps lead the bag's clock by {np.median(lead):.3f} s ({lead.min():.3f} to "
+        f"{lead.max():.3f}); bag time is used for all streams, because the robot's log has no other time"
     )
     notes.assume(BODY)
     notes.assume(ON_PUSHER)
@@ -209,16 +182,14 @@ def _report(path: Path, netft: Sequence[Stamped], rig: Rig | None, notes: Notes)
         notes.assume(f"{path}: written without a push_rig record, so contact cannot be computed; {HOW_TO_GIVE}")
 
 
-def _tracked(path: Path, mocap: Sequence[Stamped], notes: Notes) -> list[Stamped]:
-    tracked = [item for item in mocap if len(item.message.body_poses) and _is_unit(item.message.body_poses[0])]
-    if lost := len(mocap) - len(tracked):
-        notes.dropped.append(f"{path}: /Mocap: {lost} of {len(mocap)} frames in which the body was not tracked")
-    return tracked
-
-
-def _is_unit(pose: Any) -> bool:
-    q = pose.orientation
-    return abs(float(np.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)) - 1.0) < UNIT
+def _tracked(path: Path, mocap: _Logged, notes: Notes) -> Samples:
+    """x, y (m) and heading of the tracked body."""
+    tracked = np.abs(np.linalg.norm(mocap.values[:, 2:], axis=1) - 1.0) < UNIT
+    if lost := mocap.messages - int(np.sum(tracked)):
+        notes.dropped.append(f"{path}: /Mocap: {lost} of {mocap.messages} frames in which the body was not tracked")
+    x, y, *quaternion = mocap.values[tracked].T
+    heading = yaw_of_quaternion(*quaternion)
+    return Samples(mocap.time[tracked], np.column_stack([MILLIMETRE * x, MILLIMETRE * y, heading]))
 
 
 def _on_pusher(force: Samples, tool: Samples, path: Path, notes: Notes) -> WrenchStream:
@@ -246,14 +217,3 @@ def _unloaded_rows(force: Samples, tool: Samples) -> IntArray:
     pauses = [k for k in np.flatnonzero(~moving) if np.any(slot == k)]
     along = [float(np.mean(force.values[slot == k, :2] @ pressing)) for k in pauses]
     return np.flatnonzero(slot == pauses[int(np.argmin(along))])
-
-
-def _body(message: Any) -> tuple[float, float, float]:
-    pose = message.body_poses[0]
-    q = pose.orientation
-    return pose.position.x * MILLIMETRE, pose.position.y * MILLIMETRE, float(yaw_of_quaternion(q.x, q.y, q.z, q.w))
-
-
-def _tool(message: Any) -> tuple[float, float, float, float]:
-    place = (message.x * MILLIMETRE, message.y * MILLIMETRE, message.z * MILLIMETRE)
-    return *place, float(twist(message.qz, message.q0))

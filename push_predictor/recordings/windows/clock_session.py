@@ -6,15 +6,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
-from push_predictor.recordings.windows.cut import cut_window
+from push_predictor.recordings.windows.cut import PushContext, WindowCutter
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.stamp_order import ISOLATION
@@ -45,16 +43,16 @@ class ClockSession:
         self.evaluated = int(np.iinfo(np.int64).min)
         self._rig = rig
         self._segmenter = PushSegmenter(options)
-        self._counts: Counter[str] = Counter()
+        self._cutter = WindowCutter(rig)
+        self._dropouts: Counter[str] = Counter()
         self._origin: int | None = None
         self._first: int | None = None
-        self._slid = 0.0
         self._counted_until = -np.inf  # s
 
     @property
     def counts(self) -> Counter[str]:
         """Number of faults by kind; faults of samples also by stream."""
-        found = self._counts + Counter(self._segmenter.counts)
+        found = self._dropouts + self._cutter.counts + Counter(self._segmenter.counts)
         for name, track in self.tracks.items():
             # A slider that continues elsewhere was repositioned: a reset, which the segmenter counts.
             of_stream = track.counts if name != "slider" else track.order.counts
@@ -107,10 +105,10 @@ class ClockSession:
         last = int(np.searchsorted(slider.time, until, side="right"))
         if last <= first:
             return []
-        found: list[PushWindow] = []
+        due: list[tuple[int, int, PushContext]] = []
         for sample in contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last):
-            for start, end in self._segmenter.step(sample):
-                found += self._cut(start, end)
+            due += self._segmenter.step(sample)
+        found = self._cutter.cut(self.tracks, due, self._origin or 0, self._first)
         self._count_dropouts(float(slider.time[last - 1]))
         self.evaluated = int(slider.stamp[last - 1])
         self._forget(float(slider.time[last - 1]))
@@ -119,7 +117,7 @@ class ClockSession:
     def _count_dropouts(self, until: float) -> None:
         for name, track in self.tracks.items():
             count = track.dropouts(self._counted_until, until)
-            self._counts.update({f"{name} dropouts": count, "dropouts": count})
+            self._dropouts.update({f"{name} dropouts": count, "dropouts": count})
         self._counted_until = until
 
     def _horizon(self, final: bool) -> float | None:
@@ -135,22 +133,6 @@ class ClockSession:
 
     def _wrench(self) -> Track | None:
         return self.tracks["wrench"] if len(self.tracks["wrench"]) else None
-
-    def _cut(self, start: int, end: int) -> list[PushWindow]:
-        """The window from start to end (ns), none if it is rejected."""
-        push = self._segmenter.push
-        if push is None or self._origin is None or self._first is None:
-            return []
-        window = cut_window(self._rig, self.tracks, start, end, self._origin, push, self._slid)
-        if not isinstance(window, PushWindow):
-            self._counts[window] += 1
-            return []
-        edge = int(window.covariates["edge"])
-        self._segmenter.push = replace(push, last_edge=edge, window_index=push.window_index + 1)
-        # Summed over windows: summed over samples, the tracker's noise would count as distance.
-        self._slid += float(np.hypot(*window.displacement[:2]))
-        elapsed = (start - self._first) * NANOSECOND
-        return [replace(window, covariates={"elapsed_time": elapsed, **window.covariates})]
 
     def _forget(self, evaluated: float) -> None:
         start, needed = self._segmenter.start, evaluated

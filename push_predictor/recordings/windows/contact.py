@@ -39,7 +39,7 @@ class ContactSample(NamedTuple):
     gap: float
     height: float
     closing_speed: float
-    force: Array | None
+    force: tuple[float, float] | None
     speed: float
     at_speed: bool
     in_break: bool
@@ -52,36 +52,27 @@ def contact_samples(
 ) -> Iterator[ContactSample]:
     """The contact at slider samples first to last - 1 (indices into the track)."""
     time, stamp = slider.time[first:last], slider.stamp[first:last]
-    height = pusher.at(time)[:, 2] - slider.values[first:last, 2]
+    tips = {span: pusher.at(time + span) for span in (0.0, -NEAR, FIT_SPAN, FORWARD_SPAN, NEAR, REACH)}
+    height = tips[0.0][:, 2] - slider.values[first:last, 2]
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     after_break, in_break = _breaks([t for t in (slider, pusher, wrench) if t is not None], before, time)
     gap, closing_speed = _gaps(rig, slider, pusher, first, last)
-    around, after = _speed(pusher, time - NEAR, time + NEAR), _speed(pusher, time, time + FORWARD_SPAN)
-    speed, at_speed, forces = np.minimum(around, after), _at_speed(pusher, time), _forces(wrench, time)
+    around, after = (_speed(pusher, time, tips, *span) for span in ((-NEAR, NEAR), (0.0, FORWARD_SPAN)))
+    speed, at_speed, forces = np.minimum(around, after), _at_speed(pusher, time, tips), _forces(wrench, time)
     repositioned = _repositioned(slider, pusher, first, last)
     known = ~np.isnan(forces[:, 0])
-    yield from map(
-        ContactSample,
-        stamp.tolist(),
-        time.tolist(),
-        gap.tolist(),
-        height.tolist(),
-        closing_speed.tolist(),
-        (force if measured else None for force, measured in zip(forces, known.tolist(), strict=True)),
-        speed.tolist(),
-        at_speed.tolist(),
-        in_break.tolist(),
-        after_break.tolist(),
-        repositioned.tolist(),
-    )
+    forces_or_none = ((x, y) if there else None for x, y, there in zip(*forces.T.tolist(), known.tolist(), strict=True))
+    columns = [of.tolist() for of in (stamp, time, gap, height, closing_speed)]
+    later = [of.tolist() for of in (speed, at_speed, in_break, after_break, repositioned)]
+    yield from map(ContactSample._make, zip(*columns, forces_or_none, *later, strict=True))
 
 
-def _at_speed(pusher: Track, time: Array) -> BoolArray:
+def _at_speed(pusher: Track, time: Array, tips: dict[float, Array]) -> BoolArray:
     """Whether the tip is not accelerating at times (n,); True for a stream too slow to show it."""
     if 3.0 * pusher.period > FIT_SPAN:
         return np.ones(len(time), dtype=np.bool_)
-    first = _speed(pusher, time, time + FIT_SPAN)
-    near, later = _speed(pusher, time, time + NEAR), _speed(pusher, time + FIT_SPAN, time + REACH)
+    spans = ((0.0, FIT_SPAN), (0.0, NEAR), (FIT_SPAN, REACH))
+    first, near, later = (_speed(pusher, time, tips, *span) for span in spans)
     return np.asarray((first >= NEAR_SHARE * near) & (first >= REACH_SHARE * later))
 
 
@@ -116,11 +107,11 @@ def _forces(wrench: Track | None, time: Array) -> Array:
     return np.asarray(np.where(missing[:, None], wrench.values[before], wrench.at(time)))
 
 
-def _speed(pusher: Track, start: Array, end: Array) -> Array:
-    """Mean speed (m/s) of the tip between pairs of times, within its stream."""
-    start, end = np.maximum(start, pusher.time[0]), np.minimum(end, pusher.time[-1])
-    distance = np.linalg.norm(pusher.at(end)[:, :2] - pusher.at(start)[:, :2], axis=1)
-    return np.asarray(distance / np.maximum(end - start, SHORTEST_SPAN))
+def _speed(pusher: Track, time: Array, tips: dict[float, Array], begin: float, end: float) -> Array:
+    """Mean speed (m/s) of the tip between two spans after times (n,), within its stream."""
+    start, until = (np.clip(time + span, pusher.time[0], pusher.time[-1]) for span in (begin, end))
+    distance = np.hypot(*(tips[end] - tips[begin])[:, :2].T)
+    return np.asarray(distance / np.maximum(until - start, SHORTEST_SPAN))
 
 
 def _repositioned(slider: Track, pusher: Track, first: int, last: int) -> BoolArray:

@@ -1,11 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Cut one window out of the tracks: contact, velocity, angle and the slider's displacement."""
+"""Cut windows out of the tracks: contact, velocity, angle and the slider's displacement."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.track import Track
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 ENTERED, ENTERED_SHARE = 0.0005, 0.5  # m, share of the tip's displacement: a tip this much deeper enters the outline
 OUTRAN, OUTRAN_SHARE = 0.002, 1.25  # m, share of the tip's displacement: a slider this much farther is not pushed
@@ -28,147 +29,204 @@ FIT_SAMPLES = 4  # or this many samples, where those take longer
 class PushContext:
     """The properties of a push that its windows share.
 
-    push_id, push_index; first_touch ns; dwell: s without contact before it; tare: the force without contact (2,) N,
-    None if unknown; last_edge: of the previous window, None for the first; window_index: within the push.
+    push_id, push_index; first_touch ns; dwell: s without contact before it; tare: x and y of the force without
+    contact, N, None if unknown.
     """
 
     push_id: str
     push_index: int
     first_touch: int
     dwell: float
-    tare: Array | None
-    last_edge: int | None
-    window_index: int
+    tare: tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
-class _Command:
-    """The command of a window.
+class _Motions:
+    """The motion of slider and tip in n windows.
 
-    edge, contact, gap m, inward normal (2,) in the world, heading rad, angle rad, speed m/s.
+    poses (2, n, 3) and tips (2, n, 2) at both ends. speed, heading (n,): of the tip at the start; touch: of the tip
+    there. contact, edge, angle (n,), inward normal (n, 2) in the world. displacement (n, 3) in the push frame.
     """
 
-    edge: int
-    contact: float
-    gap: float
+    poses: Array
+    tips: Array
+    speed: Array
+    heading: Array
+    touch: Projection
+    contact: Array
+    edge: IntArray
     normal: Array
-    heading: float
-    angle: float
-    speed: float
+    angle: Array
+    displacement: Array
 
 
-def cut_window(
-    rig: Rig, tracks: Mapping[str, Track], start: int, end: int, origin: int, push: PushContext, slid: float
-) -> PushWindow | str:
-    """Cut a window from start to end (ns), or return the fault (a key of FAULTS) for which it is rejected.
+class WindowCutter:
+    """Cuts windows, those of one push after the other. counts: rejected windows by fault, a key of FAULTS."""
 
-    tracks: by sensor; that of the wrench may be empty. origin: stamp (ns) from which they count their time. slid:
-    distance (m) that the slider has been pushed so far.
+    def __init__(self, rig: Rig) -> None:
+        self.counts: Counter[str] = Counter()
+        self._rig = rig
+        self._slid = 0.0  # m; summed over windows: summed over samples, the tracker's noise would count as distance
+        self._push, self._edge, self._index = -1, -1, 0  # of the last window: its push, edge and number in the push
+
+    def cut(
+        self, tracks: Mapping[str, Track], due: Sequence[tuple[int, int, PushContext]], origin: int, first: int
+    ) -> list[PushWindow]:
+        """The accepted ones of the windows that are due, in order: start and end in ns, and the push.
+
+        tracks: by sensor; that of the wrench may be empty. origin: stamp (ns) from which they count their time; first:
+        from which the elapsed time counts.
+        """
+        if not due:
+            return []
+        times = (np.array([[start, end] for start, end, _ in due]).T - origin) * NANOSECOND
+        motions = _motions(self._rig.outline, tracks["slider"], tracks["pusher"], times)
+        forces = _forces(tracks["wrench"], times)
+        faults, found = _faults(self._rig, motions), list[PushWindow]()
+        for k, (start, end, push) in enumerate(due):
+            if push.push_index != self._push:
+                self._push, self._edge, self._index = push.push_index, -1, 0
+            if motions.touch.at_vertex[k]:
+                self._keep_edge(motions, k)
+            fault = faults[k] if abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] > 0.0 else "not_a_push"
+            if fault:
+                self.counts[fault] += 1
+                continue
+            covariates = {"elapsed_time": (start - first) * NANOSECOND, "slid_distance": self._slid}
+            covariates |= self._conditions(motions, k, start, push) | _on_slider(
+                forces[k], push.tare, motions.normal[k]
+            )
+            found.append(_window(motions, k, start, end, push, self._index, covariates))
+            self._edge, self._index = int(motions.edge[k]), self._index + 1
+            self._slid += float(np.hypot(*found[-1].displacement[:2]))
+        return found
+
+    def _keep_edge(self, motions: _Motions, k: int) -> None:
+        """At a vertex the contact belongs to the edge it slid along, so to that of the window before."""
+        outline, count = self._rig.outline, len(self._rig.outline.vertices)
+        vertex = int(np.argmin(np.linalg.norm(outline.vertices - motions.touch.point[k], axis=1)))
+        before = (vertex - 1) % count
+        if self._edge in (before, vertex):
+            motions.edge[k] = self._edge
+            motions.contact[k] = outline.contact_on_edge(self._edge, 1.0 if self._edge == before else 0.0)
+            row = slice(k, k + 1)
+            motions.normal[row], motions.angle[row] = _angles(
+                outline, motions.contact[row], motions.poses[0, row], motions.heading[row]
+            )
+
+    def _conditions(self, motions: _Motions, k: int, start: int, push: PushContext) -> dict[str, float]:
+        """The covariates that follow from geometry and time."""
+        x, y, heading = motions.poses[0, k].tolist()
+        return {
+            "push_heading": float(motions.heading[k]),
+            "edge": float(motions.edge[k]),
+            "contact_gap": float(motions.touch.distance[k] - self._rig.pusher_radius),
+            "push_index": float(push.push_index),
+            "dwell_time": push.dwell,
+            "time_since_contact": (start - push.first_touch) * NANOSECOND,
+            "slider_x": x,
+            "slider_y": y,
+            "slider_heading": float(wrap_angle(heading)),
+        }
+
+
+def pusher_motion(pusher: Track, begin: Array) -> tuple[Array, Array]:
+    """Positions (n, 2) m and velocities (n, 2) m/s at times (n,) s, by least-squares lines through the samples after.
+
+    Each line takes those of FIT_SPAN, and at least FIT_SAMPLES.
     """
-    times, pusher = np.array([start - origin, end - origin]) * NANOSECOND, tracks["pusher"]
-    poses = tracks["slider"].at(times)[:, [0, 1, 3]]
-    pose, pose_after = poses
-    command = _command(rig, *pusher_motion(pusher, float(times[0])), pose, push.last_edge)
-    if not (abs(command.angle) < np.pi / 2.0 and command.speed > 0.0):
-        return "not_a_push"
-    if fault := _motion_fault(rig, poses, pusher.at(times)[:, :2]):
-        return fault
-    moved = rotate(pose_after[:2] - pose[:2], np.array(-command.heading))
+    first = np.searchsorted(pusher.time, begin)
+    last = np.maximum(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right"), first + FIT_SAMPLES)
+    last = np.minimum(last, len(pusher.time))
+    count, rows = last - first, _rows(first, last)
+    time = pusher.time[rows] - np.repeat(begin, count)
+    mean_time, mean = _means(time[:, None], count), _means(pusher.values[rows, :2], count)
+    late, off = (
+        time[:, None] - np.repeat(mean_time, count, axis=0),
+        pusher.values[rows, :2] - np.repeat(mean, count, axis=0),
+    )
+    spread = _means(late**2, count)
+    velocity = _means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
+    return mean - velocity * mean_time, velocity
+
+
+def _rows(first: IntArray, last: IntArray) -> IntArray:
+    """The indices from each first to before each last, one after the other."""
+    count = last - first
+    return np.asarray(np.arange(int(count.sum())) + np.repeat(first - np.cumsum(count) + count, count))
+
+
+def _means(values: Array, count: IntArray) -> Array:
+    """Means (n, k) of n consecutive parts of values (m, k), each of `count` (n,) > 0 rows."""
+    return np.asarray(np.add.reduceat(values, np.cumsum(count) - count, axis=0) / count[:, None])
+
+
+def _motions(outline: Outline, slider: Track, pusher: Track, times: Array) -> _Motions:
+    """The motions between times (2, n) in s."""
+    poses, tips = (track.at(times.ravel()).reshape(*times.shape, -1) for track in (slider, pusher))
+    poses, tips = poses[..., [0, 1, 3]], tips[..., :2]
+    position, velocity = pusher_motion(pusher, times[0])
+    touch, heading = outline.project(to_body(position, poses[0])), np.arctan2(velocity[:, 1], velocity[:, 0])
+    contact, edge = touch.contact, outline.edge(touch.contact)[0]
+    normal, angle = _angles(outline, contact, poses[0], heading)
+    moved = poses[1] - poses[0]
+    displacement = np.column_stack([rotate(moved[:, :2], -heading), moved[:, 2]])
+    return _Motions(poses, tips, np.hypot(*velocity.T), heading, touch, contact, edge, normal, angle, displacement)
+
+
+def _angles(outline: Outline, contact: Array, poses: Array, heading: Array) -> tuple[Array, Array]:
+    """Inward normals (n, 2) in the world at contacts (n,), and angles (n,) from them to headings (n,)."""
+    normal = rotate(outline.inward_normal(contact), poses[:, 2])
+    return normal, wrap_angle(heading - np.arctan2(normal[:, 1], normal[:, 0]))
+
+
+def _faults(rig: Rig, motions: _Motions) -> list[str]:
+    """The fault of each motion that no push explains, empty without one."""
+    driven, moved = (np.hypot(*(of[1] - of[0])[:, :2].T) for of in (motions.tips, motions.poses))
+    before, after = (rig.outline.project(to_body(motions.tips[k], motions.poses[k])).distance for k in (0, 1))
+    entered = before - after > np.maximum(ENTERED, ENTERED_SHARE * driven)
+    outran = moved > OUTRAN + OUTRAN_SHARE * driven
+    return list(np.where(entered, "left_behind", np.where(outran, "outran", "")))
+
+
+def _window(
+    motions: _Motions, k: int, start: int, end: int, push: PushContext, index: int, covariates: dict[str, float]
+) -> PushWindow:
     return PushWindow(
         push_id=push.push_id,
-        index=push.window_index,
+        index=index,
         start=start,
         end=end,
-        velocity=command.speed,
-        contact=command.contact,
-        angle=command.angle,
+        velocity=float(motions.speed[k]),
+        contact=float(motions.contact[k]),
+        angle=float(motions.angle[k]),
         duration=(end - start) * NANOSECOND,
-        displacement=np.array([moved[0], moved[1], pose_after[2] - pose[2]]),
-        slider_start=pose,
-        slider_end=pose_after,
-        push_heading=command.heading,
-        covariates={
-            "slid_distance": slid,
-            **_conditions(command, pose, start, push),
-            **_forces(tracks["wrench"], times, push.tare, command.normal),
-        },
+        displacement=motions.displacement[k],
+        slider_start=motions.poses[0, k],
+        slider_end=motions.poses[1, k],
+        push_heading=float(motions.heading[k]),
+        covariates=covariates,
     )
 
 
-def _command(rig: Rig, position: Array, velocity: Array, pose: Array, last_edge: int | None) -> _Command:
-    """The command of a pusher at (2,) m with a velocity (2,) m/s, at a slider with the given pose (3,)."""
-    touch = rig.outline.project(to_body(position, pose)[None])
-    edge, contact = contact_at(rig.outline, touch, last_edge)
-    normal = rotate(rig.outline.inward_normal(np.array([contact]))[0], pose[2])
-    heading = float(np.arctan2(velocity[1], velocity[0]))
-    angle = float(wrap_angle(np.array(heading - np.arctan2(normal[1], normal[0]))))
-    gap = float(touch.distance[0] - rig.pusher_radius)
-    return _Command(edge, contact, gap, normal, heading, angle, float(np.hypot(*velocity)))
-
-
-def _motion_fault(rig: Rig, poses: Array, tips: Array) -> str:
-    """The fault of a motion that no push explains, empty without one: poses (2, 3) and tips (2, 2) at both ends."""
-    driven, moved = np.hypot(*(tips[1] - tips[0])), np.hypot(*(poses[1] - poses[0])[:2])
-    before, after = rig.outline.project(to_body(tips, poses)).distance
-    if before - after > max(ENTERED, ENTERED_SHARE * driven):
-        return "left_behind"
-    return "outran" if moved > OUTRAN + OUTRAN_SHARE * driven else ""
-
-
-def _conditions(command: _Command, pose: Array, start: int, push: PushContext) -> dict[str, float]:
-    """The covariates that follow from geometry and time."""
-    return {
-        "push_heading": command.heading,
-        "edge": float(command.edge),
-        "contact_gap": command.gap,
-        "push_index": float(push.push_index),
-        "dwell_time": push.dwell,
-        "time_since_contact": (start - push.first_touch) * NANOSECOND,
-        "slider_x": float(pose[0]),
-        "slider_y": float(pose[1]),
-        "slider_heading": float(wrap_angle(pose[2])),
-    }
-
-
-def pusher_motion(pusher: Track, begin: float) -> tuple[Array, Array]:
-    """Position (2,) m and velocity (2,) m/s at `begin` (s), by a least-squares line through the first samples."""
-    first = int(np.searchsorted(pusher.time, begin))
-    last = max(int(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right")), first + FIT_SAMPLES)
-    time = pusher.time[first:last] - begin
-    design = np.column_stack([np.ones_like(time), time])
-    solution = np.linalg.lstsq(design, pusher.values[first:last, :2], rcond=None)[0]
-    return solution[0], solution[1]
-
-
-def contact_at(outline: Outline, touch: Projection, last_edge: int | None) -> tuple[int, float]:
-    """Edge and contact of a touch; at a vertex the contact belongs to the edge it slid along."""
-    edge = int(outline.edge(touch.contact)[0][0])
-    contact = float(touch.contact[0])
-    if not touch.at_vertex[0]:
-        return edge, contact
-    count = len(outline.vertices)
-    vertex = int(np.argmin(np.linalg.norm(outline.vertices - touch.point[0], axis=1)))
-    before, after = (vertex - 1) % count, vertex
-    chosen = last_edge if last_edge in (before, after) else _facing(outline, touch.normal[0], before, after)
-    return chosen, float(outline.contact_on_edge(chosen, 1.0 if chosen == before else 0.0))
-
-
-def _facing(outline: Outline, normal: Array, before: int, after: int) -> int:
-    """The one of two edges that faces the pusher more directly."""
-    middles = outline.edge_starts[[before, after]] + 0.5 * np.diff(outline.edge_starts)[[before, after]]
-    return (before, after)[int(np.argmin(outline.inward_normal(middles) @ normal))]
-
-
-def _forces(wrench: Track, times: Array, tare: Array | None, normal: Array) -> dict[str, float]:
-    """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left.
-
-    tare: what the sensor reads without contact (2,); it is subtracted, and kept to judge the sensor's bias.
-    """
-    zero = {} if tare is None else {"free_force_x": float(tare[0]), "free_force_y": float(tare[1])}
+def _forces(wrench: Track, times: Array) -> Array:
+    """Mean forces (n, 2) N on the pusher between times (2, n) s, NaN without a sample."""
+    found = np.full((times.shape[1], 2), np.nan)
     begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
-    if begin >= end:
+    if (some := end > begin).any():
+        found[some] = _means(wrench.values[_rows(begin[some], end[some]), :2], (end - begin)[some])
+    return found
+
+
+def _on_slider(force: Array, tare: tuple[float, float] | None, normal: Array) -> dict[str, float]:
+    """The force (2,) N on the slider: along the inward normal (2,), and to its left; empty if it is unknown.
+
+    tare: what the sensor reads without contact; it is subtracted, and kept to judge the sensor's bias.
+    """
+    zero = {} if tare is None else {"free_force_x": tare[0], "free_force_y": tare[1]}
+    if np.isnan(force[0]):
         return zero
-    force = wrench.values[begin:end, :2].mean(axis=0) - (np.zeros(2) if tare is None else tare)
-    on_slider = -force  # the wrench is the force of the slider on the pusher
-    left = np.array([-normal[1], normal[0]])
-    return {"normal_force": float(on_slider @ normal), "tangential_force": float(on_slider @ left), **zero}
+    x, y = tare or (0.0, 0.0)
+    x, y = x - float(force[0]), y - float(force[1])  # the wrench is the force of the slider on the pusher
+    along_x, along_y = normal.tolist()
+    return {"normal_force": x * along_x + y * along_y, "tangential_force": y * along_x - x * along_y, **zero}

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -13,7 +14,6 @@ from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.windows.contact import ContactSample
 from push_predictor.recordings.windows.cut import PushContext
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
-from push_predictor.types import Array
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
@@ -30,7 +30,7 @@ def touches_nothing(sample: ContactSample, options: WindowOptions) -> bool:
 
 
 class PushSegmenter:
-    """Takes contact samples in order and returns the windows (start, end in ns) that are complete.
+    """Takes contact samples in order and returns the windows that are complete: start and end in ns, and the push.
 
     counts: resets and samples inside the outline. push: the current push, None between pushes. samples, touching: how
     many samples there were, and how many of them in contact.
@@ -38,6 +38,8 @@ class PushSegmenter:
 
     def __init__(self, options: WindowOptions) -> None:
         self.options = options
+        self._length = round(options.duration * 1e9)  # ns
+        self._stride = round((options.stride or options.duration) * 1e9)
         self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
         self.samples = self.touching = 0
@@ -46,9 +48,11 @@ class PushSegmenter:
         self._last_time = -np.inf
         self._idle = 0.0
         self._pushes = 0
-        self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
-        self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # at rest near the slider, before a push
-        self._zero: tuple[Array | None, float] | None = None  # of these forces; None after a new one
+        self._free_force: deque[tuple[float, float]] = deque(maxlen=TARE_SAMPLES)
+        self._resting_force: deque[tuple[float, float]] = deque(
+            maxlen=TARE_SAMPLES
+        )  # at rest near the slider, before a push
+        self._zero: tuple[tuple[float, float] | None, float] | None = None  # of these forces; None after a new one
         self._touching = False
         self._inside = False
         self._first_touch: int | None = None
@@ -59,7 +63,7 @@ class PushSegmenter:
         """Start (ns) of the incomplete window, None without one."""
         return self._start
 
-    def step(self, sample: ContactSample) -> list[tuple[int, int]]:
+    def step(self, sample: ContactSample) -> list[tuple[int, int, PushContext]]:
         """Add one sample and return the windows that end at or before it."""
         self._update_breaks(sample)
         self._update_tare(sample)
@@ -78,7 +82,7 @@ class PushSegmenter:
         if sample.after_break:
             self._start = None
         else:
-            self._idle += elapsed if np.isfinite(elapsed) else 0.0
+            self._idle += elapsed if math.isfinite(elapsed) else 0.0
         if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.in_break:
             self.counts["inside"] += not self._inside
             self._start = None
@@ -113,39 +117,33 @@ class PushSegmenter:
         separates = sample.force is None and sample.closing_speed < -limit
         return not separates and (self._touching or sample.closing_speed <= limit)
 
-    def _presses(self, force: Array | None) -> bool:
+    def _presses(self, force: tuple[float, float] | None) -> bool:
         zero, noise = self._tare()
         if force is None or zero is None:
             return False
-        return float(np.hypot(*(force - zero))) > max(self.options.least_force, NOISE_FACTOR * noise)
+        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > max(self.options.least_force, NOISE_FACTOR * noise)
 
-    def _tare(self) -> tuple[Array | None, float]:
+    def _tare(self) -> tuple[tuple[float, float] | None, float]:
         """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""
         if self._zero is None:
             readings = np.array(self._free_force or self._resting_force)
-            known = len(readings) > 0
-            noise = float(np.hypot(*readings.std(axis=0))) if known else 0.0
-            self._zero = readings.mean(axis=0) if known else None, noise
+            x, y = readings.mean(axis=0).tolist() if len(readings) else (0.0, 0.0)
+            noise = float(np.hypot(*readings.std(axis=0))) if len(readings) else 0.0
+            self._zero = (x, y) if len(readings) else None, noise
         return self._zero
 
-    def _pushing(self, sample: ContactSample) -> list[tuple[int, int]]:
-        if self.push is None or self._idle > self.options.push_pause:
-            self._begin_push(sample)
+    def _pushing(self, sample: ContactSample) -> list[tuple[int, int, PushContext]]:
+        push = self.push
+        if push is None or self._idle > self.options.push_pause:
+            push = self._begin_push(sample)
         self._idle = 0.0
         self._last_good, self._last_contact = sample.time, sample.stamp
         if self._start is None and sample.at_speed:
             self._start = sample.stamp
-        return self._complete(sample.stamp)
-
-    def _complete(self, until: int) -> list[tuple[int, int]]:
-        if self._start is None:
-            return []
-        length = round(self.options.duration * 1e9)
-        stride = round((self.options.stride or self.options.duration) * 1e9)
         done = []
-        while self._start + length <= until:
-            done.append((self._start, self._start + length))
-            self._start += stride
+        while self._start is not None and self._start + self._length <= sample.stamp:
+            done.append((self._start, self._start + self._length, push))
+            self._start += self._stride
         return done
 
     def _not_pushing(self, sample: ContactSample, touching: bool) -> None:
@@ -154,14 +152,15 @@ class PushSegmenter:
         if not touching and self._idle > self.options.push_pause:
             self._first_touch = None
 
-    def _begin_push(self, sample: ContactSample) -> None:
+    def _begin_push(self, sample: ContactSample) -> PushContext:
         first = self._first_touch if self._first_touch is not None else sample.stamp
         if self.push is not None and first == self.push.first_touch:
             first = sample.stamp  # the pusher rested in contact; this push begins with its motion
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
-        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._tare()[0], None, 0)
+        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._tare()[0])
         self._pushes += 1
         self._start = None
+        return self.push
 
     def _end_push(self) -> None:
         self.push, self._start, self._first_touch = None, None, None

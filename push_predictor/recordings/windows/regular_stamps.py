@@ -85,14 +85,16 @@ class RegularStamps:
 
     def _undisturbed(self, stamp: IntArray) -> int:
         """How many of these samples come before jitter shows: that of the first block corrects this block as well."""
-        first = self.noise is None
-        block = np.concatenate([self._block, stamp])
-        while len(block) >= DECIDING:
-            self.noise = stamp_noise(block[:DECIDING])
+        known, stamps = self.noise is not None, np.concatenate([self._block, stamp])
+        blocks = stamps[: len(stamps) // DECIDING * DECIDING].reshape(-1, DECIDING)
+        self._block = stamps[blocks.size :]
+        interval = np.diff(blocks) * NANOSECOND
+        jitter = _jitter(interval, np.median(interval, axis=1, keepdims=True))
+        for number in [*np.flatnonzero(jitter > LEAST).tolist(), *range(len(blocks))[-1:]]:
+            self.noise = stamp_noise(blocks[number])
             if self.corrected:
-                return max(len(stamp) - len(block) + (0 if first else DECIDING), 0)
-            block, first = block[DECIDING:], False
-        self._block = block
+                end = DECIDING * (number + 1 if known or number else 0)
+                return max(end - (len(stamps) - len(stamp)), 0)
         return len(stamp)
 
     def _regular(self, new: OrderedSamples, noise: StampNoise, final: bool) -> OrderedSamples:
@@ -201,10 +203,15 @@ def stamp_noise(stamp: IntArray) -> StampNoise | None:
     if len(stamp) < FEWEST or not np.any(interval > 0.0):
         return None
     usual = float(np.median(interval[interval > 0.0]))
-    # The median ignores gaps. An interval has the noise of two stamps.
-    jitter = float(SD * np.median(np.abs(interval - usual)) / np.sqrt(2.0))
+    jitter = float(_jitter(interval, usual))
     large = max(SHARE * usual, LEAST) < jitter <= LARGEST_SHARE * usual
     return StampNoise(usual, jitter, bool(large and _is_regular(interval - usual, LIMIT * jitter)))
+
+
+def _jitter(interval: Array, usual: Array | float) -> Array:
+    """Standard deviations (...) of stamps with intervals (..., n); the median ignores gaps."""
+    # An interval has the noise of two stamps.
+    return np.asarray(SD * np.median(np.abs(interval - usual), axis=-1) / np.sqrt(2.0))
 
 
 def _is_regular(deviation: Array, limit: float) -> bool:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.streams import ScalarStream
-from push_predictor.recordings.windows.clock_set import CLOCK_SET
 from push_predictor.types import Array, IntArray
 
 LONGEST_GAP = 5_000_000_000  # ns; in a longer gap between samples a scalar keeps the earlier value

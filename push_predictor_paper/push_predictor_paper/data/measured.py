@@ -10,7 +10,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.recordings.importers.mit import MitPlace, MitPush, paths_in, read_mit, read_places, straight_pushes
+from push_predictor.geometry.shapes import SHAPES
+from push_predictor.recordings.importers.mit import (
+    MitPlace,
+    file_metadata,
+    mit_places,
+    paths_in,
+    read_mit,
+    read_places,
+)
 from push_predictor.recordings.importers.mit_square import read_mit_square, square_rig
 from push_predictor.recordings.importers.staging import ImportReport, Notes
 from push_predictor.recordings.read import require_rig
@@ -43,6 +51,15 @@ class Imported:
     rig: Rig | None
     recordings: int
     notes: Notes
+
+
+@dataclass(frozen=True)
+class MitPush:
+    """A straight push at constant speed (mm/s); pair: shape and surface; place: its file."""
+
+    pair: tuple[str, str]
+    speed: float
+    place: MitPlace
 
 
 @dataclass(eq=False)
@@ -96,6 +113,38 @@ def import_pushes(places: tuple[MitPlace, ...]) -> Imported:
     except (ImportSourceError, OSError) as error:
         notes.dropped.append(f"{error}: the files after it in {places[0].path} were skipped")
     return Imported(bare(concatenate(tables)), rig, len(tables) - 1, notes)
+
+
+def straight_pushes(paths: Sequence[Path], skipped: list[str]) -> list[MitPush]:
+    """The straight pushes at constant speed in files and zip archives, each once.
+
+    skipped receives the archives that cannot be read and the shapes of unknown outline. Other files are ignored.
+    """
+    found: dict[tuple[str, int], MitPush] = {}
+    for path in paths:
+        try:
+            places = mit_places(path)
+        except (ImportSourceError, OSError) as error:
+            skipped.append(str(error))
+            continue
+        for place in places:
+            if push := _push_at(place):  # a file extracted next to its archive has the same name and size
+                found.setdefault((Path(place.name).name, place.size), push)
+    unknown = sorted({push.pair[0] for push in found.values()} - set(SHAPES))
+    skipped += [f"{shape} (its outline is not known)" for shape in unknown]
+    return [push for push in found.values() if push.pair[0] in SHAPES]
+
+
+def _push_at(place: MitPlace) -> MitPush | None:
+    """The push of a file, None for other files and other pushes."""
+    try:
+        metadata = file_metadata(place.name)
+        acceleration, speed = float(metadata["a"]), float(metadata["v"])
+    except (ImportSourceError, KeyError, ValueError):
+        return None
+    if acceleration != 0.0 or speed <= 0.0:
+        return None
+    return MitPush((metadata["shape"], metadata["surface"]), speed, place)
 
 
 def _add_square(found: Found, folder: Path) -> None:
