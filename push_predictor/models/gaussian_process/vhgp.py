@@ -42,7 +42,7 @@ class VHGP:
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
-        self._held_out = Remembered()
+        self._predicted, self._held_out = Remembered(), Remembered()
 
     @cached_property
     def solved(self) -> Bound:
@@ -72,6 +72,9 @@ class VHGP:
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
+        return self._predicted.of(inputs, self._predicted_at)
+
+    def _predicted_at(self, inputs: Array) -> LatentPrediction:
         parameters, (signal, noise) = self.parameters, self.functions()
         of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
         mean, explained = signal.predict(inputs)
