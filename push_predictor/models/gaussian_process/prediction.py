@@ -11,14 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
-Given = TypeVar("Given", Array, IntArray)
+Found = TypeVar("Found")
 MOST_REMEMBERED = 4
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
@@ -50,17 +51,17 @@ class LatentPrediction:
         return self.variance + self.process_variance
 
 
-class Remembered:
-    """The last few predictions: moments, densities, correlation and tails of the same rows share them."""
+class Remembered(Generic[Found]):
+    """The last few results: moments, densities, correlation and tails of the same rows share them."""
 
     def __init__(self) -> None:
-        self._known: dict[bytes, LatentPrediction] = {}
+        self._known: dict[bytes, Found] = {}
 
-    def of(self, given: Given, predicted: Callable[[Given], LatentPrediction]) -> LatentPrediction:
-        """What is predicted at the given inputs (m, D), or for the rows of each block (n,) from the others."""
-        key = given.tobytes()
+    def of(self, compute: Callable[[], Found], *given: NDArray[Any]) -> Found:
+        """The result for these arrays, computed if it is not known. It must not be changed."""
+        key = b"".join(each.tobytes() for each in given)
         if (known := self._known.get(key)) is None:
-            known = predicted(given)
+            known = compute()
             self._known = dict([*self._known.items(), (key, known)][-MOST_REMEMBERED:])
         return known
 

@@ -71,7 +71,7 @@ class Candidate:
     @property
     def size(self) -> int:
         """Number of coefficients, p * m."""
-        return self.response.shape[2] * (1 if self.values is None else self.values.shape[1])
+        return int(self.response.shape[2] * (1 if self.values is None else self.values.shape[1]))
 
     @property
     def kind(self) -> Kind:
