@@ -69,6 +69,7 @@ def test_predictions_are_computed_again_for_other_rows_only() -> None:
     assert asked_for(rows.copy()) is first
     rows[0] = 1  # the caller's array may change
     assert asked_for(rows).tolist() == [1.0, 0.0, 1.0]
+    assert asked_for(np.array([0, 0, 1])) is first
     assert asked == [[0, 0, 1], [1, 0, 1]]
     for other in range(2, 6):  # the first is forgotten
         asked_for(np.array([other]))
