@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from push_predictor.models.gaussian_process.prediction import (
+    MOST_ROWS,
     LatentPrediction,
     Remembered,
     density_of_constant_noise,
@@ -53,16 +54,31 @@ def test_fit_is_where_density_and_prior_are_highest(spread: float) -> None:
     assert found.noise_spread <= 1.5 + 1e-12
 
 
-def test_held_out_predictions_are_computed_again_for_other_blocks_only() -> None:
+def test_predictions_are_computed_again_for_other_rows_only() -> None:
     asked = []
 
-    def predicted(block: IntArray) -> LatentPrediction:
-        asked.append(block.tolist())
-        return LatentPrediction(*(block.astype(np.float64),) * 4)
+    def asked_for(rows: IntArray) -> Array:
+        def predicted() -> Array:
+            asked.append(rows.tolist())
+            return rows.astype(np.float64)
 
-    remembered, block = Remembered(), np.array([0, 0, 1])
-    first = remembered.of(block, predicted)
-    assert remembered.of(block.copy(), predicted) is first
-    block[0] = 1  # the caller's array may change
-    assert remembered.of(block, predicted).mean.tolist() == [1.0, 0.0, 1.0]
+        return remembered.of(predicted, rows)
+
+    remembered: Remembered[Array] = Remembered()
+    rows = np.array([0, 0, 1])
+    first = asked_for(rows)
+    assert asked_for(rows.copy()) is first
+    rows[0] = 1  # the caller's array may change
+    assert asked_for(rows).tolist() == [1.0, 0.0, 1.0]
+    assert asked_for(np.array([0, 0, 1])) is first
     assert asked == [[0, 0, 1], [1, 0, 1]]
+    for other in range(2, 6):  # the first is forgotten
+        asked_for(np.array([other, other]))
+    assert asked_for(np.array([0, 0, 1])) is not first
+
+
+@pytest.mark.parametrize("rows", [1, MOST_ROWS + 1])
+def test_a_planners_single_pushes_and_huge_batches_are_not_remembered(rows: int) -> None:
+    remembered: Remembered[Array] = Remembered()
+    first, again = (remembered.of(lambda: np.zeros(rows), np.zeros(rows)) for _ in range(2))
+    assert first is not again

@@ -33,7 +33,7 @@ def fit_of(evidence: Evidence, *mechanisms: str | None) -> Fit:
 
 def refitted_scores(fit: Fit) -> np.ndarray:
     """Score of each block by a fit of a generic effect from the beginning to the rows of the other folds."""
-    evidence, root = fit.rows.evidence, np.sqrt(fit.weight)[:, None] / fit.scale
+    evidence, share, root = fit.rows.evidence, fit.rows.share, fit.weighted.root
     flat, target = root[:, :, None] * fit.columns, root * evidence.z
     ridge = np.diag(RIDGE * np.sum(flat**2, axis=(0, 1)) + 1.0)  # a normal prior of its unit besides
     left = np.zeros_like(target)
@@ -41,10 +41,10 @@ def refitted_scores(fit: Fit) -> np.ndarray:
         out = fit.rows.block % FOLDS == fold
         x, y = flat[~out].reshape(-1, flat.shape[2]), target[~out].ravel()
         left[out] = evidence.z[out] - fit.columns[out] @ np.linalg.solve(x.T @ x + ridge, x.T @ y)
-    unit = np.sqrt(np.average(left**2 * (fit.weight / fit.rows.share)[:, None], axis=0, weights=fit.rows.share))
+    unit = np.sqrt(np.average(left**2 * (fit.weighted.weight / share)[:, None], axis=0, weights=share))
     density = multivariate_t(np.zeros(3), np.diag(unit**2), DEGREES)
     constant = multivariate_t(np.zeros(3), np.eye(3), DEGREES).logpdf(np.zeros(3))
-    return sums_by(fit.rows.block, (fit.rows.share * (density.logpdf(left) - constant))[:, None])[:, 0]
+    return sums_by(fit.rows.block, (share * (density.logpdf(left) - constant))[:, None])[:, 0]
 
 
 def test_scores_are_those_of_a_refit_without_each_fold(deployed: PushModel) -> None:
@@ -69,7 +69,7 @@ def test_scores_of_an_exact_effect_are_those_of_a_refit_without_each_fold(deploy
         change = again.coefficients - whole.coefficients
         left[out] -= (fit.columns @ change)[out]
     share = fit.rows.share
-    unit = np.sqrt(np.average(left**2 * (fit.weight / share)[:, None], axis=0, weights=share))
+    unit = np.sqrt(np.average(left**2 * (fit.weighted.weight / share)[:, None], axis=0, weights=share))
     expected = -0.5 * (DEGREES + 3.0) * np.log1p(np.sum((left / unit) ** 2, axis=1) / DEGREES) - np.log(unit).sum()
     assert fit.scores.sum() == pytest.approx(float(share @ expected), abs=0.3)
 

@@ -89,7 +89,7 @@ def test_fit_without_effects_has_the_residuals_as_they_are(deployed: PushModel) 
     evidence = evidence_of(deployed, pushes(60, 2))
     fit = fitted(FitRows(evidence), [])
     assert not fit.shift.any() and fit.coefficients.shape == (0,)
-    assert fit.scale == pytest.approx(evidence.z.std(axis=0), rel=0.2)
+    assert fit.weighted.scale == pytest.approx(evidence.z.std(axis=0), rel=0.2)
     assert estimated(fit) == ((), {})
 
 
@@ -110,8 +110,8 @@ def test_one_window_far_off_moves_little(deployed: PushModel) -> None:
     slipped[150] += np.linalg.solve(evidence.whitener[150], np.full(3, 50.0))
     before, after = (fit_of(e, LATER) for e in (evidence, replace(evidence, residual=slipped)))
     assert abs(after.coefficients[0] - before.coefficients[0]) < 0.5 * deviations(before)[0]
-    assert after.weight[150] < 0.01 * np.median(after.weight)
-    assert after.scale == pytest.approx(before.scale, rel=0.1)
+    assert after.weighted.weight[150] < 0.01 * np.median(after.weighted.weight)
+    assert after.weighted.scale == pytest.approx(before.weighted.scale, rel=0.1)
 
 
 @pytest.mark.parametrize("copies", [2, 5])
@@ -121,7 +121,7 @@ def test_windows_of_a_push_share_their_weight(deployed: PushModel, copies: int) 
     often = single.take(np.repeat(np.arange(60), copies))
     one, other = (fit_of(e, LATER) for e in (single, often))
     np.testing.assert_allclose(other.coefficients, one.coefficients, rtol=1e-6)
-    information = [float(np.sum(fit.clear.columns**2)) for fit in (one, other)]
+    information = [float(np.sum(fit.clear_columns**2)) for fit in (one, other)]
     assert information[1] / information[0] == pytest.approx(copies / (1.0 + (copies - 1.0) * CORRELATION))
 
 
@@ -157,13 +157,12 @@ def test_error_of_the_inputs_in_both_is_no_effect(stacked: tuple[FitRows, FitRow
 
 def test_an_error_that_the_controls_express_is_removed_whatever_the_weights(stacked: tuple[FitRows, FitRows]) -> None:
     rows = stacked[0]
-    fit = fitted(rows, [])
-    uneven = replace(fit, weight=np.random.default_rng(1).uniform(0.01, 1.0, len(rows.z)))
+    uneven = replace(fitted(rows, []).weighted, weight=np.random.default_rng(1).uniform(0.01, 1.0, len(rows.z)))
     error = np.outer(rows.controls @ np.ones(rows.controls.shape[1]), [1.0, -2.0, 0.5])
     expressed = replace(rows, evidence=_standardised(rows.evidence, error[: len(rows.evidence.table)]))
     assert rows.training is not None
     expressed = replace(expressed, training=_standardised(rows.training, error[len(rows.evidence.table) :]))
-    assert np.abs(replace(uneven, rows=expressed).clear.residual).max() < 1e-9 * np.abs(error).max()
+    assert np.abs(uneven.clear(expressed.z)).max() < 1e-9 * np.abs(error).max()
 
 
 def test_change_since_training_is_kept(stacked: tuple[FitRows, FitRows]) -> None:

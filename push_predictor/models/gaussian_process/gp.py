@@ -69,7 +69,7 @@ class GaussianProcess:
 
     def __init__(self, inputs: Array, outputs: Array, parameters: GpParameters) -> None:
         self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
-        self._held_out = Remembered()
+        self._held_out: Remembered[LatentPrediction] = Remembered()
 
     @cached_property
     def posterior(self) -> DensePosterior:
@@ -90,7 +90,7 @@ class GaussianProcess:
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
-        return self._held_out.of(block, self._predicted_without)
+        return self._held_out.of(lambda: self._predicted_without(block), block)
 
     def _predicted_without(self, block: IntArray) -> LatentPrediction:
         errors, variance = self.posterior.ridge.held_out_errors(self.posterior.weights, block)

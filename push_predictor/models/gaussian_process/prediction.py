@@ -11,11 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
+
+Found = TypeVar("Found")
+MOST_REMEMBERED, MOST_ROWS = 4, 5_000  # results, and rows of one: a planner's batch of a million would take 100 MB
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
 # With a hundred nodes the density is accurate to 1e-6 up to a standard deviation of g of 1.5.
@@ -46,17 +51,21 @@ class LatentPrediction:
         return self.variance + self.process_variance
 
 
-class Remembered:
-    """Held-out predictions, computed again only for other blocks: choices, correlation and tails share them."""
+class Remembered(Generic[Found]):
+    """The last few results of several rows: moments, densities, correlation and tails of the same rows share them."""
 
     def __init__(self) -> None:
-        self._last: tuple[IntArray, LatentPrediction] | None = None
+        self._known: dict[bytes, Found] = {}
 
-    def of(self, block: IntArray, predicted: Callable[[IntArray], LatentPrediction]) -> LatentPrediction:
-        """The prediction of the rows of each block (n,) from the others."""
-        if self._last is None or not np.array_equal(self._last[0], block):
-            self._last = block.copy(), predicted(block)
-        return self._last[1]
+    def of(self, compute: Callable[[], Found], *given: NDArray[Any]) -> Found:
+        """The result for these arrays, computed if it is not known. It must not be changed."""
+        if not 1 < len(given[0]) <= MOST_ROWS:
+            return compute()
+        key = b"".join(each.tobytes() for each in given)
+        if (known := self._known.get(key)) is None:
+            known = compute()
+            self._known = dict([*self._known.items(), (key, known)][-MOST_REMEMBERED:])
+        return known
 
 
 def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:

@@ -149,11 +149,18 @@ class DenseRidge:
         """
         precision = self.precision()
         errors, variance = np.empty(len(weights)), np.empty(len(weights))
-        for number in np.unique(block):
-            rows = np.flatnonzero(block == number)
-            covariance = np.linalg.inv(precision[np.ix_(rows, rows)])
-            errors[rows], variance[rows] = covariance @ weights[rows], np.diagonal(covariance)
+        for rows in rows_of_blocks(block):
+            covariance = np.linalg.inv(precision[rows[:, :, None], rows[:, None, :]])
+            errors[rows] = (covariance @ weights[rows][:, :, None])[:, :, 0]
+            variance[rows] = np.diagonal(covariance, axis1=1, axis2=2)
         return errors, variance
+
+
+def rows_of_blocks(block: IntArray) -> list[IntArray]:
+    """Rows (b, k) of the blocks (n,) of k rows, for each k: equal blocks are computed together."""
+    order = np.argsort(block, kind="stable")
+    _, starts, sizes = np.unique(block[order], return_index=True, return_counts=True)
+    return [order[starts[sizes == size, None] + np.arange(size)] for size in np.unique(sizes)]
 
 
 @dataclass(frozen=True, eq=False)

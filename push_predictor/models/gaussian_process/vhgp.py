@@ -48,7 +48,8 @@ class VHGP:
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
-        self._held_out = Remembered()
+        self._known: Remembered[LatentPrediction] = Remembered()
+        self._held_out: Remembered[LatentPrediction] = Remembered()
 
     @cached_property
     def solved(self) -> Bound:
@@ -80,6 +81,9 @@ class VHGP:
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
+        return self._known.of(lambda: self._predicted(inputs), inputs)
+
+    def _predicted(self, inputs: Array) -> LatentPrediction:
         parameters, (signal, noise) = self.parameters, self.functions
         of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
         mean, explained = signal.predict(inputs)
@@ -95,7 +99,7 @@ class VHGP:
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows, each from the rows of all other blocks (n,), without a new fit."""
-        return self._held_out.of(block, self._predicted_without)
+        return self._held_out.of(lambda: self._predicted_without(block), block)
 
     def _predicted_without(self, block: IntArray) -> LatentPrediction:
         return self.solved.held_out(block)

@@ -14,6 +14,7 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
 from push_predictor.models.effects.traced_session import TracedSession
+from push_predictor.models.gaussian_process.prediction import Remembered
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Shift
 from push_predictor.models.predictors.tails import Tails
@@ -21,7 +22,7 @@ from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 
-SIDE = "edge"
+SIDE, HEADING = "edge", "push_heading"
 GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
 
 
@@ -39,6 +40,7 @@ class ExtendedPredictor:
     scale: Array
     cross: Cross = field(default_factory=dict)
     session: TracedSession = field(default_factory=TracedSession)
+    _known: Remembered[Shift] = field(default_factory=Remembered, init=False, repr=False)
 
     @property
     def mechanics(self) -> FittedMechanics:
@@ -126,6 +128,10 @@ class ExtendedPredictor:
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
+        used = [push.covariates[name] for name in (*self.covariates, HEADING) if name in push.covariates]
+        return self._known.of(lambda: self._shift(push), push.inputs, push.duration, *used)
+
+    def _shift(self, push: Push) -> Shift:
         if len(self._acting.effects) < len(self.effects):  # an effect without a mechanism
             together = joint(self.mechanics, self.effects, push)
             design = np.concatenate(together.designs, axis=2).transpose(0, 2, 1)

@@ -56,7 +56,7 @@ class Candidate:
     nuisance: Array | None = None
     own: bool = False
 
-    @cached_property
+    @property
     def columns(self) -> Array:
         """Standardised columns (n, 3, p * m), p first, projected off the nuisance."""
         return projected(self.plain, self.nuisance)
@@ -67,6 +67,11 @@ class Candidate:
         if self.values is None:
             return self.response
         return products(self.response, self.values)
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients, p * m."""
+        return int(self.response.shape[2] * (1 if self.values is None else self.values.shape[1]))
 
     @property
     def kind(self) -> Kind:

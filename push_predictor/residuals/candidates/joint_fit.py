@@ -73,9 +73,14 @@ class FitRows:
         """Number (n,) of each new window's block of pushes, from 0."""
         return np.unique(self.evidence.block, return_inverse=True)[1]
 
+    @cached_property
+    def folds(self) -> list[IntArray]:
+        """The new windows of each fold."""
+        return [np.flatnonzero(self.block % FOLDS == k) for k in range(min(FOLDS, int(self.block.max()) + 1))]
+
     def effect(self, c: Candidate, coefficients: Array | None = None) -> Effect:
         """The effect of a candidate, of size zero without coefficients."""
-        size = c.plain.shape[2]
+        size = c.size
         found = np.zeros(size) if coefficients is None else coefficients
         return Effect(c.mechanism, c.covariate, c.basis, found, np.zeros((size, size)), self.scale)
 
@@ -90,19 +95,52 @@ class FitRows:
 
 
 @dataclass(frozen=True, eq=False)
+class Weighted:
+    """Weight (N,) of each window; scale (3,): standard deviation of what is left of each output."""
+
+    rows: FitRows
+    weight: Array
+    scale: Array
+
+    @classmethod
+    def by_density(cls, rows: FitRows, residual: Array) -> Weighted:
+        """By Student's t of residuals (N, 3)."""
+        weight, scale = rows.share, np.sqrt(np.average(residual**2, axis=0, weights=rows.share))
+        for _ in range(3):
+            distance = np.sum((residual / scale) ** 2, axis=1)
+            weight = rows.share * (DEGREES + 3.0) / (DEGREES + distance)
+            scale = np.sqrt(weight @ residual**2 / rows.share.sum())
+        return cls(rows, weight, scale)
+
+    @cached_property
+    def root(self) -> Array:
+        """Factor (N, 3) on residuals and columns."""
+        return np.asarray(np.sqrt(self.weight)[:, None] / self.scale)
+
+    @cached_property
+    def residualizer(self) -> Residualizer:
+        """Removes what the controls express."""
+        controls = self.rows.controls
+        root = np.sqrt(self.weight)[:, None]
+        return Residualizer(root * controls if controls.size else np.empty((len(root), 0)))
+
+    def clear(self, values: Array) -> Array:
+        """Values (N, 3, ...) in units of the scale, weighted, without what the controls express."""
+        return self.residualizer(self.root.reshape(*self.root.shape, *[1] * (values.ndim - 2)) * values)
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Effects fitted together.
 
-    shift (n, 3): standardised, of the new windows. columns (N, 3, p): its derivatives by all coefficients. weight (N,):
-    of each window. scale (3,): standard deviation of what is left of each output.
+    shift (n, 3): standardised, of the new windows. columns (N, 3, p): its derivatives by all coefficients.
     """
 
     rows: FitRows
     effects: tuple[Effect, ...]
     shift: Array
     columns: Array
-    weight: Array
-    scale: Array
+    weighted: Weighted
 
     @property
     def coefficients(self) -> Array:
@@ -116,54 +154,42 @@ class Fit:
         return [slice(low, high) for low, high in pairwise(ends)]
 
     @cached_property
-    def clear(self) -> Cleared:
-        """Residuals and columns in units of the scale, weighted, without what the controls express."""
-        root = np.sqrt(self.weight)[:, None] / self.scale
-        residualizer = Residualizer(self._controls)
-        residual = residualizer(root * (self.rows.z - self.rows.padded(self.shift)))
-        columns = residualizer(root[:, :, None] * self.columns)
-        return Cleared(residual, columns, residualizer, root)
+    def clear_residual(self) -> Array:
+        """Residuals (N, 3), see Weighted.clear."""
+        return self.weighted.clear(self.rows.z - self.rows.padded(self.shift))
+
+    @cached_property
+    def clear_columns(self) -> Array:
+        """Columns (N, 3, p), see Weighted.clear."""
+        return self.weighted.clear(self.columns)
 
     @property
-    def _controls(self) -> Array:
-        controls = self.rows.controls
-        return np.sqrt(self.weight)[:, None] * controls if controls.size else np.empty((len(self.rows.z), 0))
+    def left(self) -> Array:
+        """Standardised residuals (N, 3) without what the effects and the controls express."""
+        return self.clear_residual / self.weighted.root
 
     @cached_property
     def scores(self) -> Array:
         """Log density (b,) of each block of new pushes under coefficients fitted without it, up to a constant."""
-        return _held_out(self, self.clear.columns, self.coefficients)
+        return _held_out(self, self.clear_columns, self.coefficients)
 
     @cached_property
     def bend(self) -> Array:
         """Share (N,) of each window's weight that the curvature of Student's t has, on average over directions."""
-        distance = np.sum(self.clear.residual**2, axis=1) / self.weight
+        distance = np.sum(self.clear_residual**2, axis=1) / self.weighted.weight
         return np.asarray(1.0 - 2.0 / 3.0 * distance / (DEGREES + distance))
 
     def with_columns(self, columns: Array) -> Array:
         """The same for the fit with further linear columns (n, 3, q) of new windows, to first order."""
-        clear = self.clear
-        added = clear.residualizer(clear.root[:, :, None] * self.rows.padded(columns))
-        both = np.concatenate([clear.columns, added], axis=2)
+        both = np.concatenate([self.clear_columns, self.weighted.clear(self.rows.padded(columns))], axis=2)
         return _held_out(self, both, np.concatenate([self.coefficients, np.zeros(columns.shape[2])]))
-
-
-@dataclass(frozen=True, eq=False)
-class Cleared:
-    """residual (N, 3) and columns (N, 3, p), weighted by root (N, 3) and projected off the controls."""
-
-    residual: Array
-    columns: Array
-    residualizer: Residualizer
-    root: Array
 
 
 def fitted(rows: FitRows, candidates: Sequence[Candidate], start: Sequence[Array | None] = ()) -> Fit:
     """The effects of these candidates together; start: coefficients near the solution, of those that have any."""
     begin = [*start, *[None] * (len(candidates) - len(start))]
     effects = tuple(rows.effect(c, at) for c, at in zip(candidates, begin, strict=True))
-    weight, scale = _weighted(rows, rows.z)
-    now = _linearised(rows, effects, weight, scale)
+    now = _linearised(rows, effects, Weighted.by_density(rows, rows.z))
     for _ in range(MOST_STEPS):
         now = _reweighted(now)
         if not effects:
@@ -181,13 +207,12 @@ def estimated(fit: Fit, *, of_size: bool = False) -> tuple[tuple[Effect, ...], C
     depend on a few pushes. of_size: whether it also covers errors of the mechanics, as far as pushes of different
     angles, or at different places of the outline, disagree about a coefficient.
     """
-    clear, rows = fit.clear, fit.rows
-    ridge = _ridge(fit, clear.columns)
+    rows, ridge = fit.rows, _ridge(fit, fit.clear_columns)
     covariance = _jackknife(fit, _blocks(rows, rows.block), ridge)
     if of_size:
         for inputs in rows.evidence.table.inputs[:, 1:].T:  # contact, angle
             covariance = _widened(covariance, _jackknife(fit, _blocks(rows, _groups(inputs)), ridge))
-    covariance *= len(rows.z) / max(len(rows.z) - clear.residualizer.q.shape[1], 1)
+    covariance *= len(rows.z) / max(len(rows.z) - fit.weighted.residualizer.q.shape[1], 1)
     parts = fit.parts
     effects = tuple(
         replace(effect, covariance=covariance[part, part]) for effect, part in zip(fit.effects, parts, strict=True)
@@ -205,8 +230,8 @@ def best_place(fit: Fit, step: Candidate) -> float:
     always = replace(fit.effects[-1], basis=DriverBasis("constant"))
     shifts = [rows.shift(effects) for effects in (others, (*others, always))]
     n = len(shifts[0])
-    target = (fit.clear.residual / fit.clear.root)[:n] + fit.shift  # without what the controls express
-    without, with_it = (_density((target - shift) / fit.scale) for shift in shifts)
+    target = fit.left[:n] + fit.shift
+    without, with_it = (_density((target - shift) / fit.weighted.scale) for shift in shifts)
     values = np.asarray(rows.evidence.table.covariates[step.covariate])
     group = _first_of_push(rows.evidence, values) if step.covariate in CUMULATIVE else values
     _, number = np.unique(group, return_inverse=True)
@@ -232,31 +257,20 @@ def standard_error(gains: Array) -> float:
 # --- the fit ---------------------------------------------------------------------------------------------------------
 
 
-def _linearised(rows: FitRows, effects: tuple[Effect, ...], weight: Array, scale: Array) -> Fit:
+def _linearised(rows: FitRows, effects: tuple[Effect, ...], weighted: Weighted) -> Fit:
     evidence = rows.evidence
     if not effects:
         nothing = np.zeros((len(evidence.table), 3))
-        return Fit(rows, effects, nothing, np.zeros((len(rows.z), 3, 0)), weight, scale)
+        return Fit(rows, effects, nothing, np.zeros((len(rows.z), 3, 0)), weighted)
     together = joint(evidence.mechanics, (*evidence.effects, *effects), evidence.push)
     designs = np.concatenate(together.designs[len(evidence.effects) :], axis=2)
     shift = np.einsum("nij,nj->ni", evidence.whitener, together.shift - rows.before)
     columns = np.einsum("nij,njp->nip", evidence.whitener, designs)
-    return Fit(rows, effects, shift, rows.padded(columns), weight, scale)
-
-
-def _weighted(rows: FitRows, residual: Array) -> tuple[Array, Array]:
-    """Weights (N,) and scale (3,) of residuals (N, 3) by Student's t."""
-    weight, scale = rows.share, np.sqrt(np.average(residual**2, axis=0, weights=rows.share))
-    for _ in range(3):
-        distance = np.sum((residual / scale) ** 2, axis=1)
-        weight = rows.share * (DEGREES + 3.0) / (DEGREES + distance)
-        scale = np.sqrt(weight @ residual**2 / rows.share.sum())
-    return weight, scale
+    return Fit(rows, effects, shift, rows.padded(columns), weighted)
 
 
 def _reweighted(fit: Fit) -> Fit:
-    weight, scale = _weighted(fit.rows, fit.clear.residual / fit.clear.root)
-    return replace(fit, weight=weight, scale=scale)
+    return replace(fit, weighted=Weighted.by_density(fit.rows, fit.left))
 
 
 def _stepped(now: Fit) -> tuple[Fit, float]:
@@ -265,8 +279,8 @@ def _stepped(now: Fit) -> tuple[Fit, float]:
     Where pushes begin to stick, a step is far too short: the derivatives of the rest of the data change there, and the
     objective falls by more than promised.
     """
-    clear, ridge = now.clear, _ridge(now, now.clear.columns)
-    gram, slope = _normal(clear.columns, clear.residual)
+    ridge = _ridge(now, now.clear_columns)
+    gram, slope = _normal(now.clear_columns, now.clear_residual)
     slope = slope - ridge * now.coefficients
     step = np.asarray(np.linalg.solve(gram + np.diag(ridge), slope), dtype=np.float64)
     before, best, most, length = _objective(now, ridge), now, 0.0, 1.0
@@ -288,11 +302,11 @@ def _stepped(now: Fit) -> tuple[Fit, float]:
 def _moved(fit: Fit, step: Array) -> Fit:
     new = fit.coefficients + step
     effects = tuple(replace(e, coefficients=new[part]) for e, part in zip(fit.effects, fit.parts, strict=True))
-    return _linearised(fit.rows, effects, fit.weight, fit.scale)
+    return _linearised(fit.rows, effects, fit.weighted)
 
 
 def _objective(fit: Fit, ridge: Array) -> float:
-    return 0.5 * float(np.sum(fit.clear.residual**2) + np.sum(ridge * fit.coefficients**2))
+    return 0.5 * float(np.sum(fit.clear_residual**2) + np.sum(ridge * fit.coefficients**2))
 
 
 def _ridge(fit: Fit, columns: Array) -> Array:
@@ -319,19 +333,21 @@ def _shares(evidence: Evidence) -> Array:
 
 def _held_out(fit: Fit, columns: Array, coefficients: Array) -> Array:
     """Scores (b,) of blocks: each fold's coefficients are one Gauss-Newton step from those of the fit."""
-    rows, clear, n = fit.rows, fit.clear, len(fit.rows.evidence.table)
-    fold, ridge = rows.block % FOLDS, _ridge(fit, columns)
-    residual = clear.residual.copy()
+    rows, n = fit.rows, len(fit.rows.evidence.table)
+    residual = fit.clear_residual[:n].copy()
     if columns.shape[2]:
-        gram, slope = _normal(columns, clear.residual)
-        for k in range(min(FOLDS, int(rows.block.max()) + 1)):
-            own = np.flatnonzero(fold == k)
-            out, pull = _normal(columns[own], clear.residual[own])
-            step = np.linalg.solve(gram - out + np.diag(ridge), slope - pull - ridge * coefficients)
-            residual[own] = clear.residual[own] - columns[own] @ step
-    left = (residual / clear.root)[:n]
+        ridge = _ridge(fit, columns)
+        gram, slope = _normal(columns, fit.clear_residual)
+        apart = [columns[own] for own in rows.folds]
+        parts = [_normal(x, residual[own]) for x, own in zip(apart, rows.folds, strict=True)]
+        squares, pulls = (np.stack(each) for each in zip(*parts, strict=True))
+        sides = slope - pulls - ridge * coefficients
+        steps = np.linalg.solve(gram - squares + np.diag(ridge), sides[:, :, None])[:, :, 0]
+        for x, own, step in zip(apart, rows.folds, steps, strict=True):
+            residual[own] -= x @ step
+    left = residual / fit.weighted.root[:n]
     share = rows.share[:n]
-    unit = np.sqrt(np.average(left**2 * (fit.weight / rows.share)[:n, None], axis=0, weights=share))
+    unit = np.sqrt(np.average(left**2 * (fit.weighted.weight / rows.share)[:n, None], axis=0, weights=share))
     return sums_by(rows.block, (share * (_density(left / unit) - np.log(unit).sum()))[:, None])[:, 0]
 
 
@@ -368,8 +384,8 @@ def _widened(covariance: Array, other: Array) -> Array:
 
 def _jackknife(fit: Fit, block: IntArray, ridge: Array) -> Array:
     """Covariance (p, p) of the coefficients over blocks (N,); ridge (p,): added to the columns' squares."""
-    clear, rows = fit.clear, [block == b for b in np.unique(block)]
-    parts = [_normal(clear.columns[own], clear.residual[own], fit.bend[own]) for own in rows]
+    rows = [block == b for b in np.unique(block)]
+    parts = [_normal(fit.clear_columns[own], fit.clear_residual[own], fit.bend[own]) for own in rows]
     squares, slopes = (np.stack(each) for each in zip(*parts, strict=True))
     square = squares.sum(axis=0) + np.diag(ridge)
     away = np.linalg.solve(square - squares, slopes[:, :, None])[:, :, 0]

@@ -24,7 +24,7 @@ from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference, raised
 from push_predictor.residuals.selection.power import QUANTILE
-from push_predictor.residuals.selection.screening import Controlled, Scores, Screened, screen, unit_scores
+from push_predictor.residuals.selection.screening import Controlled, Scores, Screened, screen
 from push_predictor.types import Array
 
 TINY = 1e-12
@@ -79,10 +79,9 @@ class _Squares:
         residual = Residualizer(controls)(z)
         return cls(residual, evidence.table, Controlled.of(_bounded_squares(residual), controls, evidence.block))
 
-    def raw_scores(self, basis: DriverBasis, on: Array) -> tuple[Scores, Array]:
-        """Block scores and information of a covariate's basis, for the variance of the outputs on (3,)."""
-        values = basis.values(self.table.covariates, len(self.residual))
-        return self.bounded.raw_scores(on[None, :, None] * values[:, None, :])
+    def columns(self, basis: DriverBasis, on: Array) -> Array:
+        """Columns (n, 3, m) of a covariate's basis, for the variance of the outputs on (3,)."""
+        return on[None, :, None] * basis.values(self.table.covariates, len(self.residual))[:, None, :]
 
 
 def variance_effects(
@@ -162,7 +161,9 @@ def _against_training(
         return screened
     before = _Squares.of(model, baseline.evidence, baseline.evidence.z)
     every = {k: (trials[k][0].basis, _on(trials[k][0].outputs)) for k in compared}
-    changes = {k: difference(new.raw_scores(*each), before.raw_scores(*each)) for k, each in every.items()}
+    changes = {
+        k: difference(*(s.bounded.raw_scores(s.columns(*each)) for s in (new, before))) for k, each in every.items()
+    }
     return raised(screened, changes, seed)
 
 
@@ -196,7 +197,8 @@ def _along(squares: _Squares, name: str, basis: DriverBasis) -> list[Trial]:
     for outputs in TRIED:
         on = _on(outputs)
         ratio = float(np.prod(trend ** (on / on.sum())))
-        trials.append((VarianceEffect(name, basis, outputs, 1.0, ratio), unit_scores(*squares.raw_scores(basis, on))))
+        scores = squares.bounded.unit_scores(squares.columns(basis, on))
+        trials.append((VarianceEffect(name, basis, outputs, 1.0, ratio), scores))
     return trials
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.ridge import rows_of_blocks
 from push_predictor.types import Array, IntArray
 
 SINGULAR = 0.01  # bounds the adjustment of a block that alone determines a direction of the controls
@@ -34,7 +35,7 @@ class Residualizer:
         residual = self(z)
         adjusted = residual.copy() if noise is None else self(noise)
         if self.q.shape[1]:
-            for rows in _rows_of(block):
+            for rows in rows_of_blocks(block):
                 own = self.q[rows]  # (b, k, m)
                 values, vectors = np.linalg.eigh(np.eye(rows.shape[1]) - own @ own.transpose(0, 2, 1))
                 scaled = vectors / np.sqrt(np.maximum(values, SINGULAR))[:, None, :]
@@ -61,7 +62,7 @@ class ResidualBlocks:
         parts = [flat - columns @ (columns.T @ flat) for flat in (self.residual.ravel(), self.adjusted.ravel())]
         residual, adjusted = (part.reshape(self.residual.shape) for part in parts)
         rows_of = columns.reshape(*self.residual.shape, -1)
-        for rows in _rows_of(self.block):
+        for rows in rows_of_blocks(self.block):
             there = rows_of[rows].reshape(len(rows), -1, columns.shape[1])
             adjusted[rows] = _unshrunk(there, adjusted[rows].reshape(len(rows), -1)).reshape(*rows.shape, -1)
         return ResidualBlocks(residual, adjusted, self.block)
@@ -81,17 +82,5 @@ def _unshrunk(columns: Array, values: Array) -> Array:
 def sums_by(block: IntArray, values: Array) -> Array:
     """Sums (b, p) of values (n, p) over the blocks, in ascending order of their numbers."""
     order = np.argsort(block, kind="stable")
-    return np.asarray(np.add.reduceat(values[order], _starts(block[order])))
-
-
-def _rows_of(block: IntArray) -> list[IntArray]:
-    """Rows (b, k) of the blocks of k rows, for each k: equal blocks are computed together."""
-    order = np.argsort(block, kind="stable")
-    starts = _starts(block[order])
-    sizes = np.diff(starts, append=len(order))
-    return [order[starts[sizes == size, None] + np.arange(size)] for size in np.unique(sizes)]
-
-
-def _starts(ordered: IntArray) -> IntArray:
-    """Where the numbers of blocks (n,), in ascending order, change; first 0."""
-    return np.concatenate([[0], np.flatnonzero(np.diff(ordered)) + 1])
+    starts = np.unique(block[order], return_index=True)[1]
+    return np.asarray(np.add.reduceat(values[order], starts))

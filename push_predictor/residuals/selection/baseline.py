@@ -27,7 +27,7 @@ from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.split import FEWEST_PUSHES
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
-from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, Screened, raw_scores, screen
+from push_predictor.residuals.selection.screening import TINY, Columns, Controlled, Scores, Screened, screen
 from push_predictor.types import Array
 
 
@@ -69,6 +69,11 @@ class Baseline:
 
     def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         """Block scores and information of a candidate on the training windows."""
+        if candidate not in self._known:
+            self._known[candidate] = self._scores(candidate)
+        return self._known[candidate]
+
+    def _scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         evidence = self.evidence
         response = self._response(candidate.mechanism)
         in_training = replace(
@@ -77,8 +82,8 @@ class Baseline:
             values=candidate.basis.values(evidence.table.covariates, len(response)),
             nuisance=self._nuisance.of_change(*candidate.label, candidate.basis, candidate.kind),
         )
-        columns = self._seen[candidate.kind].residualizer(in_training.columns)
-        return raw_scores(self._blocks(candidate.kind, in_training.nuisance), columns)
+        columns = Columns(self._seen[candidate.kind].residualizer(in_training.columns))
+        return columns.scores(self._blocks(candidate.kind, in_training.nuisance)), columns.information
 
     def _blocks(self, kind: Kind, nuisance: Array | None) -> ResidualBlocks:
         """The residuals as a kind of candidate sees them; many candidates share one array of nuisance columns."""
@@ -91,6 +96,10 @@ class Baseline:
     def _seen(self) -> dict[Kind, Controlled]:
         z, block = self.evidence.z, self.evidence.block
         return {kind: Controlled.of(z, controls_for(kind, self.inputs), block) for kind in get_args(Kind)}
+
+    @cached_property
+    def _known(self) -> dict[Candidate, tuple[Scores, Array]]:
+        return {}
 
     @cached_property
     def _known_blocks(self) -> dict[tuple[Kind, int], ResidualBlocks]:

@@ -16,7 +16,7 @@ from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls
 from push_predictor.residuals.evidence.residualizer import sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference
-from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, moments, raw_scores, unit_scores
+from push_predictor.residuals.selection.screening import TINY, Columns, Controlled, Scores, moments
 from push_predictor.residuals.selection.search import SearchResult
 from push_predictor.types import Array, IntArray
 
@@ -59,16 +59,16 @@ def _is_reported(candidate: Candidate, strongest: str | None) -> bool:
 
 def _size(candidate: Candidate, seen: Controlled, threshold: float, baseline: Baseline | None) -> float:
     """Norm of the coefficients, in units of the parameter, at which the power is 80 %."""
-    columns = seen.residualizer(candidate.columns)
-    raw = raw_scores(seen.blocks, columns)
+    columns = Columns(seen.residualizer(candidate.columns))
+    raw = columns.scores(seen.blocks), columns.information
     against = baseline is not None and (baseline.judges(candidate) or baseline.compares(candidate))
     training = baseline.scores(candidate) if baseline is not None and against else None
-    scores = unit_scores(*raw) if training is None else difference(raw, training)
+    scores = raw[0].turned(columns.unit) if training is None else difference(raw, training)
     informations = [raw[1]] if training is None else [raw[1], training[1]]
     spread = sum(np.linalg.pinv(a, rcond=TINY, hermitian=True) for a in informations)
     if not scores.rows.shape[1] or not np.any(spread):
         return float("nan")
-    length = _detectable_length(scores, threshold, _unevenness(columns, seen.blocks.block))
+    length = _detectable_length(scores, threshold, _unevenness(columns.flat, seen.blocks.block))
     return length * float(np.sqrt(np.linalg.eigvalsh(spread)[-1]))
 
 

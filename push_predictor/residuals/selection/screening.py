@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -96,25 +97,38 @@ class Controlled:
 
     def raw_scores(self, columns: Array) -> tuple[Scores, Array]:
         """Scores of columns (n, 3, p) and their information, the controls regressed out of them too."""
-        return raw_scores(self.blocks, self.residualizer(columns))
+        own = Columns(self.residualizer(columns))
+        return own.scores(self.blocks), own.information
 
     def unit_scores(self, columns: Array) -> Scores:
         """Scores of columns (n, 3, p) in coordinates in which their information is the identity."""
-        return unit_scores(*self.raw_scores(columns))
+        own = Columns(self.residualizer(columns))
+        return own.scores(self.blocks).turned(own.unit)
 
 
-def unit_scores(scores: Scores, information: Array) -> Scores:
-    """Scores in coordinates in which the information (p, p) is the identity."""
-    values, vectors = np.linalg.eigh(information)
-    keep = values > TINY * max(values[-1], np.finfo(float).tiny)
-    return scores.turned(vectors[:, keep] / np.sqrt(values[keep]))
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns (n, 3, p) with the controls regressed out, to be scored on any residuals."""
 
+    flat: Array
 
-def raw_scores(blocks: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
-    """Scores of residualised columns (n, 3, p), and the columns' information (p, p)."""
-    x = flat.reshape(-1, flat.shape[2])
-    rows = sums_by(blocks.block, np.einsum("nkp,nk->np", flat, blocks.adjusted))
-    return Scores(rows, x.T @ blocks.residual.ravel()), x.T @ x
+    @cached_property
+    def information(self) -> Array:
+        """Their products (p, p)."""
+        x = self.flat.reshape(-1, self.flat.shape[2])
+        return np.asarray(x.T @ x)
+
+    @cached_property
+    def unit(self) -> Array:
+        """Coordinates (p, q) in which the information is the identity."""
+        values, vectors = np.linalg.eigh(self.information)
+        keep = values > TINY * max(values[-1], np.finfo(float).tiny)
+        return np.asarray(vectors[:, keep] / np.sqrt(values[keep]))
+
+    def scores(self, blocks: ResidualBlocks) -> Scores:
+        """Their scores on these residuals."""
+        rows = sums_by(blocks.block, np.einsum("nkp,nk->np", self.flat, blocks.adjusted))
+        return Scores(rows, self.flat.reshape(-1, self.flat.shape[2]).T @ blocks.residual.ravel())
 
 
 def _squares_drawn(rows: Sequence[Array], signs: Array) -> Array:

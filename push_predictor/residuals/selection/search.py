@@ -80,13 +80,14 @@ def search(gate: Gate, rows: FitRows) -> SearchResult:
 class _Search:
     """passed: p of what the gate let pass, by label, in the order of their statistics. known: fits by their terms.
 
-    unchanged: labels that training shows to the same degree.
+    formed: gains and best forms to first order. unchanged: labels that training shows to the same degree.
     """
 
     gate: Gate
     rows: FitRows
     passed: dict[Label, float] = field(default_factory=dict)
     known: dict[tuple[Key, ...], Fit] = field(default_factory=dict)
+    formed: dict[tuple[Fit, Label], tuple[float, Candidate]] = field(default_factory=dict)
     unchanged: set[Label] = field(default_factory=set)
 
     def found(self) -> SearchResult:
@@ -171,7 +172,7 @@ class _Search:
             return []
         forms = {basis.name: basis for basis in forms_of(c.covariate, self.rows.evidence.table) if not basis.offset}
         tried = [self._candidate(*c.label, basis) for basis in forms.values() if basis.name != c.basis.name]
-        return [self._fitted_with(others, t, base) for t in tried if t.plain.shape[2] <= c.plain.shape[2]]
+        return [self._fitted_with(others, t, base) for t in tried if t.size <= c.size]
 
     def _tried(self, base: Fit, others: Sequence[Candidate]) -> list[Trial]:
         """The labels that gain most to first order, each in its best form, fitted exactly."""
@@ -215,6 +216,11 @@ class _Search:
 
     def _in_best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
         """The simplest form within a standard error of the best, and its gain, both to first order."""
+        if (base, (mechanism, covariate)) not in self.formed:
+            self.formed[base, (mechanism, covariate)] = self._best_form(base, mechanism, covariate)
+        return self.formed[base, (mechanism, covariate)]
+
+    def _best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
         forms = [DriverBasis("constant")] if self._constants.get(mechanism) == covariate else []
         if (mechanism, covariate) in self._driven:
             forms += forms_of(covariate, self.rows.evidence.table)
@@ -222,7 +228,7 @@ class _Search:
         scores = [base.with_columns(c.plain) for c in every]
         best = max(scores, key=lambda each: float(each.sum()))
         near = [k for k, each in enumerate(scores) if (best - each).sum() <= standard_error(best - each)]
-        k = min(near, key=lambda k: (every[k].plain.shape[2], -scores[k].sum()))
+        k = min(near, key=lambda k: (every[k].size, -scores[k].sum()))
         return float((scores[k] - base.scores).sum()), every[k]
 
     def _candidate(self, mechanism: str | None, covariate: str, basis: DriverBasis) -> Candidate:

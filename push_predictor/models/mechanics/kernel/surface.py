@@ -179,9 +179,11 @@ def driven_twist(pusher: Three, surface: cython.pointer(Surface), acting: cython
     """
     load: Three = stretched(pusher, cython.address(acting.root))
     factor: cython.double = 0.0  # that brings the pusher's load onto the surface
+    found: Answer
     if acting.pulled:
-        factor = _with_pull(cython.address(load), surface, acting)
-    found: Answer = answer(load, surface, cython.address(acting.root))
+        found = _with_pull(load, surface, acting, cython.address(factor))
+    else:
+        found = answer(load, surface, cython.address(acting.root))
     twist: Three = stretched(found.twist, cython.address(acting.root))
     if acting.height != 0.0:
         if not acting.pulled:
@@ -196,12 +198,9 @@ def driven_twist(pusher: Three, surface: cython.pointer(Surface), acting: cython
 @cython.nogil
 @cython.exceptval(check=False)
 def _with_pull(
-    load: cython.pointer(Three), surface: cython.pointer(Surface), acting: cython.pointer(Acting)
-) -> cython.double:
-    """Add the pull to the load of a pusher such that both together lie on the surface; return the pusher's factor.
-
-    The load keeps its size: nothing but its direction counts.
-    """
+    load: Three, surface: cython.pointer(Surface), acting: cython.pointer(Acting), factor: cython.p_double
+) -> Answer:
+    """Answer of a pusher's load with a pull, both together on the surface, in the size of the load; sets its factor."""
     pull: Three = acting.pull
     given: cython.double = sqrt(load.x * load.x + load.y * load.y + load.m * load.m)
     x: cython.double = load.x / given
@@ -212,12 +211,17 @@ def _with_pull(
     radius: cython.double = 1.0
     share: cython.double = 1.0
     on: Three
+    found: Answer
+    found.twist, found.gauge = load, 1.0
     _k: cython.int
     for _k in range(PULL_ROUNDS):
         margin: cython.double = dot * dot + radius * radius - square
         share = -dot + sqrt(margin if not margin < SMALLEST_MARGIN else SMALLEST_MARGIN)
         on.x, on.y, on.m = share * x + pull.x, share * y + pull.y, share * m + pull.m
-        size: cython.double = sqrt(on.x * on.x + on.y * on.y + on.m * on.m)
-        radius = size / answer(on, surface, cython.address(acting.root)).gauge
-    load.x, load.y, load.m = given * on.x, given * on.y, given * on.m
-    return share / given
+        found = answer(on, surface, cython.address(acting.root))
+        radius = sqrt(on.x * on.x + on.y * on.y + on.m * on.m) / found.gauge
+    factor[0] = share / given
+    found.twist.x *= given
+    found.twist.y *= given
+    found.twist.m *= given
+    return found
