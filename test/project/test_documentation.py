@@ -98,8 +98,8 @@ def test_every_parameter_has_a_description_and_accepts_its_default(node: str):
 @pytest.mark.parametrize("node", NODES)
 def test_the_configuration_file_describes_every_parameter_and_the_reference_page_shows_it(node: str):
     name = f"config/{node}.yaml"
-    comments = re.findall(r"^ {4,6}\w+: .*?  # (.+)$", (REPOSITORY / name).read_text(), re.MULTILINE)
-    assert comments == [described(row) for row in NODES[node][1]]
+    lines = re.findall(r"^ {4,6}(\w+): .*?  # (.+)$", (REPOSITORY / name).read_text(), re.MULTILINE)
+    assert lines == [(row.name.rpartition(".")[2], described(row)) for row in NODES[node][1]]
     assert f'--8<-- "{name}"' in section(REFERENCE / f"{node}.md", "Parameters")
 
 
