@@ -130,7 +130,6 @@ setup(
             "mypy>=1.11",
             "scikit-learn>=1.4",
             "mcap-ros2-support>=0.5",
-            "dask[distributed]>=2024.5",
             "argcomplete>=3",
             "pyarrow>=14",
         ],

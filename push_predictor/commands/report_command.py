@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,9 +79,6 @@ def _add_paper(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"
     )
     parser.add_argument("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)")
-    parser.add_argument(
-        "--cluster", metavar="ADDRESS", help="address of a dask scheduler whose machines all see --out and --data"
-    )
     _add_common(parser)
     parser.set_defaults(run=_paper)
 
@@ -109,27 +105,12 @@ def _paper(options: argparse.Namespace) -> None:
     if options.data is not None and not options.data.is_dir():
         raise RequestError("--data", str(options.data), "a folder that exists")
     plan = QUICK if options.quick else FULL
-    with _parallel(options.cluster), progress("report paper") as watch:
+    with progress("report paper") as watch:
         work = Work(options.out.resolve() / "work", options.jobs or -1)
         keep = None if options.recordings is None else options.recordings.resolve()
         page, content = report_paper(plan, work, options.out, options.data, keep, watch)
     if not write_json(options, {"report": str(page), **content}):
         print(page)
-
-
-@contextmanager
-def _parallel(cluster: str | None) -> Iterator[None]:
-    """Send joblib's jobs to a dask scheduler, if one was given."""
-    if cluster is None:
-        yield
-        return
-    try:
-        import joblib
-        from distributed import Client
-    except ImportError as error:
-        raise PushPredictorError(f"--cluster needs dask ({error}); pip install 'dask[distributed]'") from None
-    with Client(cluster, timeout="10s"), joblib.parallel_config(backend="dask"):
-        yield
 
 
 def _validation(options: argparse.Namespace) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Independent calls, run on all cores or on a cluster by joblib, and cached on disk.
+"""Independent calls, run on all cores by joblib, and cached on disk.
 
 The cache belongs to one state of the sources: after a change of a module that matters, results are computed again.
 """
@@ -51,8 +51,7 @@ NO_RESULTS = (  # folders on which no cached result depends
 class Work:
     """A cache of calls, and the processes that fill it. A call made before, also by another process, is read from disk.
 
-    folder: of the cache; cores: calls at the same time, -1 for one per core. watch: sees each call. With
-    `joblib.parallel_config` another back end (dask, say) runs the calls; its workers must see the folder.
+    folder: of the cache; cores: calls at the same time, -1 for one per core. watch: sees each call.
     """
 
     def __init__(self, folder: Path, cores: int = -1) -> None:

@@ -53,7 +53,6 @@ KEY_OF = {  # of imports that are not named as their key
 }
 OPTIONAL = {
     "argcomplete",
-    "distributed",
     "h5py",
     "joblib",
     "pyarrow",
@@ -61,7 +60,7 @@ OPTIONAL = {
     "rosbags",
 }  # extras, no dependency
 ONLY_TO_BUILD = {"cython": "cython3"}  # compiled modules import it, and need it no longer when they are compiled
-ONLY_BY_PIP = {"diptest", "distributed", "pyarrow"}  # no key of rosdep
+ONLY_BY_PIP = {"diptest", "pyarrow"}  # no key of rosdep
 IMPORTS = re.compile(
     r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)"
     r"|(?:importorskip|import_module)\([\"'](\w+)[\w.]*[\"'][,)]",
