@@ -18,7 +18,7 @@ from push_predictor.types import Array, BoolArray
 REACH = 0.1  # s of data after a sample that its evaluation needs
 NEAR = 0.05  # s around a sample that determine motion and gap
 FORWARD_SPAN = 0.03  # s after a sample in which the pusher must already move
-FIT_SPAN = 0.020  # s of a window that determine its velocity and angle (docs/reference/recordings.md)
+FIT_SPAN = 0.020  # s of a window that determine its velocity and angle (docs/explanation/windows.md)
 NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is accelerating
 MISSING_PERIODS = 2.5  # periods between samples of the force from which some are missing
 SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
