@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from coarse import coarse_fits
 from scipy.stats import binom
 from synthetic import square_rig
 
@@ -24,7 +26,6 @@ from push_predictor.evaluation.alarm.scores import (
     calibrate,
     held_out_moments,
 )
-from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.splits import push_folds
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
@@ -81,12 +82,6 @@ def test_larger_changes_are_detected_sooner():
     assert delays[0] > delays[1] > delays[2] and delays[0] < 80 and delays[2] <= 10, delays
 
 
-def test_two_sided_score_detects_shifts_in_both_directions():
-    for shift in (-2.0, 2.0):
-        alarm = Alarm((ScoreKind("shift", 1.0, True),), scores(150, 0)[:, 1:], 0.01)
-        assert fired_after(alarm, scores(100, 1, shift)[:, 1:]) is not None
-
-
 def test_smaller_residuals_give_no_alarm():
     alarm = Alarm((ScoreKind("size", 1.0, False),), scores(150, 0)[:, :1], 0.01)
     assert fired_after(alarm, scores(200, 1)[:, :1] * 0.05) is None
@@ -100,9 +95,13 @@ def test_alarm_is_invariant_to_the_order_of_the_calibration():
 
 
 def test_equal_scores_are_ranked_at_random_and_give_no_evidence():
-    fired = [fired_after(Alarm(KINDS, np.zeros((30, 2)), 0.05, seed), np.zeros((100, 2))) for seed in range(50)]
-    assert sum(after is not None for after in fired) <= binom.ppf(0.999, 50, 0.05)
-    assert len({Alarm(KINDS, np.zeros((30, 2)), 0.05, 7).add("a", np.zeros(2)) for _ in range(3)}) == 1
+    fired = [fired_after(Alarm(KINDS, np.zeros((30, 2)), 0.05, seed), np.zeros((60, 2))) for seed in range(30)]
+    assert sum(after is not None for after in fired) <= binom.ppf(0.999, 30, 0.05)
+    alike = [Alarm(KINDS, np.zeros((30, 2)), 0.05, seed) for seed in (7, 7, 8)]
+    for alarm in alike:
+        alarm.add("a", np.zeros(2))
+    one, same, other = (alarm.state.log10_evidence for alarm in alike)
+    assert one == same != other
 
 
 def test_alarm_fires_once_and_again_only_after_a_reset():
@@ -165,6 +164,12 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
     return PushTable(inputs, duration, outcomes, push_id, {"slider_heading": rng.uniform(-3.0, 3.0, n)})
 
 
+@pytest.fixture(scope="module", autouse=True)
+def coarsely() -> Iterator[None]:
+    with coarse_fits(8):
+        yield
+
+
 @pytest.fixture(autouse=True)
 def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computing responses takes most of the time."""
@@ -200,15 +205,6 @@ def test_alarm_fires_after_a_change_and_not_on_pushes_like_the_training(kind: st
 def test_number_of_windows_of_a_push_does_not_raise_an_alarm(models: dict[str, PushModel]):
     for windows in (1, 6):
         assert not alarm_of(models["analytical"], made_up(60, 3, windows=windows)).fired
-
-
-def test_training_pushes_are_scored_by_cross_validation(models: dict[str, PushModel]):
-    training, new = models["gp"].training, made_up(200, 4)
-    prediction = models["gp"].predict_rows(new.inputs, new.duration)
-    fresh = standardised(prediction.mean, prediction.covariance, new.outcomes).std(axis=0)
-    assert standardised(*held_out_moments(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(
-        fresh, rel=0.15
-    )
 
 
 def test_training_pushes_of_a_learnt_model_are_scored_by_refits_of_the_other_half(models: dict[str, PushModel]):

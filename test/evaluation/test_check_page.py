@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistakes import another_body, tracked
+from mistakes import heading_in_degrees, tracked
 from repository import REPOSITORY
 
 from push_predictor.evaluation.check_page import (
@@ -47,7 +47,7 @@ def turned() -> CheckedData:
 
 @pytest.fixture(scope="module")
 def refused() -> CheckedData:
-    return checked_recording(another_body(read_recording(HEXAGON)))
+    return checked_recording(heading_in_degrees(read_recording(HEXAGON)))
 
 
 def test_sound_data_are_called_sound(sound: CheckedData) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Metrics and splits by their definitions."""
+"""Metrics, splits and normal scores by their definitions."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import multivariate_normal, norm
+from hypothesis.extra.numpy import array_shapes, arrays
+from scipy.special import ndtri
+from scipy.stats import multivariate_normal, norm, rankdata
 
 from push_predictor.evaluation.metrics import coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, random_split, split_by_push
+from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import PushTable, concatenate
+from push_predictor.types import Array
 
 RNG = np.random.default_rng(0)
 OUTCOMES = RNG.standard_normal((400, 3)) * [1e-3, 2e-3, 0.05]
@@ -140,3 +144,22 @@ def test_concatenated_tables_keep_common_covariates() -> None:
     other.covariates.update(b=np.zeros(3))
     both = concatenate([one, other])
     assert len(both) == 5 and list(both.covariates) == ["b"]
+
+
+FEW_VALUES = st.integers(-3, 3).map(float)  # so that many are equal
+
+
+@given(arrays(np.float64, array_shapes(min_dims=1, max_dims=2, min_side=1, max_side=20), elements=FEW_VALUES))
+def test_normal_scores_are_those_of_average_ranks(values: Array):
+    np.testing.assert_allclose(normal_scores(values), ndtri((rankdata(values, axis=0) - 0.5) / len(values)))
+
+
+def test_column_with_nan_has_no_scores():
+    scores = normal_scores(np.array([[1.0, 1.0], [np.nan, 2.0], [3.0, np.inf]]))
+    assert np.isnan(scores[:, 0]).all()
+    np.testing.assert_allclose(scores[:, 1], ndtri([1 / 6, 1 / 2, 5 / 6]), atol=1e-15)
+
+
+def test_normal_scores_depend_on_order_only():
+    values = np.random.default_rng(0).standard_normal((30, 3))
+    assert np.array_equal(normal_scores(values), normal_scores(np.exp(values)))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +15,14 @@ from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, ver
 from push_predictor_paper.data.corpus import Corpus, PushSet, learning_set, learning_spec, pair_number, travel_for
 from push_predictor_paper.data.repetitions import FEWEST, grid_spec, repeat_push
 from push_predictor_paper.plan import FULL, QUICK
+from push_predictor_paper.section import TooFewError
+from push_predictor_paper.sections import divergence, maps, modality, noise
 from push_predictor_paper.sections.data import known, section, speed_counts
 
 from push_predictor.recordings.load import load_data
 from push_predictor.simulation.rig_simulator import SimulationSpec
+
+GRID = made_up_grid(replace(PLAN, contacts=11, angle_step=0.75, repetitions=100))
 
 
 def test_the_full_plan_is_of_the_papers_size() -> None:
@@ -77,6 +82,23 @@ def test_push_with_too_few_repetitions_has_no_mean() -> None:
     assert np.isnan(few.mean).all() and np.isnan(few.sd).all() and np.isnan(few.intervals[0]).all()
 
 
+@pytest.mark.parametrize(
+    ("of", "left", "reason"),
+    [
+        (modality, 3, "No push of the grid"),
+        (divergence, 3, "No push of the grid"),
+        (maps, 2, "Only 0 pushes"),
+        (noise, 2, "have enough repetitions"),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+def test_grid_with_too_few_repetitions_decides_nothing(tmp_path: Path, of: Any, left: int, reason: str) -> None:
+    study = made_up_study(tmp_path)
+    few = tuple(replace(cell, outcomes=cell.outcomes[:left]) for cell in study.reference_grid.cells)
+    with pytest.raises(TooFewError, match=reason):
+        of.section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))
+
+
 def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
     grid = made_up_grid()
     assert grid.mean.shape == (len(grid.angles), len(grid.fractions), 3)
@@ -114,9 +136,11 @@ def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp
     ],
 )
 def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(repetitions: int, seen: int, verdict: str) -> None:
-    grid = made_up_grid(replace(PLAN, contacts=11, angle_step=0.75, repetitions=repetitions))
-    few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in grid.cells[seen:]]
-    evidence = known(replace(grid, cells=(*grid.cells[:seen], *few)))
+    cells = list(GRID.cells)  # whose intervals are computed once
+    if repetitions < len(cells[0].outcomes):
+        cells = [replace(c, commanded=repetitions, outcomes=c.outcomes[:repetitions]) for c in cells]
+    few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in cells[seen:]]
+    evidence = known(replace(GRID, cells=(*cells[:seen], *few)))
     assert verdict_on("data", "known", evidence) == verdict
 
 

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_grid, made_up_study, truth, verdict_on
 from push_predictor_paper.fits.fit import Answer
-from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.section import Section
 from push_predictor_paper.sections.divergence import (
     divergences,
     estimate,
@@ -95,13 +94,6 @@ def test_section_has_the_papers_figures_next_to_ours(made: Section) -> None:
     assert [*made.evidence] == ["mean", "median", "good"]
     assert all(picture.path.stat().st_size > 10_000 and picture.alt for picture in made.pictures)
     json.dumps(made.tables[0].json(), allow_nan=False)
-
-
-def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
-    study = made_up_study(tmp_path)
-    unseen = made_up_grid(replace(PLAN, repetitions=3))
-    with pytest.raises(TooFewError, match="No push of the grid"):
-        section(replace(study, grids={"plywood": unseen}))
 
 
 ZERO, ONE = np.zeros(1), np.ones(1)

@@ -13,6 +13,7 @@ import paper_studies
 import pytest
 from push_predictor_paper.data.repetitions import DRAWS, PATH_POINTS, RepeatedGrid, Repetitions
 from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.sections import kinds_of_push
 from push_predictor_paper.sections.kinds_of_push import (
     OfPaths,
     apart_evidence,
@@ -28,6 +29,7 @@ from push_predictor_paper.sections.kinds_of_push import (
 )
 from push_predictor_paper.study import Study
 
+from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 
 ALONG = np.linspace(0.0, 1.0, PATH_POINTS)
@@ -145,9 +147,9 @@ def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -
     json.dumps(made.tables[0].json(), allow_nan=False)
 
 
-@pytest.mark.slow
-def test_equal_pushes_are_not_distinguished(tmp_path: Path) -> None:
+def test_equal_pushes_are_not_distinguished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ten pushes of one spread, straight: the half that did not choose the extremes shows that they are chance."""
+    monkeypatch.setattr(kinds_of_push, "_picture", lambda *_: Picture(tmp_path, "", ""))
     made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
     assert not {*verdicts(made)} & {"holds", "holds in part"}
 

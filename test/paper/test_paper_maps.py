@@ -17,7 +17,6 @@ from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
 from push_predictor_paper.plan import GRID_SPEED
-from push_predictor_paper.section import TooFewError
 from push_predictor_paper.sections.maps import (
     MIRRORED,
     NAMED,
@@ -26,7 +25,6 @@ from push_predictor_paper.sections.maps import (
     likenesses,
     peak_evidence,
     peaks_of,
-    section,
 )
 from push_predictor_paper.statistics.grid_maps import (
     Peak,
@@ -218,13 +216,6 @@ def test_a_model_that_is_the_truth_agrees_and_one_without_shape_does_not() -> No
     wide = likenesses(cells, {"VHGP": [Answer(mean, sd, sd, known), Answer(mean, 3.0 * sd, sd, known)]})
     assert wide["sd", "VHGP"][0].size == pytest.approx(2.0)  # of each draw by itself, then the mean
     assert [verdict_on("maps", claim, e) for claim, e in agreement_evidence(found).items()] == ["holds", "holds"]
-
-
-def test_too_few_known_pushes_decide_nothing(tmp_path: Path) -> None:
-    study = made_up_study(tmp_path)
-    few = tuple(replace(cell, outcomes=cell.outcomes[:2]) for cell in study.reference_grid.cells)
-    with pytest.raises(TooFewError, match="Only 0 pushes"):
-        section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))
 
 
 def test_maps_are_nan_outside_the_training_data(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.fits.fit import Fit, trained
 from push_predictor_paper.painters.histograms import moments
-from push_predictor_paper.section import Section, TooFewError
+from push_predictor_paper.section import Section
 from push_predictor_paper.sections import modality
 from push_predictor_paper.sections.modality import mean_over_pushes, model_loss, section
 from push_predictor_paper.statistics.modes import (
@@ -81,11 +81,6 @@ def test_section_has_findings_tables_and_picture(with_modes: Section) -> None:
         assert {len(row) for row in table.rows} == {len(table.head)}
     assert with_modes.pictures[0].path.stat().st_size > 10_000
     json.dumps(with_modes.tables[0].json(), allow_nan=False)
-
-
-def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
-    with pytest.raises(TooFewError, match="No push of the grid"):
-        made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
 
 
 def test_tests_of_one_mode_and_of_a_gaussian() -> None:

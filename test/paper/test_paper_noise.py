@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from paper_studies import PLAN, made_up_grid, made_up_study, verdict_on
+from paper_studies import PLAN, made_up_grid, verdict_on
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.map_models import ModelMap
-from push_predictor_paper.section import TooFewError
-from push_predictor_paper.sections.noise import learned_figures, section, shape, size, span
+from push_predictor_paper.sections.noise import learned_figures, shape, size, span
 from push_predictor_paper.statistics.noise import (
     Ratios,
     Shape,
@@ -127,10 +125,3 @@ def test_learned_noise_has_the_size_of_the_truth() -> None:
     assert rms.value == pytest.approx(np.sqrt((7 * 0.25 + 3.0) / 10.0) / 2.0)
     assert (median.value, reach.value) == (0.25, 2.0)
     assert within.value == pytest.approx(0.7) and within.low == within.high == within.value
-
-
-def test_grid_with_too_few_repetitions_decides_nothing(tmp_path: Path) -> None:
-    study = made_up_study(tmp_path)
-    few = tuple(replace(cell, outcomes=cell.outcomes[:2]) for cell in study.reference_grid.cells)
-    with pytest.raises(TooFewError, match="have enough repetitions"):
-        section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))

@@ -129,11 +129,5 @@ def test_charts_are_in_rows_of_the_given_width() -> None:
     assert str(html.charts([chart()] * 6, "")).count('<div class="charts">') == 1
 
 
-def test_cells_of_a_table_name_their_column_for_narrow_screens() -> None:
-    part = str(html.table("caption", ("name", "value", "p"), [["a", "1\n[0, 2]", "0.5"]]))
-    assert 'data-column="value">1<span class="interval">[0, 2]</span>' in part and 'data-column="p">0.5' in part
-    assert '"words rows"' in part and '"words"' in str(html.table("", ("name", "value"), [["a", "1"]]))
-
-
 def test_numbers_that_are_unknown_are_dashes() -> None:
     assert [html.number(value) for value in (None, float("nan"), float("inf"))] == [html.NOTHING] * 3

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import html
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ import pytest
 from repository import BAGS
 
 from examples.overview_picture import readme_picture
-from push_predictor.cli import main
 from push_predictor.evaluation.report.maps import (
     fine_cells,
     fixed_covariates,
@@ -23,13 +21,13 @@ from push_predictor.evaluation.report.maps import (
     map_covariates,
     push_map,
 )
-from push_predictor.evaluation.report.page import SECTIONS
+from push_predictor.evaluation.report.page import SECTIONS, write_validation_report
+from push_predictor.evaluation.validation import compare
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
@@ -111,24 +109,15 @@ def test_model_without_extension_fixes_no_covariate(base: PushModel, table: Push
     assert fixed_covariates(base, table) == {} and fixed_covariates_text(base, {}) == ""
 
 
-@pytest.mark.slow
 def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
-    base: PushModel,
-    table: PushTable,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    base: PushModel, table: PushTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", SECTIONS[:1])  # the maps
     monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
     model = extended(base, slippery(), grain())
-    save_model(model, tmp_path / "extended.pushmodel")
-    save_model(base, tmp_path / "plain.pushmodel")
-    models = [str(tmp_path / f"{name}.pushmodel") for name in ("extended", "plain")]
-    call = ["report", "validation", *models, "--recording", str(BAG), "--out", str(tmp_path / "out")]
-    assert main([*call, "--json", "-"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    page = html.unescape(Path(found["report"]).read_text())
+    both = [model, replace(base, name="plain")]
+    written = write_validation_report(tmp_path, "", table, None, both, [compare(m, table) for m in both], {}, [])
+    page = html.unescape(written.read_text())
     time = fixed_covariates(model, table)["elapsed_time"]
     assert page.count(f"The map of extended is drawn at elapsed_time {time:.3g} s and slider_heading ") == 2
     assert "the first of the 6 equal sides is drawn." in page

@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,9 +19,9 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.extension.extended_model import extend, refit_base, spread_rows
+from push_predictor.residuals.extension.extended_model import by_the_clock, extend, refit_base, spread_rows
 from push_predictor.residuals.extension.held_out_gain import (
     held_out_gain,
     held_out_windows,
@@ -198,3 +200,41 @@ def test_length_of_a_vector_is_not_negative() -> None:
     )
     sized = size_of(small, pushes(2, 0))
     assert sized is not None and sized.low >= 0.0
+
+
+# --- a step that time explains as well --------------------------------------------------------------------------------
+
+
+TIMED = pushes(20, 0)  # a push every 1000 / 19 s
+STEP = DriverBasis("step", ("push_index",), place=7.5)
+
+
+def term(basis: DriverBasis, *covariates: str) -> Any:
+    values = basis.values(TIMED.covariates, len(TIMED))
+    best = Candidate("contact_friction", basis.drivers[0], basis, np.zeros((len(TIMED), 3, 1)), values)
+    return cast("Any", SimpleNamespace(best=best, naming=SimpleNamespace(covariates=covariates)))
+
+
+def test_step_that_time_explains_as_well_is_the_same_step_of_time() -> None:
+    found = by_the_clock(term(STEP, "push_index", "elapsed_time"), TIMED)
+    assert (found.covariate, found.basis.name) == ("elapsed_time", "step")
+    assert found.basis.place == pytest.approx(7.5 * 1000.0 / 19.0)
+    assert np.array_equal(found.basis.values(TIMED.covariates, len(TIMED)), STEP.values(TIMED.covariates, len(TIMED)))
+
+
+@pytest.mark.parametrize(
+    "unchanged",
+    [
+        term(STEP, "push_index", "slid_distance"),  # time was rejected
+        term(DriverBasis("linear", ("push_index",), (9.5,), (5.0,)), "push_index", "elapsed_time"),
+        term(DriverBasis("step", ("slider_x",), place=0.0), "slider_x", "elapsed_time"),
+    ],
+)
+def test_every_other_effect_keeps_its_covariate(unchanged: Any) -> None:
+    assert by_the_clock(unchanged, TIMED) is unchanged.best
+
+
+def test_step_that_time_does_not_order_keeps_its_covariate() -> None:
+    twice = replace(TIMED, covariates={**TIMED.covariates, "elapsed_time": TIMED.covariates["elapsed_time"] % 300.0})
+    kept = term(STEP, "push_index", "elapsed_time")
+    assert by_the_clock(kept, twice) is kept.best

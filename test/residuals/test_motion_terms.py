@@ -1,25 +1,31 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the motion channel says of each term: which outputs it shifts, how much it explains, and what is no effect."""
+"""Effects on the motion: the moves that undo a wrong choice, and the terms that are left: parts, outputs, shares."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from made_up_traces import NOISE, planted, pushes, slippery
-from search_bench import in_library
+from search_bench import gate_of, in_library
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.candidates.joint_fit import Fit, FitRows
 from push_predictor.residuals.channels.motion import MotionTerm, _separable, motion_effects
+from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.selection.search import _Search
 
 ALWAYS = DriverBasis("constant")
 ALONG_X = DriverBasis("linear", ("slider_x",), (0.0,), (0.1,))
@@ -44,13 +50,17 @@ def found(model: PushModel, table: PushTable) -> tuple[MotionTerm, ...]:
 def test_two_effects_of_other_mechanisms_and_covariates_are_two(
     deployed: PushModel, friction: float, spread: float
 ) -> None:
+    """And their shares add up to what all explain."""
     changed = pushes(120, 3, slippery(friction), planted("pressure_spread", "slider_x", ALONG_X, spread))
-    terms = found(deployed, changed)
+    evidence, quiet = evidence_of(deployed, changed), evidence_of(deployed, pushes(120, 3))
+    terms = motion_effects(deployed, evidence, 0.01, ["elapsed_time", "slider_x"]).terms
     assert {term.best.label for term in terms} == {
         ("contact_friction", "elapsed_time"),
         ("pressure_spread", "slider_x"),
     }
     assert [term.part for term in terms] == [False, False]
+    noise = float(np.sum(quiet.z**2) / np.sum(evidence.z**2))
+    assert sum(term.share for term in terms) == pytest.approx(1.0 - noise, abs=0.05)
 
 
 def test_a_small_further_term_of_the_same_mechanism_is_a_part_and_comes_last(deployed: PushModel) -> None:
@@ -60,14 +70,6 @@ def test_a_small_further_term_of_the_same_mechanism_is_a_part_and_comes_last(dep
         (("contact_friction", "elapsed_time"), False),
         (("contact_friction", "slider_x"), True),
     ]
-
-
-def test_shares_of_the_terms_add_up_to_what_all_explain(deployed: PushModel) -> None:
-    changed = pushes(120, 3, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1))
-    finding = motion_effects(deployed, evidence_of(deployed, changed), 0.01, ["elapsed_time", "slider_x"])
-    quiet = evidence_of(deployed, pushes(120, 3))
-    noise = float(np.sum(quiet.z**2) / np.sum(evidence_of(deployed, changed).z ** 2))
-    assert sum(term.share for term in finding.terms) == pytest.approx(1.0 - noise, abs=0.05)
 
 
 def test_an_unknown_effect_on_one_output_shifts_that_one(deployed: PushModel) -> None:
@@ -83,16 +85,12 @@ def test_p_value_counts_that_the_variance_is_tested_too(deployed: PushModel) -> 
 
 
 def test_a_constant_effect_lies_in_the_inputs_of_a_learnt_base_alone(deployed: PushModel) -> None:
-    learnt = train_model(noisy_pushes(300), square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
+    learnt = train_model(noisy_pushes(150), square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
     table = pushes(120, 5, planted("contact_friction", "model_inputs", ALWAYS, -0.15))
     (own,) = found(learnt, table)
     (other,) = found(deployed, table)
     assert (own.best.label, own.own) == (("contact_friction", "model_inputs"), True)
     assert (other.best.label, other.own) == (("contact_friction", "model_inputs"), False)
-
-
-def test_a_model_without_a_change_has_no_terms(deployed: PushModel) -> None:
-    assert found(deployed, pushes(120, 6)) == ()
 
 
 def test_among_extrapolated_pushes_the_speed_is_tried_only_if_most_lie_inside(deployed: PushModel) -> None:
@@ -104,3 +102,79 @@ def test_among_extrapolated_pushes_the_speed_is_tried_only_if_most_lie_inside(de
     assert _separable(along, 0.6) and not _separable(along, 0.4)
     assert _separable(candidate(evidence, "contact_friction", "slider_x", place), 0.4)
     assert not _separable(candidate(evidence, "contact_friction", "model_inputs", ALWAYS), 0.6)
+
+
+# --- moves ------------------------------------------------------------------------------------------------------------
+
+
+FRICTION, SPREAD = ("contact_friction", "elapsed_time"), ("pressure_spread", "slider_x")
+WARMER = ("contact_friction", "topic:/warmth")
+
+
+def moved(model: PushModel, table: PushTable, *labels: tuple[str, str]) -> list[tuple[str | None, str]]:
+    """The labels after the moves from linear terms with these, where the gate let pass all that occur here."""
+    evidence = evidence_of(model, table)
+    gate = gate_of(model, evidence, ["elapsed_time", "slider_x", "topic:/warmth"])
+    search = _Search(gate, FitRows(evidence), dict.fromkeys([FRICTION, SPREAD, WARMER], 0.001))
+    chosen = [_linear(evidence_of(model, table).table, model, *label) for label in labels]
+    after, _ = search._improved(chosen, search._fit(chosen))
+    return [term.label for term in after]
+
+
+def _linear(table: PushTable, model: PushModel, mechanism: str, covariate: str) -> Candidate:
+    basis = replace(standard_basis("linear", covariate, table.covariates[covariate]), offset=True)
+    return candidate(evidence_of(model, table), mechanism, covariate, basis)
+
+
+def warmed(table: PushTable) -> PushTable:
+    """The pushes in a room that gets warmer with the time, but not evenly."""
+    time = table.covariates["elapsed_time"] / 300.0
+    uneven = 0.4 * np.repeat(np.random.default_rng(7).normal(size=len(table.pushes)), 3)
+    return replace(table, covariates={**table.covariates, "topic:/warmth": 20.0 + time + uneven})
+
+
+def both(seed: int = 3) -> PushTable:
+    return warmed(pushes(120, seed, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
+
+
+def test_terms_that_are_needed_stay(deployed: PushModel) -> None:
+    assert sorted(map(str, moved(deployed, both(), FRICTION, SPREAD))) == sorted(map(str, (FRICTION, SPREAD)))
+
+
+def test_a_term_that_another_explains_is_dropped(deployed: PushModel) -> None:
+    table = warmed(pushes(120, 3, slippery(0.1)))
+    assert moved(deployed, table, SPREAD, FRICTION) == [FRICTION]
+    assert moved(deployed, table, FRICTION, SPREAD) == [FRICTION]
+
+
+def test_a_term_with_a_worse_covariate_is_exchanged(deployed: PushModel) -> None:
+    assert set(moved(deployed, both(), SPREAD, WARMER)) == {FRICTION, SPREAD}
+
+
+def test_an_only_term_stays_as_it_was_chosen(deployed: PushModel) -> None:
+    assert moved(deployed, warmed(pushes(120, 3)), FRICTION) == [FRICTION]
+
+
+@pytest.mark.parametrize(
+    ("gain", "further", "size", "enough"),
+    [
+        (8.0, False, 1, False),
+        (12.0, False, 1, True),
+        (12.0, False, 6, True),
+        (12.0, True, 1, True),
+        (12.0, True, 6, False),
+        (32.0, True, 6, True),
+    ],
+)
+def test_a_term_must_gain_its_error_and_a_further_one_five_nats_a_coefficient(
+    deployed: PushModel, gain: float, further: bool, size: int, enough: bool
+) -> None:
+    """A standard error of 10 nats over 100 blocks."""
+    rows = FitRows(evidence_of(deployed, pushes(100, 1)))
+    search = _Search(cast("Gate", None), rows)
+    uneven = np.where(np.arange(100) % 2, 1.0, -1.0)
+    before, after = (
+        cast("Fit", SimpleNamespace(scores=scores, coefficients=np.zeros(count)))
+        for scores, count in ((np.zeros(100), 0), (uneven + gain / 100.0, size))
+    )
+    assert search._worthwhile(after, before, further) == enough

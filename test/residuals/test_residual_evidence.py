@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from push_predictor.residuals.question import Question
 from push_predictor.types import Array
 
 
+@cache
 def trained(table: PushTable, kind: str = "gp") -> PushModel:
     return train_model(table, square_rig(), kind, name="deployed", options=TrainingOptions(mean="zero"))
 

@@ -23,7 +23,7 @@ from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
 from push_predictor.residuals.selection.search import SearchResult
 
-BLOCKS, ROWS = 40, 3  # a block
+BLOCKS, ROWS = 20, 3  # a block
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +45,9 @@ def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_proje
     rng = np.random.default_rng(5)
     n, block = BLOCKS * ROWS, np.repeat(np.arange(BLOCKS), ROWS)
     residualizer = Residualizer(rng.normal(size=(n, 6)))
-    of_pushes = np.repeat(rng.normal(size=(BLOCKS, 3, 46)), ROWS, axis=0) + 0.3 * rng.normal(size=(n, 3, 46))
+    of_pushes = np.repeat(rng.normal(size=(BLOCKS, 3, 24)), ROWS, axis=0) + 0.3 * rng.normal(size=(n, 3, 24))
     basis = np.linalg.qr(residualizer(of_pushes).reshape(3 * n, -1))[0]
-    nuisance, column = basis[:, :45], basis[:, 45].reshape(n, 3)
+    nuisance, column = basis[:, :23], basis[:, 23].reshape(n, 3)
     total, rows = [], []
     for _ in range(500):
         apart = residualizer.blocks(rng.normal(size=(n, 3)), block).orthogonal_to(nuisance)
@@ -77,7 +77,7 @@ def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushMode
 @pytest.mark.usefixtures("a_library_of_three")
 def test_an_obvious_effect_in_two_dozen_pushes_is_found(deployed: PushModel) -> None:
     """Against the gate's noise, which contains the effect, it would pass in one of five such recordings."""
-    for seed in (2, 3, 4):
+    for seed in (2, 3):
         found = searched(deployed, pushes(24, seed, slippery(0.2)), ["elapsed_time", "slider_x"], alpha=0.004)
         assert found.terms[0].mechanism == "contact_friction"
 

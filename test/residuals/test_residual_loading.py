@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Loading data to judge a model on: recordings and push tables, with every covariate by name."""
+"""Loading data to judge a model on: recordings and push tables, with every covariate by name, and their session."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_traces import pushes
 from synthetic import Push, square_rig, translating_push
 
 from push_predictor.errors import RecordingError, RigError
+from push_predictor.models.effects.traced_session import Mark
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import Recording, ScalarStream, WrenchStream
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import cut_again, load_evidence
@@ -162,3 +164,48 @@ def test_rejects_data_without_rig_or_pushes_by_name(tmp_path: Path) -> None:
     write_recording(tmp_path / "still", still)
     with pytest.raises(RecordingError, match="still"):
         load_evidence([tmp_path / "still"])
+
+
+# --- the session ------------------------------------------------------------------------------------------------------
+
+
+def test_session_of_recordings_has_their_beginnings_and_the_values_after_the_last_window(tmp_path: Path) -> None:
+    loaded = load_evidence([saved(tmp_path, "b", LATER), saved(tmp_path, "a", 0)])
+    session, last = loaded.session, {name: column[-1] for name, column in loaded.table.covariates.items()}
+    began = int(translating_push(Push()).slider.stamp[0])
+    assert [mark.stamp - began for mark in session.marks[:2]] == pytest.approx([0, LATER], abs=2_000_000)
+    assert session.origin == session.marks[0].stamp and session.marks[0] == Mark(session.marks[0].stamp, 0.0, 0.0)
+    assert session.marks[1].pushes == 1.0 and session.marks[1].slid == pytest.approx(last["slid_distance"] / 2, rel=0.2)
+    travel = np.hypot(*loaded.table.outcomes[-1, :2])
+    assert session.now == pytest.approx(
+        {
+            "elapsed_time": last["elapsed_time"] + loaded.table.duration[-1],
+            "push_index": 2.0,
+            "slid_distance": last["slid_distance"] + travel,
+        }
+    )
+    end = session.marks[-1]
+    assert (end.pushes, end.slid) == (2.0, session.now["slid_distance"])
+    assert (end.stamp - began) * 1e-9 == pytest.approx(session.now["elapsed_time"], abs=0.002)
+
+
+def test_each_traced_recording_and_its_table_keep_their_place_in_the_session(tmp_path: Path) -> None:
+    both = [saved(tmp_path, "a", 0), saved(tmp_path, "b", LATER)]
+    loaded = load_evidence(both)
+    second = load_evidence(both[1:])
+    expected = loaded.table.take(loaded.table.covariates["recording"] == 1.0).covariates
+    columns = {name: c for name, c in second.table.covariates.items() if name not in INPUTS}
+    write_table(tmp_path / "pushes.csv", replace(second.table, covariates=columns))
+    of_table = load_evidence([tmp_path / "pushes.csv"], second.rig)
+    for table in (second.table, of_table.table):
+        found = loaded.session.continued(table).covariates
+        for name in ("elapsed_time", "push_index", "slid_distance"):
+            assert found[name] == pytest.approx(expected[name], abs=2e-3 if name == "elapsed_time" else 1e-9), name
+    assert of_table.session.marks == second.session.marks
+
+
+def test_session_of_a_table_without_stamps_has_values_alone(tmp_path: Path) -> None:
+    write_table(tmp_path / "pushes.csv", pushes(20, 0))
+    session = load_evidence([tmp_path / "pushes.csv"], load_evidence([saved(tmp_path, "a", 0)]).rig).session
+    assert session.origin is None and session.marks == ()
+    assert session.now == pytest.approx({"elapsed_time": 1000.2, "push_index": 20.0})

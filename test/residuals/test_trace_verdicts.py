@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from search_bench import in_library
+from sensed_motion import sensed
 
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -53,6 +54,9 @@ def spec(seed: int, pushes: int) -> SimulationSpec:
     return SimulationSpec("rect1", "delrin", plan, seed=seed, surface_seed=1, slider_seed=1, turn_spread=3.0)
 
 
+SECOND = spec(2, 45)
+
+
 @cache
 def learnt(mean: MeanChoice = "zero", pushes: int = 60, rows: int = 80) -> PushModel:
     recording = simulate(spec(1, pushes))
@@ -77,10 +81,10 @@ def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
     in_library(monkeypatch, "contact_friction", "pressure_spread", "tilted_surface", "inertia")
 
 
-def loaded(changes: Changes, faults: Faults, pushes: int = 45) -> LoadedData:
-    recording = simulate(replace(spec(2, pushes), changes=changes, faults=faults))
-    assert recording.rig is not None
-    return LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig)
+def loaded(changes: Changes, faults: Faults, plan: SimulationSpec = SECOND) -> LoadedData:
+    new = sensed(plan, faults=faults) if changes == Changes() else simulate(replace(plan, changes=changes))
+    assert new.rig is not None
+    return LoadedData(cut_again([new], new.rig), (new,), new.rig)
 
 
 @cache
@@ -93,6 +97,7 @@ def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
     return trace(learnt(), loaded(changes, Faults(**faults)), covariates=["elapsed_time"])
 
 
+@pytest.mark.usefixtures("a_library_of_four")
 def test_second_recording_of_the_same_rig_has_no_effect() -> None:
     assert trace(learnt(), faultless()).verdict == "none"
 
@@ -300,7 +305,7 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
-    found = trace(learnt("mechanics", 80, 150), loaded(slippery, Faults(), 60), covariates=["elapsed_time"])
+    found = trace(learnt("mechanics", 80, 150), loaded(slippery, Faults(), spec(2, 60)), covariates=["elapsed_time"])
     (effect,) = found.effects
     assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "session")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1

@@ -1,19 +1,34 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A simulator less fine than for a user, where the errors are far below a test's noise."""
+"""A simulator and fits less fine than for a user, where the errors are far below a test's noise."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from unittest.mock import patch
 
+from push_predictor.models.gaussian_process.gp import Cost, Descent, Minimum
 from push_predictor.simulation import dynamics
+from push_predictor.types import Array
 
 
 @contextmanager
 def coarse_simulator(factor: float) -> Iterator[None]:
     """The steps of a simulated push are longer by a factor."""
     with patch.object(dynamics, "TRAVEL_STEP", factor * dynamics.TRAVEL_STEP):
+        yield
+
+
+@contextmanager
+def coarse_fits(steps: int = 3) -> Iterator[None]:
+    """Every search for hyperparameters ends after few steps."""
+    whole = Descent.run
+
+    def begun(self: Descent, cost: Cost, first: Array, unit: float = 1.0) -> Minimum:
+        return whole(replace(self, most_iterations=steps), cost, first, unit)
+
+    with patch.object(Descent, "run", begun):
         yield
