@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Work on many cores: results in order, kept on disk, resumed after an interruption, spread over a dask cluster."""
+"""Work on many cores: results in order, kept on disk, resumed after an interruption."""
 
 from __future__ import annotations
 
@@ -39,10 +39,6 @@ PIECES = textwrap.dedent(
         while number > 3 and not Path(log).with_name("go_on").exists():
             time.sleep(0.05)
         return squared(number, log)
-
-    def where(number):
-        time.sleep(0.2)
-        return number, os.getpid()
     """
 )
 
@@ -212,31 +208,3 @@ def test_a_new_and_a_renamed_source_change_the_fingerprint(copied_packages: Path
 
 def test_results_are_kept_under_the_fingerprint(tmp_path: Path) -> None:
     assert Work(tmp_path, cores=1).folder == tmp_path / fingerprint()
-
-
-@pytest.fixture
-def cluster(pieces) -> Iterator[object]:
-    """Two dask workers, processes of their own that inherit PYTHONPATH."""
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-        ) as workers,
-        distributed.Client(workers) as client,
-    ):
-        yield client
-
-
-@pytest.mark.long
-def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_path: Path) -> None:
-    import joblib
-
-    calls = [(n, str(tmp_path / "log")) for n in range(6)]
-    here = Work(tmp_path / "here", cores=1).run("squares", pieces.squared, calls)
-    with joblib.parallel_config(backend="dask"):
-        there = Work(tmp_path / "there").run("squares", pieces.squared, calls)
-        places = Work(tmp_path / "there").run("places", pieces.where, [(n,) for n in range(8)])
-    assert there == here
-    assert [n for n, _ in places] == list(range(8))
-    assert {pid for _, pid in places} == set(cluster.run(os.getpid).values())
-    assert os.getpid() not in {pid for _, pid in places}
