@@ -32,7 +32,7 @@ from push_predictor import (
     validate,
 )
 from push_predictor.cli import main
-from push_predictor.errors import PushPredictorError, RecordingError, RequestError, RigError, TrainingError
+from push_predictor.errors import PushPredictorError, RequestError, RigError, TrainingError
 from push_predictor.planning.rollout import rollout
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
@@ -301,12 +301,6 @@ def test_a_validation_has_the_metrics_of_the_command_line(
         np.testing.assert_allclose(flat(found.metrics[key]), flat(printed[key]), rtol=1e-9)
     assert (found.metrics["n_test"], found.metrics["n_pushes"]) == (printed["n_test"], printed["n_pushes"])
     assert len(found.windows) == printed["n_test"] and "53 windows of 10 pushes" in repr(found)
-
-
-@pytest.mark.slow
-def test_an_absent_recording_is_an_error_with_its_name(model: PushModel):
-    with pytest.raises(RecordingError, match="absent"):
-        validate(model, "absent")
 
 
 @pytest.mark.slow

@@ -78,24 +78,6 @@ def test_the_force_on_the_pusher_points_out_of_the_slider(
     assert np.median(along) > np.cos(np.radians(15.0)), "within friction of the contact normal"
 
 
-@pytest.mark.parametrize("run", RUNS)
-def test_every_run_yields_one_push_of_many_windows(mcube: tuple[ImportReport, dict[str, Recording]], run: str) -> None:
-    recording = mcube[1][run]
-    assert recording.rig is not None
-    windows = find_windows(recording, recording.rig)
-    assert len({window.push_id for window in windows}) == 1
-    assert len(windows) >= 8
-    assert len({window.covariates["edge"] for window in windows}) == 1
-    speeds = [window.velocity for window in windows]
-    mean = [np.hypot(*(_tip_at(recording, w.end) - _tip_at(recording, w.start))) / w.duration for w in windows]
-    assert np.median(np.abs(np.array(speeds) / mean - 1.0)) < 0.15, "the start's speed is about the window's"
-
-
-def _tip_at(recording: Recording, stamp: int) -> Array:
-    tip = recording.pusher
-    return np.array([np.interp(stamp, tip.stamp, tip.x), np.interp(stamp, tip.stamp, tip.y)])
-
-
 def test_the_clock_offset_is_that_of_the_delay_test_without_repeated_rows(measured_data: Path) -> None:
     folder, notes = measured_data / "mcube_preliminary" / "time_delay", Notes()
     vicon = in_order(read_numbers(folder / "Output_vicon_tcpvicon.txt", 2, notes), "vicon", notes)

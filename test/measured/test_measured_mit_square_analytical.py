@@ -14,7 +14,6 @@ from push_predictor.evaluation.metrics import nmse
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 
-FLIPS = list(product((1, -1), repeat=4))  # of angle, contact, dy, dtheta
 AS_CONTRACT, MIRRORED = (1, 1, 1, 1), (-1, -1, -1, -1)
 
 
@@ -49,6 +48,7 @@ def test_the_exact_mirror_is_as_good(square_pushes):
     assert flipped_score(square_pushes, MIRRORED) == pytest.approx(flipped_score(square_pushes, AS_CONTRACT), abs=1e-4)
 
 
-@pytest.mark.parametrize("flip", [flip for flip in FLIPS if flip not in (AS_CONTRACT, MIRRORED)])
-def test_every_other_flip_is_far_off(square_pushes, flip):
-    assert flipped_score(tuple(values[::7] for values in square_pushes), flip) > 1.6
+def test_every_other_flip_is_far_off(square_pushes):
+    some = tuple(values[::7] for values in square_pushes)
+    for flip in product((1, -1), repeat=4):  # of angle, contact, dy, dtheta
+        assert flip in (AS_CONTRACT, MIRRORED) or flipped_score(some, flip) > 1.6, flip

@@ -183,10 +183,3 @@ def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
         "push_predictor.cli.build_parser()\n"
     )
     subprocess.run([sys.executable, "-c", forbidden + use], check=True, cwd=REPOSITORY)
-
-
-def test_versions_agree() -> None:
-    version = (REPOSITORY / "package.xml").read_text().split("<version>")[1].split("<")[0]
-    assert f'__version__ = "{version}"' in (REPOSITORY / "push_predictor" / "__init__.py").read_text()
-    assert f'version="{version}"' in (REPOSITORY / "setup.py").read_text()
-    assert f"## {version}" in (REPOSITORY / "CHANGELOG.md").read_text()

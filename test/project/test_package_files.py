@@ -21,6 +21,8 @@ from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import Package, parse_package
 from repository import REPOSITORY
 
+import push_predictor
+
 FOLDERS = {
     "push_predictor": REPOSITORY,
     "push_predictor_interfaces": REPOSITORY / "push_predictor_interfaces",
@@ -146,6 +148,8 @@ def test_all_packages_have_one_version(name: str):
     else:
         assert f'\nversion = "{package(name).version}"\n' in (FOLDERS[name] / "pyproject.toml").read_text()
     assert f"\nversion: {package(name).version}\n" in (REPOSITORY / "CITATION.cff").read_text()
+    assert push_predictor.__version__ == package(name).version
+    assert f"## {package(name).version}" in (REPOSITORY / "CHANGELOG.md").read_text()
 
 
 def test_what_the_library_imports_is_a_dependency():

@@ -114,8 +114,7 @@ def noisy(rate: float, seed: int = 0) -> ScalarStream:
     return ScalarStream(stamps(time), np.random.default_rng(seed).standard_normal(len(time)))
 
 
-@pytest.mark.parametrize("late", [0.0, 0.35, 1.7], ids="late by {} s".format)
-@pytest.mark.parametrize("rate", [40.0, 1.3])
+@pytest.mark.parametrize(("late", "rate"), [(0.0, 40.0), (0.35, 1.3), (1.7, 40.0)])
 def test_covariate_is_the_same_for_late_samples_in_portions(late: float, rate: float) -> None:
     recording = with_warmth(noisy(rate))
     expected, finder, found = find_windows(recording, square_rig()), WindowFinder(square_rig()), []
