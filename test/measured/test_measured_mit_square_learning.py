@@ -31,7 +31,6 @@ def test_vhgp_has_a_better_density_than_gp_on_the_random_split(measured_data: Pa
     ("split", "n", "seeds", "nmse", "nlpd"),
     [
         ("random", 500, 1, 0.115, -17.83),
-        pytest.param("random", 1000, 1, 0.115, -17.84, marks=pytest.mark.long),
         ("push", 100, 5, 0.197, -17.09),
     ],
 )

@@ -22,6 +22,7 @@ from catkin_pkg.package import Package, parse_package
 from repository import REPOSITORY
 
 import push_predictor
+from push_predictor.commands import doctor_command
 
 FOLDERS = {
     "push_predictor": REPOSITORY,
@@ -225,6 +226,14 @@ def test_every_source_file_begins_with_the_licence():
         lines = text.splitlines(keepends=True)
         start = 1 if text.startswith("#!") else 0
         assert not text or "".join(lines[start : start + 2]) == HEADER, path
+
+
+def test_the_doctor_checks_the_packages_and_modules_of_setup():
+    given = setup_arguments("push_predictor")
+    required = [row.split(">")[0].replace("PyYAML", "yaml") for row in given["install_requires"]]
+    assert list(doctor_command.REQUIRED) == required
+    compiled = [extension.name for extension in given["ext_modules"]]
+    assert [f"push_predictor.{name}" for name in doctor_command.COMPILED] == compiled
 
 
 # --- colcon ----------------------------------------------------------------------------------------------------------

@@ -69,11 +69,6 @@ def test_the_page_that_answers_a_question_exists_and_is_two_links_away() -> None
         assert anchor in anchors(REPOSITORY / name) and REPOSITORY / name in near, place
 
 
-def test_ten_questions_are_a_planners_and_ten_a_laboratorys() -> None:
-    assert len(PLANNER) == len(LABORATORY) == 10
-    assert len({*PLANNER.values(), *LABORATORY.values()}) == 20
-
-
 @pytest.mark.parametrize("page", sorted((REPOSITORY / "docs").rglob("*.md")), ids=lambda page: page.name)
 def test_every_link_to_a_section_of_a_page_finds_it(page: Path) -> None:
     for target, anchor in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", without_code(page)):

@@ -89,7 +89,6 @@ def test_any_recording_reads_back_unchanged(written: Recording, compression: str
     assert set(read.scalars) == set(written.scalars)
 
 
-@settings(max_examples=30, deadline=None)
 @given(scalars())
 def test_scalar_without_header_has_log_time_as_stamp(scalar: ScalarStream) -> None:
     nothing = PoseStream(scalar.stamp, *np.zeros((4, len(scalar))))
