@@ -104,7 +104,7 @@ def test_a_small_range_of_angles_is_found(share: float, severity: str) -> None:
 
 
 def test_contacts_that_stick_are_found() -> None:
-    assert found(pushes(slip=0.05))["few_sliding"].severity == "warning"
+    assert found(pushes(slip=0.18))["few_sliding"].severity == "warning"  # each step against the path of its own push
     mixed = pushes()
     sliding = np.arange(len(mixed)) // WINDOWS % 10 == 0
     inputs = np.where(sliding[:, None], mixed.inputs, pushes(slip=0.05).inputs)

@@ -165,12 +165,6 @@ def test_another_type_applies_to_the_messages_that_come_after_it():
     assert len(own) == 0 and own.foreign == {POSE_TYPE.name: 1} and own.received == 1
 
 
-def test_a_message_without_a_header_is_dated_by_its_sending():
-    own = StreamDecoder(Topics("slider.pose")).inputs()["slider"]
-    input_of(own, "geometry_msgs/msg/PoseWithCovariance", *[b"\0\1\0\0" + bytes(43 * 8)] * 2)
-    assert not own.timed and own.take().stamp.tolist() == [0, 1]
-
-
 def test_the_recent_messages_are_those_that_are_readable_with_their_receipt_and_frames():
     own = slider_input(pose(*GOOD, nanosec=1), b"", pose(*GOOD, nanosec=2, frame="map"))
     stamp, received, frames = own.recent()

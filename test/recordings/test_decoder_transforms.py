@@ -206,22 +206,6 @@ def test_a_frame_that_was_static_may_move() -> None:
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
 
 
-def test_a_pose_at_a_stamp_waits_for_the_slowest_of_two_transforms() -> None:
-    buffer, stamps = TransformBuffer([], "world"), START + np.array([40, 60, 80]) * MILLISECOND
-    put(buffer, cart(every(20, 0, 61), every(4, 0, 101)).in_order())
-    decided, rows = buffer.at("tip", "world", stamps, "wrench")
-    assert decided.tolist() == [True, True, False]
-    np.testing.assert_allclose(rows[:, 0], [0.08, 0.12], atol=1e-12)
-
-
-def test_old_samples_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(transform_buffer, "KEPT", 100 * MILLISECOND)
-    buffer = TransformBuffer(["tip"])
-    stamp, _ = taken(buffer, cart(every(20, 0, 1601), every(4, 0, 1601)).in_order(), "tip")
-    assert len(stamp) == 401
-    assert {child: len(history.edge.stamp) for child, history in buffer._histories.items()}["tip"] < 50
-
-
 def test_a_decoder_keeps_the_transforms_of_some_seconds() -> None:
     lab = cart(every(40, 0, 12_000), every(10, 0, 12_000))
     decoder = decoder_of(lab, Topics("/tf:cart", "/tf:tip"))

@@ -86,11 +86,6 @@ def test_a_shift_of_the_slider_is_separated_from_one_between_the_frames() -> Non
     assert (shift["x"].value, shift["y"].value) == pytest.approx((0.0, -0.003), abs=1e-4)
 
 
-def test_frames_apart_are_no_part_of_the_rig() -> None:
-    findings = check_recording(other_world(bag(ROUND), 0.0, (0.002, 0.0)), rig_of(ROUND))
-    assert corrected_rig(rig_of(ROUND), findings) is rig_of(ROUND)
-
-
 # --- axes mirrored or exchanged --------------------------------------------------------------------------------------
 
 AXES: Mapping[str, tuple[list[list[float]], float, float]] = {  # {name: (axes, sign and offset of the heading)}

@@ -216,13 +216,6 @@ def test_a_field_of_another_type_has_the_stamp_of_its_header_or_the_time_of_its_
     assert dict(own.rejected) == {"unreadable": 1} and own.timed is timed
 
 
-def test_unusable_messages_are_counted_by_kind() -> None:
-    numbers = [b"\0\1\0\0" + struct.pack("<f", value) for value in (0.5, np.inf)]
-    stream, own = taken("warmth", "std_msgs/msg/Float32", numbers[0], b"\0\1", numbers[1])
-    assert stream.value.tolist() == [0.5]
-    assert dict(own.rejected) == {"unreadable": 1, "not finite": 1}
-
-
 def test_samples_wait_for_the_first_pose_or_the_end() -> None:
     decoder, own = decoder_of("warmth")
     input_of(own, "std_msgs/msg/Float64", float64(1.0))

@@ -25,12 +25,11 @@ from turning_sensor import (
     wrench_rows,
 )
 
-from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.fields.pose_rows import about_points, in_world_axes, normalised, poses_at
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics
 
 POSE = "geometry_msgs/msg/PoseStamped"
 NAMES = Topics("/slider", "/tip", "/ft", wrench_frame="tip")
@@ -203,18 +202,6 @@ def test_a_tip_without_orientation_turns_no_wrench(tmp_path: Path) -> None:
         RecordingError, match=r"wrench_frame 'tip' .*: the poses of /tip have no orientation; give world"
     ):
         read_recording(lab.mcap(tmp_path / "lab"), topics=NAMES)
-
-
-def test_the_axes_are_an_option_and_are_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(lab_of_tip().mcap(tmp_path / "lab", original().rig))
-    names = ["--slider-topic", "/slider", "--pusher-topic", "/tip", "--wrench-topic", "/ft"]
-    assert main(["info", path, *names, "--wrench-frame", "tip", "--save-topics"]) == 0
-    assert "turned with the tip (/tip)" in capsys.readouterr().out
-    assert load_topics(tmp_path / "lab") == NAMES
-    assert main(["info", path, "--wrench-frame", "ft_link"]) == 1
-    assert "wrench_frame 'ft_link' (option --wrench-frame): the bag has no /tf" in capsys.readouterr().err
-    assert main(["check", path]) == 0
-    assert "wrench_frame" not in capsys.readouterr().out
 
 
 def test_a_frame_named_tip_is_given_with_its_topic() -> None:
