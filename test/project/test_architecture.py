@@ -35,10 +35,11 @@ def picture() -> list[list[str]]:
 @cache
 def imports_of(path: Path) -> set[str]:
     """Modules that a file imports, and what it imports from them: a.b and a.b.c for `from a.b import c`."""
-    tree = ast.parse(path.read_text())
-    named = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module:
+    named: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            named |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
             named |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return named
 
