@@ -108,6 +108,13 @@ def test_rviz_shows_each_namespace_of_the_markers_and_no_other():
     assert markers["Namespaces"] == dict.fromkeys(shown_namespaces(), True)
 
 
+def test_rviz_has_places_for_its_panels():
+    """Without them the panels cover the view, as RViz 1.14 showed."""
+    state = bytes.fromhex(RVIZ["Window Geometry"]["QMainWindow State"])
+    for panel in RVIZ["Panels"]:
+        assert panel["Name"].encode("utf-16-be") in state
+
+
 def test_the_document_explains_each_marker():
     section = (
         (REPOSITORY / "docs" / "how_to" / "visualisation.md")
@@ -157,6 +164,14 @@ def test_every_panel_that_is_configured_is_placed_once():
     assert {panel.partition("!")[0] for panel in placed} == PANELS
     assert all(panel.partition("!")[2].isalnum() for panel in placed)
     assert FOXGLOVE.keys() == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+
+
+def test_every_plot_and_the_scene_have_the_title_that_foxglove_shows():
+    """Foxglove shows foxglovePanelTitle; it ignores the key title."""
+    panels = {name: config for name, config in FOXGLOVE["configById"].items() if name.startswith(("Plot!", "3D!"))}
+    titles = [config.get("foxglovePanelTitle", "") for config in panels.values()]
+    assert len(panels) == 4 and all(titles) and len(set(titles)) == 4
+    assert not any("title" in config for config in panels.values())
 
 
 def test_every_message_path_leads_to_a_field_that_is_published(published):
