@@ -64,12 +64,6 @@ def test_world_frames_apart_are_named_with_yaw_and_shift(name: str, yaw: float, 
     assert stated in findings["frames_apart"].sentence and findings["frames_apart"].severity == "warning"
 
 
-def test_the_stated_turn_and_shift_bring_the_frames_together() -> None:
-    apart = other_world(bag(ROUND), 0.3, (0.05, 0.015))
-    turn, move = frame_of(found(apart, rig_of(ROUND))["frames_apart"])
-    assert found(other_world(apart, turn, move), rig_of(ROUND)) == {}
-
-
 def test_axes_a_quarter_turn_apart_are_world_frames_apart() -> None:
     finding = found(other_world(bag(ROUND), np.pi / 2.0, (0.3, 0.0)), rig_of(ROUND))["frames_apart"]
     turn, move = frame_of(finding)
