@@ -86,7 +86,7 @@ def test_the_standard_deviations_are_those_of_repeated_estimates() -> None:
     noise = np.array([0.02, 0.05, 0.1, 0.003, 0.002, 0.001])
     found = [
         estimate_bias(stamp, weighed(poses) + noise * np.random.default_rng(seed).normal(size=(400, 6)), free, poses)
-        for seed in range(100)
+        for seed in range(200)
     ]
     for name in ("force", "torque", "weight"):
         values, sds = (np.array([getattr(bias, key) for bias in found]) for key in (name, f"{name}_sd"))
