@@ -32,7 +32,7 @@ from push_predictor import (
     validate,
 )
 from push_predictor.cli import main
-from push_predictor.errors import PushPredictorError, RecordingError, RequestError, RigError, TrainingError
+from push_predictor.errors import PushPredictorError, RequestError, RigError, TrainingError
 from push_predictor.planning.rollout import rollout
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
@@ -246,9 +246,7 @@ def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain
     ("pushes", "message"),
     [
         (Pushes(-0.02, 0.1, 0.3), "velocity: -0.02 is not accepted, give a finite number above 0, in m/s"),
-        (Pushes(0.02, [0.1, 1.0], 0.3), r"contact\[1\]: 1.0 is not accepted"),
         (Pushes(0.02, 0.1, [0.3, 0.0, 1.6]), r"angle\[2\]: 1.6 is not accepted"),
-        (Pushes(0.02, 0.1, -1.6), "angle: -1.6 is not accepted"),
         (Pushes(0.02, 0.1, 0.3, duration=2.0), "duration: 2.0 is not accepted, give 0.18 to 0.22 s"),
     ],
 )
@@ -301,12 +299,6 @@ def test_a_validation_has_the_metrics_of_the_command_line(
         np.testing.assert_allclose(flat(found.metrics[key]), flat(printed[key]), rtol=1e-9)
     assert (found.metrics["n_test"], found.metrics["n_pushes"]) == (printed["n_test"], printed["n_pushes"])
     assert len(found.windows) == printed["n_test"] and "53 windows of 10 pushes" in repr(found)
-
-
-@pytest.mark.slow
-def test_an_absent_recording_is_an_error_with_its_name(model: PushModel):
-    with pytest.raises(RecordingError, match="absent"):
-        validate(model, "absent")
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from coarse import coarse_simulator
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from repository import REPOSITORY
@@ -65,13 +64,6 @@ class Outcome:
         return json.loads(self.out)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def coarsely() -> Iterator[None]:
-    """Recordings are simulated less finely than for a user."""
-    with coarse_simulator(4.0):
-        yield
-
-
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
     """simulate -> train, as a user would."""
@@ -79,17 +71,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
     simulate = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT]
     calls = {
         "train recording": [*simulate, "--pushes", "6", "--seed", "1", "--out", str(folder / "train")],
-        "test recording": [
-            *simulate,
-            "--pushes",
-            "4",
-            "--seed",
-            "2",
-            "--out",
-            str(folder / "test.mcap"),
-            "--json",
-            "-",
-        ],
+        "test recording": [*simulate, "--pushes", "4", "--seed", "2", "--json", "-"]
+        + ["--out", str(folder / "test.mcap")],
         "gp": ["train", str(folder / "train"), "--kind", "gp", "--mean", "zero"]
         + ["--out", str(folder / "gp.pushmodel")],
         "vhgp": ["train", str(folder / "train"), "--kind", "vhgp", "--n-train", "15", "--name", "hetero"]
@@ -151,13 +134,10 @@ def test_every_command_has_help_with_an_example_and_json(command: str, run):
         ["train"],
         ["train", "data", "--kind", "forest", "--out", "m"],
         ["train", "data", "--out", "m"],
-        ["train", "data", "--kind", "gp", "--model", "gp", "--out", "m"],
         ["predict", "m", "--velocity", "fast", "--contact", "0", "--angle", "0"],
         ["import", "martian", "x", "--out", "y"],
         ["evaluate", "m"],
-        ["report", "poem", "--out", "y"],
         ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "many", "--speed", "0.02", "--out", "x"],
-        ["info", "x", "--wrong"],
         ["report", "paper", "--model", "x", "--out", "y"],
         ["trace", "new.csv", "--alp", "0.1", "--model", "m"],
     ],
@@ -174,11 +154,11 @@ def test_version_and_the_list_of_commands(run):
     assert all(f"    {command} " in shown for command in COMMANDS)
 
 
-def test_help_imports_neither_ros_nor_scipy():
+def test_help_imports_neither_ros_nor_scipy_nor_completion():
     """So it is there at once."""
     code = (
-        "import sys; from push_predictor.cli import build_parser; build_parser().format_help(); "
-        "sys.exit(' '.join(name for name in ('rclpy', 'scipy', 'matplotlib') if name in sys.modules) or 0)"
+        "import sys; from push_predictor.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+        "slow = {'rclpy', 'scipy', 'matplotlib', 'argcomplete'}; sys.exit(' '.join(slow & sys.modules.keys()) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
@@ -194,11 +174,13 @@ def test_simulate_reports_the_recording(place: Place, run):
 
 
 def test_seed_determines_the_simulated_recording(place: Place, run):
-    call = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT, "--pushes", "4"]
-    for seed, same in (("2", True), ("3", False)):
-        again = place.path(f"again{seed}/test.mcap")
-        assert run(*call, "--seed", seed, "--out", again).status == 0
-        assert (Path(again).read_bytes() == Path(place.path("test.mcap")).read_bytes()) is same
+    call = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT, "--pushes", "1"]
+    made = []
+    for number, seed in enumerate(("2", "2", "3")):
+        path = place.folder / f"again{number}" / "test.mcap"
+        assert run(*call, "--seed", seed, "--out", str(path)).status == 0
+        made.append(path.read_bytes())
+    assert made[0] == made[1] != made[2]
 
 
 def test_train_reports_model_windows_and_pushes(place: Place):
@@ -348,13 +330,6 @@ def test_info_describes_recording_table_and_model(place: Place, run):
         assert run("info", place.path(name)).out.count("\n") > 5
 
 
-def test_info_takes_a_rig(place: Place, run, tmp_path: Path):
-    rig = str(tmp_path / "rig.yaml")
-    sizes = ("--circle", "0.1", "--tip-radius", "0.004", "--surface", "abs", "--mass", "1.0")
-    run("rig", *sizes, "--out", rig)
-    assert "circle on abs" in str(run("info", place.path("test.mcap"), "--rig", rig, "--json", "-").json["rig"])
-
-
 def test_info_saves_the_rig_of_a_recording_that_loses_it_by_conversion(place: Place, run, tmp_path: Path):
     whole, bare, rig = (
         place.path("test.mcap"),
@@ -461,10 +436,8 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
     ("call", "words"),
     [
         (changed(SIMULATE, "--shape", "blob"), ["shape", "'blob'", "rect1"]),
-        (changed(SIMULATE, "--surface", "ice"), ["surface", "'ice'", "plywood"]),
         (changed(SIMULATE, "--pushes", "0"), ["--pushes", "0"]),
         (changed(SIMULATE, "--speed", "-1"), ["speed", "-1"]),
-        ([*SIMULATE, "--travel", "nan"], ["travel", "nan"]),
         ([*SIMULATE, "--seed", "-1"], ["--seed", "-1"]),
         (changed(SIMULATE, "--out", "{file}/x"), ["{file}"]),
         (changed(TRAIN, "train", "{tmp}/absent"), ["{tmp}/absent", "no such file"]),
@@ -472,10 +445,8 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (changed(TRAIN, "train", "{junk}.csv"), ["junk.csv"]),
         (changed([*TRAIN, "--mean", "zero"], "--kind", "analytical"), ["--kind", "--mean"]),
         ([*TRAIN, "--n-train", "100000"], ["n_train", "100000"]),
-        ([*TRAIN, "--n-train", "3"], ["3", "at least 10"]),
         ([*TRAIN, "--seed", "-1"], ["--seed", "-1"]),
         ([*TRAIN, "--stride", "-0.1"], ["--stride", "-0.1"]),
-        ([*TRAIN, "--stride", "nan"], ["--stride", "nan"]),
         ([*TRAIN, "--rig", "{tmp}/absent.yaml"], ["absent.yaml"]),
         (changed(TRAIN, "--out", "{tmp}"), ["{tmp}"]),
         (["predict", "{tmp}/absent", *PUSH], ["{tmp}/absent", "cannot be read"]),
@@ -483,7 +454,6 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (["predict", "{gp}", *changed(PUSH, "--contact", "1.5")], ["contact", "1.5", "[0, 1)"]),
         (["predict", "{gp}", *PUSH, "--duration", "3"], ["duration", "3"]),
         (["predict", "{gp}", *PUSH, "--covariate", "humid"], ["--covariate", "'humid'", "NAME=VALUE"]),
-        (["predict", "{gp}", *PUSH, "--covariate", "=3"], ["--covariate", "'=3'", "NAME=VALUE"]),
         (["predict", "{gp}", *PUSH, "--json", "{tmp}"], ["{tmp}"]),
         (["evaluate", "{gp}", "{tmp}/absent.csv"], ["absent.csv", "no such file"]),
         (["evaluate", "{train}", "{train}"], ["{train}"]),
@@ -492,14 +462,11 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (["validate", "{gp}", "{tmp}/test.csv"], ["RECORDING", "{tmp}/test.csv", "push_predictor evaluate"]),
         (["validate", "{gp}", "{test}", "--windows", "{tmp}"], ["{tmp}"]),
         (["report", "validation", "{gp}", "--out", "{tmp}/r"], ["--recording", "both"]),
-        (["report", "validation", "--recording", "{test}", "--out", "{tmp}/r"], ["MODEL", "both"]),
         (["info", "{tmp}/absent"], ["{tmp}/absent"]),
         (["info", "{tmp}"], ["{tmp}", ".mcap"]),
         (["info", "{junk}.csv"], ["junk.csv"]),
         (["import", "mit-square", "{tmp}/absent.npz", "--out", "{tmp}/o"], ["absent.npz"]),
         (["import", "mit", "{junk}.mcap", "--out", "{tmp}/o"], ["junk.mcap"]),
-        (["import", "mlab", "{tmp}/absent.txt", "--out", "{tmp}/o"], ["absent.txt"]),
-        (["import", "rosbag1", "{junk}.mcap", "--out", "{tmp}/o"], ["junk.mcap"]),
     ],
 )
 def test_failure_is_one_line_that_names_the_file_or_field(

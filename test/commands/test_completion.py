@@ -35,7 +35,6 @@ def _path() -> str:
     [
         ("push_predictor tra", ["train", "trace"]),
         ("push_predictor train --kind ", ["vhgp", "gp", "analytical", "prior"]),
-        ("push_predictor report val", ["validation"]),
         ("push_predictor suggest --spe", ["--speed-range"]),
         ("push_predictor predict mod", ["model.pushmodel"]),
     ],
@@ -48,16 +47,6 @@ def test_commands_options_and_files_are_completed(line: str, offered: list[str],
 
 def test_the_command_is_marked_for_the_shells_global_completion() -> None:
     assert "PYTHON_ARGCOMPLETE_OK" in (REPOSITORY / "push_predictor" / "cli.py").read_text()[:1024]
-
-
-def test_a_command_does_not_import_argcomplete() -> None:
-    code = (
-        "import sys; from push_predictor.cli import main\n"
-        "try: main(['--version'])\n"
-        "finally: assert 'argcomplete' not in sys.modules"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 def test_completion_without_argcomplete_is_no_traceback(tmp_path: Path) -> None:

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-import runpy
 from pathlib import Path
-from typing import Any
 
 import pytest
 from ros_harness import REPOSITORY, free_domain, node_environment
@@ -99,16 +97,3 @@ def test_module_that_is_not_compiled_is_named_with_the_command(monkeypatch: pyte
     gone = compiled_modules()
     assert gone.state == "missing" and "No module named 'push_predictor.no_such_module'" in gone.found
     assert "`pip install -e .`" in gone.remedy and "colcon" in gone.remedy
-
-
-def test_checked_packages_and_modules_equal_those_of_setup(monkeypatch: pytest.MonkeyPatch) -> None:
-    import setuptools
-
-    setup: dict[str, Any] = {}
-    monkeypatch.chdir(REPOSITORY)
-    monkeypatch.setattr(setuptools, "setup", setup.update)
-    runpy.run_path("setup.py")
-    required = [row.split(">")[0].replace("PyYAML", "yaml") for row in setup["install_requires"]]
-    assert list(doctor_command.REQUIRED) == required
-    compiled = [extension.name for extension in setup["ext_modules"]]
-    assert [f"push_predictor.{name}" for name in doctor_command.COMPILED] == compiled

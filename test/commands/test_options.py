@@ -67,9 +67,8 @@ def test_a_model_file_is_an_argument_and_never_an_option(words: tuple[str, ...])
     assert not any("--model" in action.option_strings for action in parser_of(words)._actions)
 
 
-@pytest.mark.parametrize("words", [(), *CALLS], ids=" ".join)
-def test_no_option_may_be_abbreviated(words: tuple[str, ...]) -> None:
-    assert not parser_of(words).allow_abbrev
+def test_no_option_may_be_abbreviated() -> None:
+    assert [words for words in ((), *CALLS) if parser_of(words).allow_abbrev] == []
 
 
 @pytest.mark.parametrize("words", CALLS, ids=" ".join)

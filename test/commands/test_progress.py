@@ -98,7 +98,7 @@ def test_commands_report_what_is_done(
 ) -> None:
     monkeypatch.setattr("push_predictor.design.batch.CANDIDATES", 16)
     bag, model = str(tmp_path / "bag"), str(tmp_path / "m.pushmodel")
-    shape = ["--shape", "rect1", "--surface", "abs", "--speed", "0.02", "--travel", "0.012"]
+    shape = ["--shape", "rect1", "--surface", "abs", "--speed", "0.02", "--travel", "0.016"]
     assert main(["simulate", *shape, "--pushes", "10", "--out", bag]) == 0
     assert main(["train", bag, "--kind", "gp", "--mean", "zero", "--out", model]) == 0
     assert main(["suggest", model, "--count", "3", "--out", str(tmp_path / "s.csv")]) == 0

@@ -212,12 +212,6 @@ def test_a_file_is_overwritten_only_with_force(tmp_path: Path, capsys: pytest.Ca
 # --- output ----------------------------------------------------------------------------------------------------------
 
 
-def test_the_summary_states_the_sizes_in_millimetres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made(tmp_path, "--circle", "0.105")
-    text = capsys.readouterr().out
-    assert "105.00 mm along x, 105.00 mm along y" in text and "tip radius     4.75 mm" in text
-
-
 def test_the_json_contains_the_record(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made(tmp_path, "--square", "0.09", "--json", "-")
     content = json.loads(capsys.readouterr().out)

@@ -77,19 +77,8 @@ def test_keeps_to_the_limits_without_a_model(
         return calls[-1][-1]
 
     monkeypatch.setattr("push_predictor.design.batch.suggest_pushes", noted)
-    limits = [
-        "--speed-range",
-        "0.03",
-        "0.05",
-        "--angle-range",
-        "-0.2",
-        "0.4",
-        "--travel",
-        "0.02",
-        "--exclude",
-        "0.5",
-        "1.0",
-    ]
+    limits = ["--speed-range", "0.03", "0.05", "--angle-range", "-0.2", "0.4"]
+    limits += ["--travel", "0.02", "--exclude", "0.5", "1.0"]
     call = ["suggest", "--rig", str(folder / "rig.yaml"), "--count", "3", "--transfer-speed", "0.1", *limits]
     assert main([*call, "--out", str(folder / "first.csv"), "--json", "-"]) == 0
     found, shown = written(folder / "first.csv"), json.loads(capsys.readouterr().out)

@@ -283,7 +283,7 @@ def test_recording_contains_no_hint_of_the_truth(tmp_path: Path) -> None:
 @pytest.mark.parametrize("group", GROUPS)
 def test_every_kind_of_effect_can_be_drawn_and_changes_outcomes(group: str) -> None:
     spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 8)
-    drawn = [drawn_for(spec, group, np.random.default_rng(seed)) for seed in range(25)]
+    drawn = [drawn_for(spec, group, np.random.default_rng(seed)) for seed in range(12)]
     assert {one.size for one in drawn} == set(SIZES)
     assert {one.kind for one in drawn} <= {kind.name for kind in GROUPS[group]}
     assert all(one.covariates and one.unit and one.value != 0.0 for one in drawn)
@@ -302,7 +302,7 @@ def test_equal_seeds_draw_equal_truths() -> None:
 
 def test_a_fifth_of_the_effects_on_the_motion_have_a_second_one() -> None:
     spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 8)
-    drawn = [drawn_for(spec, "library", np.random.default_rng(seed)) for seed in range(150)]
+    drawn = [drawn_for(spec, "library", np.random.default_rng(seed)) for seed in range(100)]
     both = [one for one in drawn if one.second]
     motion = CYCLE.count("library") + CYCLE.count("outside")
     assert 0.15 < len(both) / len(drawn) * CYCLE.count("library") / motion < 0.25

@@ -29,28 +29,9 @@ from push_predictor import load_model, read_recording
 
 PACKAGE = Path(command.__file__).parent
 TRUTH_KEYS = {
-    "number",
-    "group",
-    "seed",
-    "engine",
-    "shape",
-    "surface",
-    "friction",
-    "pushes",
-    "training_pushes",
-    "kind",
-    "channel",
-    "names",
-    "covariates",
-    "form",
-    "size",
-    "value",
-    "unit",
-    "place",
-    "place_time",
-    "second",
-    "clean_ratio",
-}
+    "number", "group", "seed", "engine", "shape", "surface", "friction", "pushes", "training_pushes", "kind", "channel",
+    "names", "covariates", "form", "size", "value", "unit", "place", "place_time", "second", "clean_ratio",
+}  # fmt: skip
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -118,14 +118,3 @@ def test_node_without_compiled_modules_prints_one_line(tmp_path: Path):
     done = python("-m", "push_predictor.nodes.predict_server", first=HIDE_COMPILED, folder=tmp_path)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 1 and line.startswith("predict_server: the compiled mechanics")
-
-
-def test_doctor_without_compiled_modules_names_the_remedy(tmp_path: Path):
-    code = (
-        "from push_predictor.commands.doctor_command import compiled_modules as check; print(*check().lines, sep='|')"
-    )
-    done = python("-c", code, first=HIDE_COMPILED, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    finding, remedy = done.stdout.strip().split("|")
-    assert finding.split()[:2] == ["missing", "compiled"] and "compiled mechanics" in finding
-    assert remedy.strip() == f"-> {REMEDY}"

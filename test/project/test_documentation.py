@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import importlib.util
 import re
@@ -157,20 +156,6 @@ def test_the_examples_in_the_help_are_taken_too(capsys: pytest.CaptureFixture[st
         build_parser().parse_args(example.split()[1:])
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
-def test_every_link_to_a_file_leads_somewhere(document: Path):
-    for target in re.findall(r"\]\(([^)#\s]+)", document.read_text()):
-        if not target.startswith(("http://", "https://")):
-            assert (document.parent / target).exists(), target
-
-
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
-def test_every_file_that_a_page_shows_exists_with_the_part_that_it_shows(document: Path):
-    for name, part in re.findall(r"^--8<-- \"([^\":]+)(?::(\w+))?\"$", document.read_text(), re.MULTILINE):
-        text = (REPOSITORY / name).read_text()
-        assert not part or (f"[start:{part}]" in text and f"[end:{part}]" in text)
-
-
 def test_the_names_in_the_documented_files_are_those_that_are_written():
     names = " ".join(row[0] for row in table(REFERENCE / "push_validator.md", "What is written"))
     for name in (MAIN_RESULT, "windows.json", "residuals/", "report.html"):
@@ -182,22 +167,6 @@ def test_the_names_in_the_documented_files_are_those_that_are_written():
 
 def section(document: Path, heading: str) -> str:
     return document.read_text().split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_the_command_line_page_names_every_option(command: str):
-    page = REFERENCE / "command_line.md"
-    known = section(page, command) + section(page, "Conventions")
-    for action in command_parser(command)._actions:
-        assert action.dest == "help" or not action.option_strings or any(o in known for o in action.option_strings), (
-            action.option_strings
-        )
-
-
-def command_parser(command: str) -> argparse.ArgumentParser:
-    groups = [action for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction)]
-    parser: argparse.ArgumentParser = groups[0].choices[command]
-    return parser
 
 
 def test_the_python_page_shows_every_public_name():
@@ -248,19 +217,20 @@ def test_every_key_of_the_example_rig_has_a_comment_before_it_and_the_rig_page_s
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
-def test_cited_modules_and_files_exist(document: Path):
+def test_what_a_document_links_shows_or_cites_exists(document: Path):
     text = document.read_text()
+    for target in re.findall(r"\]\(([^)#\s]+)", text):
+        assert target.startswith(("http://", "https://")) or (document.parent / target).exists(), target
+    for name, part in re.findall(r"^--8<-- \"([^\":]+)(?::(\w+))?\"$", text, re.MULTILINE):
+        shown = (REPOSITORY / name).read_text()
+        assert not part or (f"[start:{part}]" in shown and f"[end:{part}]" in shown)
     for module in re.findall(r"python -m ((?:benchmarks|examples)[\w.]*)", text):
         assert importlib.util.find_spec(module.rstrip(".")), module
     for path in re.findall(r"`((?:test|benchmarks|examples|config|docs)/[\w/.]+\.(?:py|yaml|xml|json|rviz|md))`", text):
         assert (REPOSITORY / path).is_file(), path
     for module in set(re.findall(r"`([\w/]+\.py)`", text)) - NOT_THERE_YET:
         assert [path for path in PYTHON_FILES if f"/{path}".endswith(f"/{module}")], module
-
-
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
-def test_model_files_have_one_suffix(document: Path):
-    assert not re.findall(r"\b(?!pushes_)\w+\.(?:model|npz)\b", document.read_text())
+    assert not re.findall(r"\b(?!pushes_)\w+\.(?:model|npz)\b", text), "model files have one suffix"
 
 
 def test_code_cites_documents_that_exist():

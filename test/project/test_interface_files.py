@@ -79,14 +79,9 @@ def test_all_interfaces_are_found() -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_every_field_has_a_comment(path: Path) -> None:
+def test_every_field_has_a_comment_every_number_a_unit_and_every_array_a_shape(path: Path) -> None:
     assert path.read_text().startswith("# ")
-    for field in fields_of(path):
-        assert len(field.comment) > 5, field
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_every_number_has_a_unit_and_every_array_a_shape(path: Path) -> None:
+    assert [field for field in fields_of(path) if len(field.comment) <= 5] == []
     for field in (field for field in fields_of(path) if not is_constant(field)):
         if not field.kind.startswith(WITHOUT_UNIT):
             assert re.match(r"\[[^\]]+\]", field.comment), field
@@ -95,14 +90,10 @@ def test_every_number_has_a_unit_and_every_array_a_shape(path: Path) -> None:
             assert re.search(r"shape \(\w+,( \w+,?)*\)", field.comment), field
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_a_file_with_an_outcome_defines_the_push_frame(path: Path) -> None:
-    text = path.read_text()
-    if "dtheta" in text or "push frame" in text:
-        assert "\n# Push frame: " in text and "counter-clockwise" in text
-
-
-def test_definitions_are_the_same_in_all_files() -> None:
+def test_a_file_with_an_outcome_defines_the_push_frame_and_definitions_are_the_same() -> None:
+    for text in (path.read_text() for path in FILES):
+        if "dtheta" in text or "push frame" in text:
+            assert "\n# Push frame: " in text and "counter-clockwise" in text, text
     for begin in ("# Push frame: ", "# Contact: "):
         blocks = {
             re.split(r"\n(?!# )|\n# (?=Contact)", path.read_text().split(begin, 1)[1])[0]

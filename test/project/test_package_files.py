@@ -21,6 +21,9 @@ from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import Package, parse_package
 from repository import REPOSITORY
 
+import push_predictor
+from push_predictor.commands import doctor_command
+
 FOLDERS = {
     "push_predictor": REPOSITORY,
     "push_predictor_interfaces": REPOSITORY / "push_predictor_interfaces",
@@ -145,6 +148,8 @@ def test_all_packages_have_one_version(name: str):
     else:
         assert f'\nversion = "{package(name).version}"\n' in (FOLDERS[name] / "pyproject.toml").read_text()
     assert f"\nversion: {package(name).version}\n" in (REPOSITORY / "CITATION.cff").read_text()
+    assert push_predictor.__version__ == package(name).version
+    assert f"## {package(name).version}" in (REPOSITORY / "CHANGELOG.md").read_text()
 
 
 def test_what_the_library_imports_is_a_dependency():
@@ -220,6 +225,14 @@ def test_every_source_file_begins_with_the_licence():
         lines = text.splitlines(keepends=True)
         start = 1 if text.startswith("#!") else 0
         assert not text or "".join(lines[start : start + 2]) == HEADER, path
+
+
+def test_the_doctor_checks_the_packages_and_modules_of_setup():
+    given = setup_arguments("push_predictor")
+    required = [row.split(">")[0].replace("PyYAML", "yaml") for row in given["install_requires"]]
+    assert list(doctor_command.REQUIRED) == required
+    compiled = [extension.name for extension in given["ext_modules"]]
+    assert [f"push_predictor.{name}" for name in doctor_command.COMPILED] == compiled
 
 
 # --- colcon ----------------------------------------------------------------------------------------------------------

@@ -62,17 +62,11 @@ def reached() -> set[Path]:
     return {*STARTS, *first, *(page for one in first for page in linked(one))}
 
 
-@pytest.mark.parametrize("place", [*PLANNER.values(), *LABORATORY.values()])
-def test_the_page_that_answers_a_question_exists_and_is_two_links_away(place: str) -> None:
-    name, anchor = place.split("#")
-    page = REPOSITORY / name
-    assert anchor in anchors(page)
-    assert page in reached()
-
-
-def test_ten_questions_are_a_planners_and_ten_a_laboratorys() -> None:
-    assert len(PLANNER) == len(LABORATORY) == 10
-    assert len({*PLANNER.values(), *LABORATORY.values()}) == 20
+def test_the_page_that_answers_a_question_exists_and_is_two_links_away() -> None:
+    near = reached()
+    for place in (*PLANNER.values(), *LABORATORY.values()):
+        name, anchor = place.split("#")
+        assert anchor in anchors(REPOSITORY / name) and REPOSITORY / name in near, place
 
 
 @pytest.mark.parametrize("page", sorted((REPOSITORY / "docs").rglob("*.md")), ids=lambda page: page.name)

@@ -18,16 +18,15 @@ from repository import REPOSITORY
 from push_predictor.geometry.shapes import transformed
 from push_predictor.recordings.checks.check import check_table
 from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
-from push_predictor.recordings.checks.coverage import coverage_findings, coverage_of
-from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.coverage import coverage_findings
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import BoolArray
 
 SMALL = "ellipse_plywood"
 WHOLE = "square_abs_test"  # on all sides, at several speeds and angles
 SLIDERS = [name for name in BAGS if name != "square_abs_train"]
+TWO = ("circle_pu", "square_abs_repeats")  # round, and pushed on one side
 Change = Callable[[PushTable], PushTable]
 
 
@@ -48,11 +47,6 @@ def rig_of(name: str) -> Rig:
     return rig
 
 
-def lacking(table: PushTable, name: str = WHOLE) -> dict[str, Finding]:
-    rig = rig_of(name)
-    return {each.name: each for each in coverage_findings(coverage_of(table, rig))}
-
-
 def changed(table: PushTable, dy: float = 1.0, dtheta: float = 1.0, angle: float = 1.0) -> PushTable:
     return replace(table, inputs=table.inputs * [1.0, 1.0, angle], outcomes=table.outcomes * [1.0, dy, dtheta])
 
@@ -67,70 +61,17 @@ def clockwise_contacts(table: PushTable) -> PushTable:
 
 @pytest.mark.parametrize("name", [*SLIDERS, pytest.param("square_abs_train", marks=pytest.mark.long)])
 def test_no_bag_gives_a_warning(name: str) -> None:
-    assert {finding.severity for finding in checked(name).findings} <= {"note"}
     coverage = checked(name).coverage
     assert coverage is not None and coverage.sliding is not None
+    assert [each for each in checked(name).findings if each not in coverage_findings(coverage)] == []
+    assert {finding.severity for finding in checked(name).findings} <= {"note"}
     assert coverage.sliding > 0.3
-
-
-def test_a_bag_with_all_sides_speeds_and_angles_lacks_nothing() -> None:
-    assert lacking(table_of(WHOLE)) == {}
-
-
-@pytest.mark.parametrize(("count", "severity"), [(7, "warning"), (20, "note")])
-def test_a_bag_cut_after_some_pushes_has_few(count: int, severity: str) -> None:
-    table = table_of(WHOLE)
-    finding = lacking(table.take(np.isin(table.push_id, table.pushes[:count])))["few_pushes"]
-    assert finding.severity == severity and f"{count} pushes" in finding.sentence
-
-
-def test_a_bag_without_windows_has_no_push() -> None:
-    table = table_of(WHOLE)
-    assert list(lacking(table.take(np.zeros(len(table), dtype=np.bool_)))) == ["no_pushes"]
-
-
-def test_a_bag_cut_to_one_side_names_the_others() -> None:
-    table = table_of(WHOLE)
-    finding = lacking(table.take(np.floor(4.0 * table.inputs[:, 1]) == 2.0))["few_sides"]
-    assert finding.severity == "note" and "Pushed: side 3 of 4" in finding.sentence
-    ellipse = table_of("ellipse_plywood")
-    quarter = ellipse.take(np.floor(4.0 * ellipse.inputs[:, 1]) == 0.0)
-    assert lacking(quarter, "ellipse_plywood")["few_sides"].severity == "warning"
-
-
-def test_a_bag_cut_to_one_speed_says_so() -> None:
-    table = table_of(WHOLE)
-    slow = table.take(np.abs(table.inputs[:, 0] - 0.02) < 0.004)
-    assert [(each.name, each.severity) for each in lacking(slow).values()] == [("one_speed", "note")]
-
-
-@pytest.mark.parametrize(("degrees", "severity"), [(12.0, "warning"), (25.0, "note")])
-def test_a_bag_cut_to_few_angles_is_found(degrees: float, severity: str) -> None:
-    table = table_of(WHOLE)
-    straight = table.take(np.abs(table.inputs[:, 2]) < np.radians(degrees))
-    assert lacking(straight)["few_angles"].severity == severity
-
-
-def test_a_bag_cut_to_contacts_that_stick_is_found() -> None:
-    """Of each push, the windows before the contact first slides."""
-    finding = lacking(table_of(WHOLE).take(sticking(table_of(WHOLE), rig_of(WHOLE))))["few_sliding"]
-    assert finding.severity == "warning"
-
-
-def sticking(table: PushTable, rig: Rig) -> BoolArray:
-    """Windows (n,) of pushes whose contact moves along the edge by less than 15 % of the tip's path."""
-    step = np.diff(table.inputs[:, 1], append=table.inputs[-1:, 1])
-    along = rig.outline.perimeter * (step - np.round(step)) + rig.pusher_radius * table.outcomes[:, 2]
-    slides = np.abs(along) > 0.15 * table.inputs[:, 0] * table.duration
-    last = np.append(table.push_id[1:] != table.push_id[:-1], True)
-    sliding = np.unique(table.push_id[slides & ~last])
-    return np.asarray(~np.isin(table.push_id, sliding))
 
 
 # --- signs -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SLIDERS)
+@pytest.mark.parametrize("name", TWO)
 @pytest.mark.parametrize(
     ("change", "finding"),
     [
@@ -145,7 +86,7 @@ def test_a_mirrored_table_is_named(name: str, change: Change, finding: str) -> N
     assert all(value.value < -0.9 for value in found.values.values())
 
 
-@pytest.mark.parametrize("name", SLIDERS)
+@pytest.mark.parametrize("name", TWO)
 def test_without_a_rig_the_sign_of_dy_is_checked(name: str) -> None:
     assert check_table(table_of(name)) == ()
     (found,) = check_table(changed(table_of(name), dy=-1.0, dtheta=-1.0))
@@ -197,27 +138,3 @@ def test_a_wrench_that_hides_pushes_is_left_out_of_the_coverage() -> None:
     (finding,) = (each for each in hiding.findings if each.severity == "warning")
     hidden = re.search(r"contact is found in (\d+) of (\d+) pushes. `--wrench-topic none`", finding.advice)
     assert hidden is not None and int(hidden[1]) < 0.7 * int(hidden[2])
-
-
-# --- units -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", SLIDERS)
-@pytest.mark.parametrize(
-    ("columns", "finding"),
-    [
-        (([1e3, 1.0, 1.0], 1.0, [1.0, 1.0, 1.0]), "units_velocity"),
-        (([1.0, 1.0, 1.0], 1e3, [1.0, 1.0, 1.0]), "units_duration"),
-        (([1.0, 1.0, 1.0], 1.0, [1e3, 1e3, 1.0]), "units_dx"),
-        (([1.0, 1.0, 1.0], 1.0, [1.0, 1.0, 180.0 / np.pi]), "units_dtheta"),
-    ],
-)
-def test_a_table_in_other_units_is_refused_by_column(
-    name: str, columns: tuple[list[float], float, list[float]], finding: str
-) -> None:
-    inputs, duration, outcomes = columns
-    table = table_of(name)
-    wrong = PushTable(
-        table.inputs * inputs, table.duration * duration, table.outcomes * outcomes, table.push_id, table.covariates
-    )
-    assert [(each.name, each.severity) for each in check_table(wrong, rig_of(name))] == [(finding, "refused")]

@@ -15,7 +15,6 @@ import pytest
 from checked_bags import bag, found, rig_of, sample
 from lab_bags import Lab, pose_values
 from mistakes import (
-    BAGS,
     MISTAKES,
     UPRIGHT,
     UPSIDE_DOWN,
@@ -26,7 +25,6 @@ from mistakes import (
     force_of_random_direction,
     force_scaled,
     force_turned,
-    heading_in_degrees,
     late,
     mirrored,
     on_hand,
@@ -34,14 +32,11 @@ from mistakes import (
     spatial_rows,
     stream_part,
     tracked,
-    w_first,
-    without_orientation,
 )
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.frames import swapped
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.wrench import wrench_findings
 from push_predictor.recordings.decoder.rules import slider_stream
@@ -56,30 +51,15 @@ from push_predictor.types import Array
 SMALL = "hexagon_delrin"
 ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
 PUSHED = ("circle_pu", ONE_SIDE)  # whose forces are altered
-SLIDERS = [name for name in BAGS if name != "square_abs_train"]  # which has the slider and surface of another
-FURTHER = ["ellipse_plywood", ONE_SIDE]  # the mistakes of a third are in the list
-FURTHER_PUSHED = ["circle_pu"]
 
 
 def of_force(recording: Recording, rig: Rig) -> list[Finding]:
     return wrench_findings(motion_of(recording, rig), rig)
 
 
-def bag_apothem(name: str) -> float:
-    """Distance (m) from the centre of a regular polygon to its sides."""
-    corners = rig_of(name).outline.vertices
-    return float(np.linalg.norm(0.5 * (corners[0] + corners[1])))
-
-
-@pytest.mark.parametrize("name", BAGS)
-def test_the_bags_give_no_finding(name: str) -> None:
-    assert check_recording(bag(name), rig_of(name)) == ()
-
-
 @pytest.mark.parametrize(
     ("name", "shift"),
     [
-        ("ellipse_plywood", (-0.0012, 0.0)),
         (SMALL, (0.0, 0.0012)),
         (ONE_SIDE, (-0.0012, 0.0)),  # along its side no contact shows a shift
     ],
@@ -92,24 +72,23 @@ def test_a_shift_of_over_a_millimetre_is_found_within_four_sd(name: str, shift: 
     assert finding.severity == "warning" and "mm" in finding.sentence
 
 
-@pytest.mark.parametrize(("name", "degrees"), [("ellipse_plywood", 2.1), (ONE_SIDE, 2.1), ("square_abs_test", -12.0)])
+@pytest.mark.parametrize(("name", "degrees"), [("ellipse_plywood", 2.1), ("square_abs_test", -12.0)])
 def test_a_turn_of_over_two_degrees_is_found(name: str, degrees: float) -> None:
     finding = found(tracked(sample(name), np.radians(degrees), (0.0, 0.0)), rig_of(name))["outline_turned"]
     assert finding.values["yaw"].value == pytest.approx(-np.radians(degrees), abs=0.006)
 
 
-@pytest.mark.parametrize("name", SLIDERS)
+@pytest.mark.parametrize("name", ["circle_pu", SMALL])
 def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
     order = rig_of(name).outline.rotational_symmetry
     turn = 2.0 * np.pi / order if order else 0.3
     assert not found(tracked(sample(name), turn, (0.0, 0.0)), rig_of(name))
 
 
-@pytest.mark.parametrize("name", ["hexagon_delrin", "square_abs_test"])
-def test_a_wrong_size_is_found(name: str) -> None:
-    finding = found(sample(name), outline_altered(rig_of(name), size=1.03))["outline_size"]
+def test_a_wrong_size_is_found() -> None:
+    finding = found(bag(SMALL), outline_altered(rig_of(SMALL), size=1.03))["outline_size"]
     assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
-    half = 45.0 if name.startswith("square") else 1e3 * bag_apothem(name)
+    half = 1e3 * float(np.linalg.norm(np.mean(rig_of(SMALL).outline.vertices[:2], axis=0)))
     stated = re.search(r", (-\d+\.\d) mm a side", finding.sentence)
     assert stated and float(stated[1]) == pytest.approx(half * 1.03 * (1 / 1.03 - 1.0), abs=0.15)
 
@@ -135,17 +114,11 @@ def test_a_circle_with_a_wrong_y_axis_is_named_as_mirrored() -> None:
     assert list(found(mirrored(bag("circle_pu"), -1.0, 1.0), rig_of("circle_pu"))) == ["frame_mirrored"]
 
 
-@pytest.mark.parametrize("error", [0.0011])
-def test_a_wrong_tip_radius_seen_from_one_side_is_reported_as_a_shift(error: float) -> None:
+def test_a_wrong_tip_radius_seen_from_one_side_is_reported_as_a_shift() -> None:
     """The contacts of one side separate neither; see test_outline_causes for the other recordings."""
     rig = rig_of(ONE_SIDE)
-    (finding,) = check_recording(sample(ONE_SIDE), replace(rig, pusher_radius=rig.pusher_radius + error))
+    (finding,) = check_recording(sample(ONE_SIDE), replace(rig, pusher_radius=rig.pusher_radius + 0.0011))
     assert finding.name == "outline_shifted" and abs(finding.values["x"].value) == pytest.approx(0.0011, abs=1e-4)
-
-
-@pytest.mark.parametrize("name", FURTHER)
-def test_exchanged_topics_are_refused(name: str) -> None:
-    assert found(swapped(sample(name)), rig_of(name))["topics_swapped"].severity == "refused"
 
 
 def test_few_pushes_give_no_estimate_of_the_outline() -> None:
@@ -178,7 +151,7 @@ def with_poses(recording: Recording, alter: Callable[[Array], Array]) -> Recordi
     return replace(recording, slider=replace(slider, **{c: alter(getattr(slider, c)) for c in ("x", "y", "heading")}))
 
 
-@pytest.mark.parametrize(("name", "lag"), [("ellipse_plywood", -0.05), (SMALL, 0.05), (ONE_SIDE, 0.05)])
+@pytest.mark.parametrize(("name", "lag"), [("ellipse_plywood", -0.05), (ONE_SIDE, 0.05)])
 def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
     finding = found(late(sample(name), lag), rig_of(name))["clocks_apart"]
     estimate = finding.values["lag"]
@@ -187,38 +160,20 @@ def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
     assert f"{1e3 * abs(estimate.value):.0f} ms {'late' if lag > 0.0 else 'early'} (sd " in finding.sentence
 
 
-@pytest.mark.parametrize("stream", ["slider", "pusher"])
-def test_millimetres_are_refused_by_name(stream: str) -> None:
-    poses = getattr(bag(SMALL), stream)
-    wrong = replace(bag(SMALL), **{stream: replace(poses, x=1e3 * poses.x, y=1e3 * poses.y)})
-    finding = found(wrong, rig_of(SMALL))[f"units_length_{stream}"]
-    assert finding.severity == "refused" and "mm" in finding.sentence
-
-
 def test_a_rig_in_millimetres_is_refused() -> None:
     assert "units_rig" in found(bag(SMALL), outline_altered(rig_of(SMALL), size=1e3))
 
 
-@pytest.mark.parametrize("factor", [1e-6, 1e3])
-def test_stamps_in_a_wrong_unit_are_refused(factor: float) -> None:
+def test_stamps_in_a_wrong_unit_are_refused() -> None:
     slider = bag(SMALL).slider
-    stamp = ((slider.stamp - slider.stamp[0]) * factor).astype(np.int64)
+    stamp = ((slider.stamp - slider.stamp[0]) * 1e-6).astype(np.int64)
     assert "units_time_slider" in found(replace(bag(SMALL), slider=replace(slider, stamp=stamp)), rig_of(SMALL))
 
 
-@pytest.mark.parametrize("name", FURTHER)
-def test_a_quaternion_with_w_first_is_refused(name: str) -> None:
-    """Of a tracker, whose quaternions have a tilt of some milliradians."""
-    (finding,) = check_recording(w_first(sample(name)), rig_of(name))
-    assert (finding.name, finding.severity) == ("quaternion_order", "refused")
-    assert finding.values["tilt"].value > np.radians(90.0)
-
-
-@pytest.mark.parametrize("name", SLIDERS)
-def test_the_tilt_of_a_tracker_is_no_finding(name: str) -> None:
-    recording = sample(name)
+def test_the_tilt_of_a_tracker_is_no_finding() -> None:
+    recording = bag(SMALL)
     tracked_in_space = slider_stream(recording.slider.stamp, spatial_rows(recording.slider))
-    assert check_recording(replace(recording, slider=tracked_in_space), rig_of(name)) == ()
+    assert check_recording(replace(recording, slider=tracked_in_space), rig_of(SMALL)) == ()
     assert tracked_in_space.tilt is not None
     assert np.median(tracked_in_space.tilt) == pytest.approx(0.003, abs=0.001)
 
@@ -242,13 +197,12 @@ def test_a_body_that_is_upside_down_is_a_warning() -> None:
     assert finding.severity == "warning" and "180 degrees" in finding.sentence
 
 
-@pytest.mark.parametrize("w_is_first", [True, False])
-def test_quaternions_of_transforms_are_checked_too(tmp_path: Path, w_is_first: bool) -> None:
+def test_quaternions_of_transforms_are_checked_too(tmp_path: Path) -> None:
     """As the Vicon bridge sends them."""
     recording, lab = bag(SMALL), Lab()
     rows = spatial_rows(recording.slider)
     kind, stamps = "geometry_msgs/msg/TransformStamped", recording.slider.stamp
-    rows = rows[:, [0, 1, 2, 6, 3, 4, 5]] if w_is_first else rows
+    rows = rows[:, [0, 1, 2, 6, 3, 4, 5]]
     lab.add(
         "/vicon",
         kind,
@@ -260,18 +214,10 @@ def test_quaternions_of_transforms_are_checked_too(tmp_path: Path, w_is_first: b
     )
     lab.pose("/pusher/pose", "geometry_msgs/msg/PoseStamped", recording.pusher, "pose")
     read = read_recording(lab.mcap(tmp_path / "lab", rig_of(SMALL)), topics=Topics("/vicon"))
-    assert list(found(read, rig_of(SMALL))) == (["quaternion_order"] if w_is_first else [])
+    assert list(found(read, rig_of(SMALL))) == ["quaternion_order"]
 
 
-@pytest.mark.parametrize("name", FURTHER)
-def test_an_orientation_that_is_not_recorded_is_refused(name: str) -> None:
-    assert found(without_orientation(sample(name)), rig_of(name))["heading_constant"].severity == "refused"
-
-
-PLACES = [(0.03, 0.0), (0.0, -0.03), (-0.08, 0.0), (0.05, 0.06)]
-
-
-@pytest.mark.parametrize(("name", "place"), [*zip((ONE_SIDE, *SLIDERS[:3]), PLACES, strict=True)])
+@pytest.mark.parametrize(("name", "place"), [("circle_pu", (0.0, -0.03)), ("ellipse_plywood", (-0.08, 0.0))])
 def test_a_body_on_the_robots_hand_is_refused(name: str, place: tuple[float, float]) -> None:
     """Whether the tip seems to be inside the outline, on it, or outside."""
     (finding,) = check_recording(on_hand(sample(name), place), rig_of(name))
@@ -286,55 +232,29 @@ def test_a_shifted_world_frame_is_no_exchange_of_topics(name: str, shift: float)
     assert findings and {each.severity for each in findings.values()} == {"warning"}
 
 
-@pytest.mark.parametrize("name", FURTHER_PUSHED)
-def test_a_wrench_of_the_wrong_sign_is_named(name: str) -> None:
-    wrench = sample(name).wrench
-    assert wrench is not None
-    wrong = replace(sample(name), wrench=replace(wrench, fx=-wrench.fx, fy=-wrench.fy))
-    assert list(found(wrong, rig_of(name))) == ["wrench_sign"]
-
-
-@pytest.mark.parametrize("name", FURTHER_PUSHED)
-def test_a_wrench_along_other_axes_is_named(name: str) -> None:
-    wrench = sample(name).wrench
-    assert wrench is not None
-    wrong = replace(sample(name), wrench=replace(wrench, fx=-wrench.fy, fy=wrench.fx))
-    assert list(found(wrong, rig_of(name))) == ["wrench_frame"]
-
-
-@pytest.mark.parametrize("name", PUSHED)
 @pytest.mark.parametrize("mistake", [force_in_slider_frame, lambda recording: force_turned(recording, -np.pi / 2.0)])
-def test_a_wrench_in_the_sliders_or_a_turned_frame_is_named(name: str, mistake: Mistake) -> None:
-    assert list(found(mistake(sample(name)), rig_of(name))) == ["wrench_frame"]
-
-
-@pytest.mark.parametrize("name", FURTHER)
-def test_a_heading_in_degrees_is_refused(name: str) -> None:
-    finding = found(heading_in_degrees(sample(name)), rig_of(name))["units_heading"]
-    assert finding.severity == "refused" and "degrees" in finding.sentence
+def test_a_wrench_in_the_sliders_or_a_turned_frame_is_named(mistake: Mistake) -> None:
+    assert list(found(mistake(bag("circle_pu")), rig_of("circle_pu"))) == ["wrench_frame"]
 
 
 @pytest.mark.parametrize("name", PUSHED)
 @pytest.mark.parametrize("alter", [
     force_of_random_direction,
-    force_of_another_time,
     lambda recording: force_of_another_time(recording, -1.0 / 3.0),
-    lambda recording: force_constant(recording, 0.0),
     lambda recording: force_constant(recording, 2.0),
 ])  # fmt: skip
 def test_a_force_that_has_nothing_to_do_with_the_push_is_named(name: str, alter: Mistake) -> None:
-    (finding,) = of_force(alter(sample(name)), rig_of(name))
+    (finding,) = of_force(alter(bag(name)), rig_of(name))
     assert (finding.name, finding.severity) == ("wrench_unrelated", "warning")
 
 
 @pytest.mark.parametrize("name", PUSHED)
-@pytest.mark.parametrize(("factor", "finding"), [
-    (0.0, "wrench_absent"), (1e-3, "wrench_absent"), (1.0 / 9.81, "wrench_absent"),
-    (102.0, "wrench_units"), (1e3, "wrench_units"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("factor", "finding"), [(1e-3, "wrench_absent"), (1.0 / 9.81, "wrench_absent"), (102.0, "wrench_units")]
+)
 def test_a_force_that_is_absent_or_in_another_unit_is_named(name: str, factor: float, finding: str) -> None:
-    """In N, kN, kgf, gf or mN."""
-    assert [each.name for each in of_force(force_scaled(sample(name), factor), rig_of(name))] == [finding]
+    """In kN, kgf or gf."""
+    assert [each.name for each in of_force(force_scaled(bag(name), factor), rig_of(name))] == [finding]
 
 
 def test_a_slider_of_unknown_mass_may_be_light_or_heavy() -> None:

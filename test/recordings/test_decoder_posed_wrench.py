@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from turning_sensor import in_sensor_axes
 
 from push_predictor.recordings.decoder.wrench import PosedWrench
@@ -43,21 +42,6 @@ def put(turned: PosedWrench, stamp: IntArray, values: Array, at: IntArray, tip: 
     return found.stamp, at_tip(found.values, found.sensor, found.tip)
 
 
-@pytest.mark.parametrize("lag", [0, 37, -21])  # samples by which the wrench is ahead of the tip
-@pytest.mark.parametrize("portions", [1, 7])
-def test_the_wrench_is_that_along_the_axes_of_the_world(lag: int, portions: int) -> None:
-    turned, found = PosedWrench(), []
-    for part, tip in zip(np.array_split(STAMPS, portions), np.array_split(TIP, portions), strict=True):
-        ahead = part if lag >= 0 else part[:lag]
-        found.append(put(turned, ahead, measured(ahead), tip, poses(tip)))
-        if lag < 0:
-            found.append(put(turned, part[lag:], measured(part[lag:]), *NO_TIP))
-    stamp = np.concatenate([each for each, _ in found])
-    values = np.concatenate([each for _, each in found])
-    assert np.array_equal(stamp, STAMPS) and turned.without_pose == 0
-    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
-
-
 def test_a_wrench_waits_for_the_tip() -> None:
     turned = PosedWrench()
     stamp, _ = put(turned, STAMPS, measured(STAMPS), *NO_TIP)
@@ -80,15 +64,6 @@ def test_a_wrench_before_the_tip_or_in_a_dropout_of_it_has_no_pose() -> None:
     outside = (TIP[10] > STAMPS) | ((TIP[29] < STAMPS) & (TIP[60] > STAMPS))
     assert np.array_equal(stamp, STAMPS[~outside]) and turned.without_pose == outside.sum()
     np.testing.assert_allclose(values, world(stamp), atol=1e-9)
-
-
-def test_a_tip_without_orientation_turns_nothing() -> None:
-    turned = PosedWrench()
-    flat = np.zeros((len(TIP), 7))
-    stamp, _ = put(turned, STAMPS, measured(STAMPS), TIP, flat)
-    assert len(stamp) == 0
-    stamp, _ = put(turned, *NO_WRENCH, TIP, poses(TIP))
-    assert np.array_equal(stamp, STAMPS)
 
 
 def test_a_clock_that_is_set_back_begins_again() -> None:

@@ -95,26 +95,6 @@ def assert_same(found: WrenchStream, wanted: WrenchStream | None, atol: float = 
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name)[kept], atol=atol)
 
 
-@pytest.mark.parametrize(("portion", "world"), [(29, "world"), (400, "map"), (100_000, "world")])
-def test_a_sensor_at_a_frame_of_tf_gives_the_wrench_of_the_recording(tmp_path: Path, portion: int, world: str) -> None:
-    made = lab(measured_at_mount(wrench(), original().pusher), "ft", True, world)
-    topics = replace(NAMES, wrench_frame="ft")
-    found, state, _ = live(made, topics, *in_portions(made.in_order(), portion))
-    assert_same(found, read_recording(made.mcap(tmp_path / "lab"), topics=topics).wrench)
-    assert not state.wrench.problem and state.wrench.without_pose == 0 and state.wrench.turned_into == world
-
-
-def test_a_sensor_whose_transforms_are_ahead_of_the_tip_waits_for_it(tmp_path: Path) -> None:
-    topics = replace(NAMES, wrench_frame="ft")
-    made = turned()
-    messages = made.in_order()
-    tips = [message for message in messages if message[1] == TIP]
-    first = [message for message in messages if message[1] != TIP] + tips[: len(tips) // 2]
-    found, _, counts = live(made, topics, first, tips[len(tips) // 2 :])
-    assert counts[0] > 50 and counts[1] > 50
-    assert_same(found, read_recording(made.mcap(tmp_path / "lab"), topics=topics).wrench)
-
-
 def test_wrenches_outside_the_time_of_the_sensors_transforms_have_no_pose() -> None:
     made = turned()
     moving = [message for message in made.in_order() if message[1] == "/tf"]
@@ -136,7 +116,7 @@ def test_a_frame_that_tf_does_not_have_is_named_and_its_wrenches_wait() -> None:
 
 
 def test_transforms_of_a_sensor_are_forgotten_when_no_wrench_needs_them() -> None:
-    buffer, made, stamps = TransformBuffer([]), Lab(), np.arange(0, 60 * SECOND, SECOND // 100)
+    buffer, made, stamps = TransformBuffer([]), Lab(), np.arange(0, 25 * SECOND, SECOND // 100)
     rows = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
     made.transform("/tf", "world", "ft", stamps, rows)
     for number, (sent, topic, data) in enumerate(made.in_order()):
@@ -160,10 +140,9 @@ def biased(frame: str) -> Array:
     return np.asarray(in_sensor_axes(true, poses) + BIAS + np.hstack([WEIGHT * down, np.cross(LEVER, down)]))
 
 
-@pytest.mark.parametrize("frame", ["world", "tip"])
-def test_the_bias_is_estimated_as_from_a_recording_and_subtracted(tmp_path: Path, frame: str) -> None:
-    topics = replace(NAMES, wrench_frame=frame, wrench_bias="free_motion")
-    made = lab(biased(frame), "world" if frame == "world" else "ft")
+def test_the_bias_is_estimated_as_from_a_recording_and_subtracted(tmp_path: Path) -> None:
+    topics = replace(NAMES, wrench_frame="tip", wrench_bias="free_motion")
+    made = lab(biased("tip"), "ft")
     found, state, counts = live(made, topics, *in_portions(made.in_order(), 50))
     read = read_recording(made.mcap(tmp_path / "lab", original().rig), topics=topics)
     assert_same(found, read.wrench, atol=0.1)
@@ -175,13 +154,6 @@ def test_the_bias_is_estimated_as_from_a_recording_and_subtracted(tmp_path: Path
     assert estimate is not None and read.wrench_bias is not None and bias is not None and not bias.problem
     assert estimate.to_text().startswith("the bias (") and "s of free motion" in estimate.to_text()
     assert estimate.force[:2] == pytest.approx(read.wrench_bias.force[:2], abs=0.06)
-
-
-def test_with_all_samples_at_once_the_estimate_is_that_of_the_recording(tmp_path: Path) -> None:
-    topics = replace(NAMES, wrench_frame="tip", wrench_bias="free_motion")
-    made = lab(biased("tip"), "ft")
-    found, _, _ = live(made, topics, made.in_order())
-    assert_same(found, read_recording(made.mcap(tmp_path / "lab", original().rig), topics=topics).wrench)
 
 
 def test_without_free_motion_the_wrench_is_held_back_and_it_is_said() -> None:

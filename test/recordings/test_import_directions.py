@@ -38,9 +38,8 @@ def reached(name: str) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", sorted(SOURCES))
-def test_no_module_imports_itself(name: str) -> None:
-    assert name not in reached(name)
+def test_no_module_imports_itself() -> None:
+    assert [name for name in SOURCES if name in reached(name)] == []
 
 
 @pytest.mark.parametrize("folder", ["bag", "windows"])

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sqlite3
 import sys
 from dataclasses import replace
@@ -17,12 +16,10 @@ pytest.importorskip("rosbags")
 from lab_bags import Lab, write_db3, write_ros1
 from test_lab_topics import NAMES, TIP, UR, VICON, assert_same_windows, original, tf_lab, vicon_and_ur
 
-from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.rig import save_rig
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics
 
 
 def own_type() -> Lab:
@@ -57,7 +54,7 @@ def bag_folder(lab: Lab, path: Path) -> Path:
 @pytest.mark.parametrize(
     ("write", "kind"),
     [
-        *((write, "transforms") for write in (write_db3, db3_file, db3_without_metadata, bag_file, bag_folder)),
+        *((write, "transforms") for write in (db3_file, db3_without_metadata, bag_folder)),
         *((write, "tf") for write in (write_db3, bag_file)),
     ],
 )
@@ -179,23 +176,6 @@ def test_a_missing_package_is_named_with_its_command(tmp_path: Path, monkeypatch
     with pytest.raises(RecordingError, match=r"lab\.bag: ROS 1 bags need the package rosbags \(pip install rosbags\)"):
         read_recording(path, topics=NAMES)
     assert len(read_recording(other, topics=NAMES).slider) == len(original().slider)  # sqlite3 is part of Python
-
-
-@pytest.mark.parametrize("write", [bag_file, write_db3])
-def test_four_commands_go_from_a_laboratorys_bag_to_a_validated_model(
-    tmp_path: Path, write: object, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = str(write(vicon_and_ur(), tmp_path / "lab"))  # type: ignore[operator]
-    assert original().rig is not None
-    save_rig(original().rig, tmp_path / "rig.yaml")
-    rig, model = ["--rig", str(tmp_path / "rig.yaml")], str(tmp_path / "lab.pushmodel")
-    names = ["--slider-topic", VICON, "--pusher-topic", UR, "--wrench-topic", "/netft", "--save-topics"]
-    assert main(["info", path, *names]) == 0
-    assert load_topics(Path(path)) == NAMES
-    assert main(["train", path, "--kind", "analytical", "--out", model, *rig]) == 0
-    assert main(["evaluate", model, path, *rig]) == 0
-    assert main(["validate", model, path, *rig]) == 0, capsys.readouterr().err
-    shutil.rmtree(tmp_path / "lab", ignore_errors=True)
 
 
 def test_a_rig_in_the_metadata_of_a_db3_folder_is_read(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def poses(stream: PoseStream) -> list[PoseStamped]:
     return [pose_message(*row) for row in columns]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(shift=st.tuples(METRES, METRES), turn=TURNS, contact=st.floats(0.0, 0.999))
 def test_windows_are_the_same_after_ros_messages_in_any_world_frame(
     shift: tuple[float, float], turn: float, contact: float
@@ -92,16 +92,15 @@ def simulated() -> Recording:
 
 
 def mirrored(recording: Recording) -> Recording:
-    """The mirror image about the world's x axis, through messages."""
+    """The mirror image about the world's x axis."""
     wrench = recording.wrench
     assert wrench is not None
-    there = replace(
+    return replace(
         recording,
         slider=replace(recording.slider, y=-recording.slider.y, heading=-recording.slider.heading),
         pusher=replace(recording.pusher, y=-recording.pusher.y, heading=-recording.pusher.heading),
         wrench=WrenchStream(wrench.stamp, wrench.fx, -wrench.fy, -wrench.torque),
     )
-    return through_messages(there)
 
 
 @settings(max_examples=3, deadline=None)

@@ -21,7 +21,7 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.recordings.read import Topics, read_recording, require_rig
+from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.write import write_recording
 
@@ -108,7 +108,7 @@ def test_every_chunking_and_compression_of_mcap_is_accepted(
     np.testing.assert_array_equal(read.slider.x, POSES[:, 0])
 
 
-@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+@pytest.mark.parametrize("compression", ["zstd", "none"])
 def test_data_before_a_cut_are_used_and_the_cut_is_noted(
     recording: Recording, tmp_path: Path, compression: str
 ) -> None:
@@ -128,17 +128,7 @@ def test_data_before_a_cut_are_used_and_the_cut_is_noted(
     assert counts[2] > 0
 
 
-def test_file_without_its_last_bytes_loses_no_message(recording: Recording, tmp_path: Path) -> None:
-    """A killed recorder writes no summary and no footer."""
-    write_recording(tmp_path / "a.mcap", recording)
-    data = (tmp_path / "a.mcap").read_bytes()
-    whole = [m.data for m in open_bag(tmp_path / "a.mcap").messages()]
-    (tmp_path / "a.mcap").write_bytes(data[:-50])
-    assert [m.data for m in open_bag(tmp_path / "a.mcap").messages()] == whole
-    assert read_recording(tmp_path / "a.mcap").rig is not None
-
-
-@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
 def test_damaged_chunk_is_skipped_and_noted(tmp_path: Path, compression: CompressionType) -> None:
     path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
     offsets = chunk_offsets(path)
@@ -206,19 +196,6 @@ def test_folder_without_recordings_and_missing_path_are_errors(tmp_path: Path) -
         read_recording(tmp_path / "absent.mcap")
 
 
-def test_missing_topic_is_reported_with_the_existing_topics(tmp_path: Path) -> None:
-    path = write_mcap(tmp_path / "a.mcap", {"/vicon/square/square": pose_topics()["/slider/pose"]})
-    with pytest.raises(RecordingError, match=r"no topic /slider/pose and /pusher/pose .*/vicon/square/square"):
-        read_recording(path)
-
-
-def test_topics_can_have_other_names(tmp_path: Path) -> None:
-    topics = {"/vicon/square/square": pose_topics()["/slider/pose"], "/tip": pose_topics()["/pusher/pose"]}
-    path = write_mcap(tmp_path / "a.mcap", topics)
-    read = read_recording(path, topics=Topics(slider="vicon/square/square", pusher="/tip"))
-    assert len(read.slider) == len(read.pusher) == N
-
-
 def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
     poses = pose_topics()
     wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6], WRENCH_STAMPED))}
@@ -244,16 +221,6 @@ def test_unusable_samples_are_discarded_and_counted(tmp_path: Path) -> None:
     assert len(read.pusher) == N
 
 
-def test_tip_needs_no_orientation(tmp_path: Path) -> None:
-    values = POSES.copy()
-    values[:, 3:] = 0.0
-    tip = {"/pusher/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
-    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **tip})
-    read = read_recording(path)
-    np.testing.assert_array_equal(read.pusher.x, POSES[:, 0])
-    assert any("/pusher/pose: 40 samples have no orientation" in note for note in read.notes)
-
-
 def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Path) -> None:
     heading = np.linspace(-3.1, 3.1, N)
     values = POSES.copy()
@@ -261,11 +228,6 @@ def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Pa
     turned = {"/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **turned})
     np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
-
-
-def test_another_frame_is_noted(tmp_path: Path) -> None:
-    read = read_recording(write_mcap(tmp_path / "a.mcap", pose_topics("vicon")))
-    assert any("/slider/pose: frame_id 'vicon' is treated as 'world'" in note for note in read.notes)
 
 
 def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
 # --- the estimate -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sd", [0.2, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("sd", [0.2, 1.0, 3.0])
 def test_jitter_is_the_standard_deviation_of_a_stamp(sd: float) -> None:
     stamp = np.delete(grid(3000), slice(500, 520))
     found = stamp_noise(noisy(stamp, sd))
@@ -101,7 +101,7 @@ def test_jitter_is_recognised_by_few_samples_whatever_its_distribution(kind: str
     assert np.mean(found) > 0.9
 
 
-@pytest.mark.parametrize("share", [0.06, 0.1, 0.2, 0.4])
+@pytest.mark.parametrize("share", [0.06, 0.4])
 def test_exact_stamps_of_irregular_samples_are_no_jitter(share: float) -> None:
     for seed in range(50):
         step = 10 * MS * np.maximum(1.0 + share * np.random.default_rng(seed).standard_normal(DECIDING), 0.01)
@@ -112,7 +112,7 @@ def test_exact_stamps_of_irregular_samples_are_no_jitter(share: float) -> None:
 # --- regular stamps ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("sd", "left"), [(1.3, 0.2), (2.0, 0.3), (3.0, 0.9)])
+@pytest.mark.parametrize(("sd", "left"), [(1.3, 0.2), (3.0, 0.9)])
 def test_regular_stamps_are_near_the_true_times(sd: float, left: float) -> None:
     true = grid(2000)
     stamp = np.maximum.accumulate(noisy(true, sd) - np.arange(2000)) + np.arange(2000)
@@ -175,8 +175,7 @@ def test_a_short_stream_is_decided_by_what_there_is() -> None:
     assert np.array_equal(regular(few), few)
 
 
-@pytest.mark.parametrize("sd", [0.0, 0.2, 1.3, 2.0])
-@pytest.mark.parametrize("portion", [3, DECIDING])
+@pytest.mark.parametrize(("sd", "portion"), [(0.0, 3), (1.3, 3), (2.0, DECIDING)])
 def test_the_stamps_do_not_depend_on_the_portions(sd: float, portion: int) -> None:
     rng = np.random.default_rng(3)
     true = np.delete(grid(1500), [*rng.integers(0, 1500, 12), *range(800, 830)])

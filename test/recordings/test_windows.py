@@ -42,14 +42,6 @@ def test_translating_slider_moves_only_along_the_push() -> None:
         assert window.duration == pytest.approx(0.2, abs=1e-12)
 
 
-def test_force_on_the_slider_is_opposite_to_the_measured_wrench() -> None:
-    windows = windows_of(translating_push())
-    assert len(windows) == 5
-    for window in windows:
-        assert window.covariates["normal_force"] == pytest.approx(2.0, abs=0.2)
-        assert window.covariates["tangential_force"] == pytest.approx(0.0, abs=1e-9)
-
-
 def test_windows_state_what_the_sensor_read_in_free_motion_and_do_not_contain_it() -> None:
     plain = translating_push()
     assert plain.wrench is not None
@@ -100,14 +92,6 @@ def test_windows_do_not_depend_on_portions_and_interleaving(cuts: list[int], ord
     for a, b in zip(found, whole, strict=True):
         assert a.displacement == pytest.approx(b.displacement, abs=1e-12)
         assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-12)
-
-
-def test_finer_sampling_gives_the_same_windows() -> None:
-    coarse, fine = windows_of(translating_push(rate=100.0)), windows_of(translating_push(rate=500.0))
-    assert len(coarse) == len(fine)
-    for a, b in zip(coarse, fine, strict=True):
-        assert (a.start - b.start) * 1e-9 == pytest.approx(0.0, abs=0.011)
-        assert a.displacement == pytest.approx(b.displacement, abs=1e-9)
 
 
 @pytest.mark.parametrize("stream", ["slider", "pusher", "wrench"])
@@ -173,7 +157,7 @@ def test_contact_without_wrench_begins_when_the_gap_stops_shrinking(speed: float
     assert all(window.displacement[0] >= 0.9 * 0.2 * speed for window in windows)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     rng, rate = np.random.default_rng(seed), 250.0
     time = np.arange(0.0, 2.5, 1.0 / rate)
@@ -292,8 +276,10 @@ def test_the_force_on_the_slider_is_along_the_normal_and_to_its_left() -> None:
     recording = translating_push()
     assert recording.wrench is not None
     sideways = replace(recording.wrench, fy=np.where(recording.wrench.fx != 0.0, 0.5, 0.0))
-    for window in windows_of(replace(recording, wrench=sideways)):
-        assert window.covariates["normal_force"] > 0.0
+    windows = windows_of(replace(recording, wrench=sideways))
+    assert len(windows) == 5
+    for window in windows:
+        assert window.covariates["normal_force"] == pytest.approx(2.0, abs=0.2)
         assert window.covariates["tangential_force"] == pytest.approx(-0.5)
 
 

@@ -108,12 +108,11 @@ def test_a_pose_waits_for_its_transform_and_later_ones_wait_behind_it() -> None:
     assert not decoder.of("slider").rejected and len(decoder) == 0
 
 
-@pytest.mark.parametrize("portion", [1, 50, 10_000])
-def test_a_pose_without_a_transform_within_two_seconds_is_rejected(portion: int) -> None:
+def test_a_pose_without_a_transform_within_two_seconds_is_rejected() -> None:
     stamps = np.arange(0, 6000 * MS, 20 * MS)
     lab = seen_from_cart(stamps, np.arange(0, 2001 * MS, 20 * MS))
     decoder = decoder_of(lab, NAMES)
-    for each in in_portions(lab.in_order(), portion):
+    for each in in_portions(lab.in_order(), 50):
         put(decoder, lab, each, live=True)
         decoder.take()
     late = int(np.sum((stamps > 2000 * MS) & (stamps < stamps[-1] - 2000 * MS)))
@@ -132,13 +131,6 @@ def test_poses_in_two_frames_give_the_same_windows(tmp_path: Path) -> None:
     assert found.notes == ()
     without = replace(original(), wrench=None)
     assert_same_windows(read_recording(path, topics=NAMES), without)
-
-
-def test_a_frame_of_tf_and_poses_of_another_frame_meet_in_the_world(tmp_path: Path) -> None:
-    lab = two_frames()
-    in_vicon = seen_from(VICON, original().pusher)
-    lab.transform("/tf", "vicon", "tool0", original().pusher.stamp, in_vicon)
-    assert_same_poses(read_recording(lab.mcap(tmp_path / "lab"), topics=replace(NAMES, pusher="/tf:tool0")))
 
 
 def test_without_the_option_different_frames_are_noted(tmp_path: Path) -> None:
@@ -231,7 +223,7 @@ def test_the_world_is_an_option_and_is_saved(tmp_path: Path, capsys: pytest.Capt
 def test_poses_in_another_frame_go_on_after_a_replay_began_again() -> None:
     """The newest poses wait for tf at the end of each round; they must not hold back the next round."""
     begin, rounds = 100 * 10**9, []
-    stamp = begin + np.arange(0, 10 * 10**9, 4 * 10**6)
+    stamp = begin + np.arange(0, 4 * 10**9, 4 * 10**6)
     lab = Lab()
     rows = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamp), 1))
     for topic in ("/slider/pose", "/pusher/pose"):

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab
@@ -27,12 +25,11 @@ from turning_sensor import (
     wrench_rows,
 )
 
-from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.fields.pose_rows import about_points, in_world_axes, normalised, poses_at
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
-from push_predictor.recordings.topics import Topics, load_topics, save_topics
+from push_predictor.recordings.topics import Topics
 
 POSE = "geometry_msgs/msg/PoseStamped"
 NAMES = Topics("/slider", "/tip", "/ft", wrench_frame="tip")
@@ -76,20 +73,6 @@ def test_a_torque_about_another_point_has_the_lever_of_the_force() -> None:
     measured = np.array([[0.0, 2.0, 0.0, 0.0, 0.0, 0.5]])
     moved = about_points(measured, np.array([[0.4, 0.0, 0.0]]), np.array([[0.1, 0.0, 0.0]]))
     np.testing.assert_allclose(moved, [[0.0, 2.0, 0.0, 0.0, 0.0, 0.5 + 0.3 * 2.0]])
-
-
-rows = st.tuples(*[st.floats(-2.0, 2.0)] * 7).filter(lambda row: np.linalg.norm(row[3:]) > 0.1)
-
-
-@given(st.tuples(*[st.floats(-9.0, 9.0)] * 6), rows)
-def test_turning_keeps_size_and_angle_and_has_an_inverse(measured: tuple[float, ...], row: tuple[float, ...]) -> None:
-    wrenches, poses = np.array([measured]), normalised(np.array([row]))
-    turned = in_world_axes(wrenches, poses)
-    for part in (slice(0, 3), slice(3, 6)):
-        assert np.linalg.norm(turned[0, part]) == pytest.approx(np.linalg.norm(wrenches[0, part]), abs=1e-9)
-    assert turned[0, :3] @ turned[0, 3:] == pytest.approx(wrenches[0, :3] @ wrenches[0, 3:], abs=1e-9)
-    np.testing.assert_allclose(in_sensor_axes(turned, poses), wrenches, atol=1e-9)
-    np.testing.assert_allclose(in_world_axes(-wrenches, poses), -turned, atol=1e-12)
 
 
 def test_poses_are_interpolated_at_stamps_in_any_order_but_not_across_a_dropout() -> None:
@@ -219,24 +202,6 @@ def test_a_tip_without_orientation_turns_no_wrench(tmp_path: Path) -> None:
         RecordingError, match=r"wrench_frame 'tip' .*: the poses of /tip have no orientation; give world"
     ):
         read_recording(lab.mcap(tmp_path / "lab"), topics=NAMES)
-
-
-def test_the_axes_are_an_option_and_are_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(lab_of_tip().mcap(tmp_path / "lab", original().rig))
-    names = ["--slider-topic", "/slider", "--pusher-topic", "/tip", "--wrench-topic", "/ft"]
-    assert main(["info", path, *names, "--wrench-frame", "tip", "--save-topics"]) == 0
-    assert "turned with the tip (/tip)" in capsys.readouterr().out
-    assert load_topics(tmp_path / "lab") == NAMES
-    assert main(["info", path, "--wrench-frame", "ft_link"]) == 1
-    assert "wrench_frame 'ft_link' (option --wrench-frame): the bag has no /tf" in capsys.readouterr().err
-    assert main(["check", path]) == 0
-    assert "wrench_frame" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("frame", ["world", "tip", "/tf:tip", "ft_link"])
-def test_saved_axes_come_back(tmp_path: Path, frame: str) -> None:
-    save_topics(tmp_path / "a.mcap", Topics(wrench_frame=frame))
-    assert load_topics(tmp_path / "a.mcap") == Topics(wrench_frame=frame)
 
 
 def test_a_frame_named_tip_is_given_with_its_topic() -> None:

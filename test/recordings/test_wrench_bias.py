@@ -21,11 +21,10 @@ from turning_sensor import add_tip, add_wrench, in_sensor_axes, tip_rows
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.geometry.frames import to_body
-from push_predictor.recordings.fields.pose_rows import in_world_axes
-from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, gravity_direction
+from push_predictor.recordings.fields.wrench_bias import BiasError, estimate_bias, gravity_direction
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
-from push_predictor.recordings.topics import Topics, load_topics, save_topics
+from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.recordings.windows.clock_session import free_motion
 
 BIAS = np.array([0.5, -0.3, 1.2, 0.02, 0.01, -0.03])
@@ -276,17 +275,3 @@ def test_another_bias_is_refused(tmp_path: Path) -> None:
     (tmp_path / "lab.recording.yaml").write_text("wrench_bias: zero\n")
     with pytest.raises(RecordingError, match=r"lab\.recording\.yaml: wrench_bias is 'zero', give free_motion or none"):
         load_topics(tmp_path / "lab.mcap")
-    save_topics(tmp_path / "a.mcap", Topics(wrench_bias="none"))
-    assert load_topics(tmp_path / "a.mcap") == Topics(wrench_bias="none")
-
-
-def test_the_correction_is_the_same_where_it_is_applied_online() -> None:
-    """The estimate of a recording, applied to one wrench at a time along the sensor's axes."""
-    poses = tip_rows(original().pusher, wrench().stamp)
-    none = np.zeros(3)
-    bias = WrenchBias(BIAS[:3], none, BIAS[3:], none, 1.0, 4, WEIGHT, 0.0, LEVER)
-    measured = in_sensor_axes(unbiased(), poses) + weighed(poses)
-    for k in (0, 150, 399):
-        row = slice(k, k + 1)
-        found = in_world_axes(bias.subtracted_from(measured[row], poses[row]), poses[row])
-        np.testing.assert_allclose(found, unbiased()[row], atol=1e-9)

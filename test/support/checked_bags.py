@@ -10,7 +10,7 @@ from functools import cache
 from lab_bags import short_recording, whole_recording
 
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 
@@ -33,3 +33,8 @@ def rig_of(name: str) -> Rig:
 
 def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
     return {finding.name: finding for finding in check_recording(recording, rig)}
+
+
+def finding_of(name: str, **values: float) -> Finding:
+    """A finding with these values."""
+    return Finding(name, "warning", "", "", {key: Value(value, "1") for key, value in values.items()})
