@@ -10,12 +10,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from unittest.mock import patch
 
-<<<<<<< HEAD
-from push_predictor.models.gaussian_process.gp import Cost, Descent, Minimum
-=======
 import pytest
 
->>>>>>> s41_c
+from push_predictor.models.gaussian_process.gp import Cost, Descent, Minimum
 from push_predictor.simulation import dynamics
 from push_predictor.types import Array
 
@@ -27,7 +24,6 @@ def coarse_simulator(factor: float) -> Iterator[None]:
         yield
 
 
-<<<<<<< HEAD
 @contextmanager
 def coarse_fits(steps: int = 3) -> Iterator[None]:
     """Every search for hyperparameters ends after few steps."""
@@ -37,10 +33,11 @@ def coarse_fits(steps: int = 3) -> Iterator[None]:
         return whole(replace(self, most_iterations=steps), cost, first, unit)
 
     with patch.object(Descent, "run", begun):
-=======
+        yield
+
+
 @pytest.fixture(scope="module", autouse=True)
 def coarsely() -> Iterator[None]:
     """For all tests of a folder whose conftest.py imports it."""
     with coarse_simulator(4.0):
->>>>>>> s41_c
         yield
