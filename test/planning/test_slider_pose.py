@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from repository import BAGS
 from synthetic import triangle
@@ -25,7 +25,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter, WorldPush, slider_after
 from push_predictor.recordings.dropouts import NANOSECOND
@@ -107,11 +107,6 @@ def test_prediction_equals_that_of_the_model_at_the_contact(shape: str, angle: f
         assert after.in_domain == bool(in_domain)
 
 
-def test_push_through_the_centre_moves_the_slider_with_the_tip() -> None:
-    after = slider_after(model_of("rect1"), push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, 0.0)))
-    assert np.all(np.abs(after.pose - [SPEED * DURATION, 0.0, 0.0]) < 1e-9)
-
-
 @given(st.sampled_from(sorted(OUTLINES)), st.floats(0.0, 0.999), st.floats(-1.3, 1.3), METRES, METRES, ANGLES)
 def test_prediction_is_equivariant_under_rotation_and_translation(
     shape: str, contact: float, angle: float, x: float, y: float, turn: float
@@ -142,22 +137,6 @@ def test_four_sides_of_a_square_are_equivalent(angle: float) -> None:
         np.testing.assert_allclose(other.covariance, first.covariance, rtol=1e-6)
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.floats(0.0, 0.999), st.floats(-1.3, 1.3), ANGLES)
-def test_covariance_equals_that_of_transformed_samples(contact: float, angle: float, turn: float) -> None:
-    model = model_of("ellip2")
-    push = push_at("ellip2", contact, angle, pose=(1.0, 2.0, turn))
-    after = slider_after(model, push)
-    assert np.linalg.eigvalsh(after.covariance).min() > 0.0
-    np.testing.assert_allclose(after.covariance, after.covariance.T, rtol=1e-12)
-    heading = np.arctan2(push.velocity[1], push.velocity[0])
-    along = np.array([np.cos(heading), np.sin(heading), 0.0])
-    across = np.array([-np.sin(heading), np.cos(heading), 0.0])
-    axes = np.stack([along, across, [0.0, 0.0, 1.0]])
-    in_push_frame = model.predict_rows(np.array([[SPEED, contact, angle]]), np.array([DURATION])).covariance[0]
-    np.testing.assert_allclose(axes @ after.covariance @ axes.T, in_push_frame, rtol=1e-6, atol=1e-16)
-
-
 def test_off_diagonal_covariance_is_transformed() -> None:
     """Made-up predictions with a full covariance, whatever the models of today know."""
 
@@ -171,17 +150,6 @@ def test_off_diagonal_covariance_is_transformed() -> None:
     push = push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, np.pi / 2.0))  # pushed along the world's y
     expected = np.array([[1e-8, -1e-8, -2e-7], [-1e-8, 4e-8, 3e-7], [-2e-7, 3e-7, 3e-5]])
     np.testing.assert_allclose(slider_after(model, push).covariance, expected, atol=1e-20)
-
-
-def test_tabulated_model_gives_the_prediction_of_its_table() -> None:
-    tabulated = tabulate(model_of("rect1", "gp"))
-    assert isinstance(tabulated, TabulatedModel) and tabulated.tabulated
-    push = push_at("rect1", 0.1, 0.3)
-    ours = tabulated.predict_rows(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
-    heading = np.arctan2(push.velocity[1:], push.velocity[:1])
-    after = slider_after(tabulated, push)
-    np.testing.assert_allclose(after.pose, displaced(push.slider[None], heading, ours.mean)[0], atol=1e-9)
-    np.testing.assert_allclose(after.covariance, covariance_in_world(ours.covariance, heading)[0], rtol=1e-6)
 
 
 # --- corners ----------------------------------------------------------------------------------------------------
