@@ -58,6 +58,7 @@ def untrained() -> PushModel:
     model = train_model(empty_table(), square_rig(), "prior", name="before")
     assert isinstance(model.predictor, PriorPredictor)
     fitted = model.predictor.fitted
+    assert "rim_exponent" in fitted.values  # no support is known
     coarse = replace(fitted, mechanics=replace(fitted.mechanics, accuracy=0.01))
     return replace(model, predictor=replace(model.predictor, fitted=coarse))
 

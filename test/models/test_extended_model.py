@@ -17,7 +17,7 @@ import pytest
 import ros_harness as harness
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
 from hosted_nodes import hosted_node
-from synthetic import square_rig, translating_push
+from synthetic import square_rig
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
 from push_predictor.cli import main
@@ -33,14 +33,10 @@ from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.request import PushRequest, check_pushes, check_request
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.tabulated.tabulated_model import MEAN_TOLERANCE, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.table_file import write_table
-from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
@@ -207,8 +203,7 @@ def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, P
 
 
 @pytest.mark.parametrize(
-    ("kind", "answer"),
-    [(kind, lambda model: model) for kind in KINDS if kind != "gp"] + [("gp", tabulate), ("analytical", tabulate)],
+    ("kind", "answer"), [("vhgp", lambda model: model), ("gp", tabulate), ("prior", lambda model: model)]
 )
 def test_covariate_outside_training_range_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
     model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
@@ -426,45 +421,6 @@ def test_info_lists_needed_covariates_and_their_ranges(model_file: Path, capsys:
     assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}
 
 
-def test_evaluate_names_the_missing_column_of_a_table(
-    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_table(tmp_path / "whole.csv", pushes(10, 1))
-    write_table(tmp_path / "lacking.csv", replace(pushes(10, 1), covariates={}))
-    assert main(["evaluate", str(model_file), str(tmp_path / "whole.csv"), "--json", "-"]) == 0
-    assert json.loads(capsys.readouterr().out)["n_test"] == 30
-    assert main(["evaluate", str(model_file), str(tmp_path / "lacking.csv")]) == 1
-    assert "covariate elapsed_time" in capsys.readouterr().err
-
-
-def turned_a_little(recording: Recording) -> Recording:
-    """A slider with a constant heading would be refused: its quaternions are probably in another order."""
-    heading = np.linspace(0.0, 1e-3, len(recording.slider))
-    return replace(recording, slider=replace(recording.slider, heading=heading))
-
-
-@pytest.mark.parametrize("covariate", ["elapsed_time", "topic:/warmth"])
-def test_validate_uses_covariates_of_windows_or_names_the_missing_one(
-    bases: dict[str, PushModel], covariate: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    effect = replace(slippery(0.2), basis=replace(DRIFT, drivers=(covariate,)))
-    save_model(extended(bases["gp"], effect), tmp_path / "m")
-    write_recording(tmp_path / "bag", turned_a_little(translating_push()))
-    status = main(["validate", str(tmp_path / "m"), str(tmp_path / "bag"), "--json", "-"])
-    heard = capsys.readouterr()
-    if covariate == "elapsed_time":
-        assert (status, json.loads(heard.out)["n_test"]) == (0, 5)
-    else:
-        assert status == 1
-        assert "covariate topic:/warmth: 'missing' is not accepted" in heard.err
-
-
-def test_registry_lists_covariates_that_a_request_must_contain(model_file: Path) -> None:
-    registry = ModelRegistry()
-    registry.load(model_file)
-    assert "covariates=elapsed_time;" in registry.describe("extended")
-
-
 @pytest.fixture(scope="module")
 def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
     """Call a service of a running predict_server with the extended model."""
@@ -480,15 +436,12 @@ def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
         yield lambda name, request: harness.call(clients[name], request)
 
 
-def test_service_rejects_push_without_covariate_by_name(ask: Callable[..., Any]) -> None:
+def test_the_service_rejects_and_answers_by_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
     response = ask("predict_push", query_to_request("", np.array([0.02, 0.1, 0.2]), 0.2))
     assert not response.success
     assert response.message.startswith("covariate elapsed_time: 'missing' is not accepted, give a finite number, in s")
     batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", np.array([[0.02, 0.1, 0.2]]), 0.2, {})))
     assert (batch.success, "covariate elapsed_time" in batch.message) == (False, True)
-
-
-def test_the_service_answers_with_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
     table = pushes(10, 1)
     time = {"elapsed_time": table.covariates["elapsed_time"]}
     expected = predicted(as_served(load_model(model_file)), replace(table, covariates=time))

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -152,13 +153,12 @@ def test_a_file_keeps_it(options: dict[str, Any], tmp_path: Path) -> None:
             np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
 
 
-@pytest.mark.parametrize("n", (1, 6))
-def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel, n: int) -> None:
+def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:
     several = trained(pushes(0.02, 0.03, n=90), slow.kind)
     for model in (slow, several):
         tabulated = tabulate(model)
         assert tabulated.tabulated, tabulated.how
-        for speed in (0.005, 0.02, 0.025, 0.03, 0.06, 0.15):
+        for speed, n in product((0.005, 0.02, 0.025, 0.03, 0.06, 0.15), (1, 6)):
             inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
             assert not tabulated.exact_count(inputs)
             found, expected = (m.predict_rows(inputs, np.full(n, 0.2)) for m in (tabulated, model))
