@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from coarse import coarse_simulator
 from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
@@ -116,7 +117,8 @@ class TestCandidates:
     def test_follow_the_slider_as_the_simulator_moves_it(self) -> None:
         plan = PushPlan(np.array([0.1, 0.4, 0.7]), np.array([0.2, -0.5, 0.0]), np.full(3, 0.02), np.full(3, 0.03))
         spec = SimulationSpec("rect1", "abs", plan)
-        table = push_outcomes(spec)
+        with coarse_simulator(3.0):
+            table = push_outcomes(spec)
         model = train_model(empty_table(), simulated_rig(spec), "prior", name="m")
         first = np.array([table.inputs[table.push_id == push][0] for push in ("0", "1", "2")])
         found = courses(model, first, 0.03)

@@ -65,30 +65,6 @@ def test_gradient_equals_finite_differences(n: int) -> None:
         assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
 
 
-def test_prediction_far_from_data_is_the_prior() -> None:
-    prediction = GaussianProcess(*rows(30), PARAMETERS).predict(np.array([[50.0, 50.0]]))
-    assert prediction.mean[0] == pytest.approx(0.0, abs=1e-12)
-    assert prediction.variance[0] == pytest.approx(PARAMETERS.kernel.variance)
-
-
-def test_order_of_rows_does_not_matter() -> None:
-    inputs, outputs = rows(40)
-    order = np.random.default_rng(5).permutation(40)
-    new = rows(6, seed=1)[0]
-    straight = GaussianProcess(inputs, outputs, PARAMETERS).predict(new)
-    shuffled = GaussianProcess(inputs[order], outputs[order], PARAMETERS).predict(new)
-    np.testing.assert_allclose(straight.mean, shuffled.mean, atol=1e-12)
-    np.testing.assert_allclose(straight.variance, shuffled.variance, atol=1e-12)
-
-
-def test_more_rows_never_increase_the_variance() -> None:
-    inputs, outputs = rows(40)
-    new = rows(50, seed=1)[0]
-    few = GaussianProcess(inputs[:20], outputs[:20], PARAMETERS).predict(new)
-    many = GaussianProcess(inputs, outputs, PARAMETERS).predict(new)
-    assert (many.variance <= few.variance + 1e-12).all()
-
-
 def test_fit_recovers_noise_and_relevant_input() -> None:
     inputs, outputs = rows(300, noise=0.2)
     fitted = fit_gp(inputs, outputs)

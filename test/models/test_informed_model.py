@@ -166,29 +166,6 @@ def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(inform
         assert not informed.predict_rows(later.inputs, later.duration).in_domain.any()
 
 
-def test_density_and_moments_are_those_of_the_same_gaussian(with_function: PushModel) -> None:
-    table = pushes(20, 6, (0.03, 0.03))
-    predictor = replace(learnt(with_function), tails=None)
-    found = replace(with_function, predictor=predictor).predict_rows(table.inputs, table.duration)
-    push = Push(table.inputs, table.duration, {})
-    density = predictor._log_density(predictor.latent(table.inputs), push, table.outcomes)
-    expected = -0.5 * np.log(2.0 * np.pi * found.std**2) - 0.5 * ((table.outcomes - found.mean) / found.std) ** 2
-    np.testing.assert_allclose(density, expected, rtol=1e-9)
-
-
-def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_function: PushModel) -> None:
-    few, many = pushes(3, 8), pushes(40, 9)
-    for model in (informed, with_function):
-        table = tabulate(model)
-        assert table.tabulated, table.how
-        for rows in (few, many):
-            found, expected = (m.predict_rows(rows.inputs, rows.duration) for m in (table, model))
-            assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 1e-3
-            np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
-        one = table.predict_rows(few.inputs[:1], np.full(1, 0.2))
-        np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
-
-
 def test_covariates_of_the_mechanics_bound_the_domain_of_the_table_too() -> None:
     table = pushes(40, 1)
     heading = np.linspace(0.0, 0.5, len(table))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -141,16 +139,6 @@ def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
     np.testing.assert_allclose(targets(learnt(model)), model.training.outcomes, rtol=1e-9, atol=1e-15)
     for first, second in zip(at(model, 0.02), at(model, 0.02, 0.4), strict=True):
         np.testing.assert_array_equal(first, second)
-
-
-@pytest.mark.parametrize("options", ({}, {"per_path": False}, {"about": MECHANICS}))
-def test_a_file_keeps_it(options: dict[str, Any], tmp_path: Path) -> None:
-    model = trained(pushes(0.02, 0.03), **options)
-    save_model(model, tmp_path / "m")
-    again = load_model(tmp_path / "m")
-    for speed in (0.01, 0.02, 0.1):
-        for found, expected in zip(at(again, speed), at(model, speed), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
 
 
 def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:

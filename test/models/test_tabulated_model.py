@@ -212,8 +212,7 @@ NARROW = {
     ("shape", "narrow"),
     [
         *(("square", narrow) for narrow in NARROW),
-        *(("circle", narrow) for narrow in ("one contact", "one velocity and contact")),
-        *((shape, "a part of an edge") for shape in ("ellipse", "triangle")),
+        *(("circle", "one contact"), ("ellipse", "a part of an edge")),
     ],
 )
 def test_constant_inputs_have_no_axis(shape: str, narrow: str) -> None:
@@ -288,7 +287,7 @@ def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) ->
         assert np.array_equal(getattr(of(read, outside), name), getattr(of(computed, outside), name))
 
 
-@pytest.mark.parametrize("shape", OUTLINES)
+@pytest.mark.parametrize("shape", ["square", "circle"])
 def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: str) -> None:
     model = tabulate(coupled(trained(OUTLINES[shape], "gp", *WIDE, n=80, per_path=False)))
     fast = inside(model.model, 30)

@@ -169,24 +169,6 @@ def test_homoscedastic_data_get_nearly_one_noise_level() -> None:
     assert noise.std() < 0.1
 
 
-def test_the_same_data_and_parameters_give_the_same_model(fitted: VHGP) -> None:
-    new = rows(50, seed=4)[0]
-    again = VHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions)
-    one, other = fitted.predict(new), again.predict(new)
-    np.testing.assert_allclose(one.mean, other.mean, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(one.outcome_variance, other.outcome_variance, rtol=1e-12)
-    assert again.bound == pytest.approx(fitted.bound, abs=1e-9)
-
-
-def test_order_of_rows_does_not_matter(fitted: VHGP) -> None:
-    order = np.random.default_rng(5).permutation(250)
-    shuffled = VHGP(fitted.inputs[order], fitted.outputs[order], fitted.parameters, fitted.site_precisions[order])
-    new = rows(20, seed=6)[0]
-    one, other = fitted.predict(new), shuffled.predict(new)
-    np.testing.assert_allclose(one.mean, other.mean, atol=1e-9)
-    np.testing.assert_allclose(one.outcome_variance, other.outcome_variance, rtol=1e-8)
-
-
 def test_prediction_far_from_data_is_the_prior(fitted: VHGP) -> None:
     far = fitted.predict(np.array([[1e6, 1e6]]))
     parameters = fitted.parameters

@@ -149,7 +149,7 @@ def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip3", "hex"])
+@pytest.mark.parametrize("shape", ["rect1", "ellip3"])
 def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -> None:
     rng = np.random.default_rng(2)
     speed, direction = rng.uniform(0.05, 0.15, 8), rng.uniform(-np.pi, np.pi, 8)
@@ -222,8 +222,8 @@ def test_force_through_the_centre_equals_friction_times_weight() -> None:
 
 @pytest.mark.slow
 def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
-    plan = random_pushes(16, [0.04, 0.1], 0.006, np.random.default_rng(8))
-    physics = even_physics(slider_named("ellip3"), 16, contact_friction=0.25)
+    plan = random_pushes(8, [0.04, 0.1], 0.006, np.random.default_rng(8))
+    physics = even_physics(slider_named("ellip3"), 8, contact_friction=0.25)
     motion = push(physics, plan, rest=0.0)
     poses, tips = motion.slider[:, :-1].reshape(-1, 3), motion.pusher[:, :-1].reshape(-1, 2)
     normal = rotate(physics.outline.project(to_body(tips, poses)).normal, poses[:, 2])
@@ -236,8 +236,8 @@ def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
 
 @pytest.mark.slow
 def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
-    plan = random_pushes(12, [0.04, 0.12], 0.005, np.random.default_rng(9))
-    physics = even_physics(slider_named("rect1"), 12)
+    plan = random_pushes(6, [0.04, 0.12], 0.005, np.random.default_rng(9))
+    physics = even_physics(slider_named("rect1"), 6)
     motion = push(physics, plan)
     gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
     gap = gap.reshape(motion.time.shape)
