@@ -13,6 +13,7 @@ import pytest
 from coarse import coarse_simulator
 from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
+from learnt_models import learnt as predictor_of
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.design import batch
@@ -31,7 +32,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.prior import CORRELATION
-from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.train import TrainingOptions, train_model
@@ -287,7 +288,7 @@ def _retold(model: PushModel, rows: PushTable) -> PushModel:
     """The model with the same hyperparameters and scaling, conditioned on other rows."""
     from push_predictor.models.gaussian_process.gp import GaussianProcess
 
-    predictor = _learnt(model)
+    predictor = predictor_of(model)
     features = predictor.scaling.features(model.rig.outline, rows.inputs)
     regressions = tuple(GaussianProcess(features, np.zeros(len(rows)), one.parameters) for one in predictor.regressions)
     return replace(model, predictor=replace(predictor, regressions=regressions))
@@ -295,12 +296,7 @@ def _retold(model: PushModel, rows: PushTable) -> PushModel:
 
 def _latent(model: PushModel, push: Push) -> float:
     """Mean variance in units of noise of the functions alone, without what speeds beyond the training's add."""
-    predictor = _learnt(model)
+    predictor = predictor_of(model)
     features = predictor.scaling.features(model.rig.outline, push.inputs)
     latent = [regression.predict(features) for regression in predictor.regressions]
     return float(np.mean([one.variance / one.process_variance for one in latent]))
-
-
-def _learnt(model: PushModel) -> GaussianProcessPredictor:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return model.predictor

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from learnt_models import learnt
 from synthetic import square_rig
 
 from push_predictor.evaluation.metrics import joint_nlpd
@@ -69,8 +70,7 @@ def correlation_of(model: PushModel) -> Correlation:
 
 def alone(model: PushModel) -> GaussianProcessPredictor:
     """Its predictor with independent outputs."""
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return replace(model.predictor, correlation=None)
+    return replace(learnt(model), correlation=None)
 
 
 def with_fitted_correlation(model: PushModel) -> GaussianProcessPredictor:

@@ -73,16 +73,6 @@ def test_fit_recovers_noise_and_relevant_input() -> None:
     assert irrelevant > relevant + 2.0
 
 
-def test_jumps_between_sides_are_learnt_and_not_taken_for_noise() -> None:
-    """Five sides that no symmetry folds, the outcome turning its sign on each: features.EDGE_SPACING apart."""
-    rng = np.random.default_rng(0)
-    side, along, angle = rng.integers(5, size=300), rng.random(300), rng.uniform(-1.0, 1.0, 300)
-    outputs = 2.0 * along - 1.0 + 0.5 * angle + 0.1 * rng.normal(size=300)
-    inputs = np.column_stack([3.0 * side + along, angle])
-    inputs, outputs = ((x - x.mean(axis=0)) / x.std(axis=0) for x in (inputs, outputs))
-    assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
-
-
 def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
     fitted = fit_gp(*rows(100))
     _, gradient = log_likelihood_and_gradient(fitted.inputs, fitted.outputs, fitted.parameters)

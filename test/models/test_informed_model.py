@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models import train, train_learnt
@@ -23,7 +24,7 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, bes
 from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
@@ -31,19 +32,12 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import Array
 
 pytestmark = pytest.mark.slow
 
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
 NOISE = np.array([2e-4, 2e-4, 5e-3])  # m, m, rad on a path of 4 mm
-
-
-def targets(predictor: GaussianProcessPredictor) -> Array:
-    """What the regressions were trained on (n, 3), SI."""
-    scaled = np.column_stack([regression.outputs for regression in predictor.regressions])
-    return np.asarray(scaled * predictor.scaling.outcome_sd + predictor.scaling.outcome_mean)
 
 
 def pushes(n: int, seed: int, speeds: tuple[float, float] = (0.02, 0.02)) -> PushTable:
@@ -58,11 +52,6 @@ def pushes(n: int, seed: int, speeds: tuple[float, float] = (0.02, 0.02)) -> Pus
 
 def trained(table: PushTable, kind: str = "vhgp", **options: object) -> PushModel:
     return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "mechanics", **options}))
-
-
-def learnt(model: PushModel) -> GaussianProcessPredictor:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return model.predictor
 
 
 def exact_nlpd(model: PushModel, table: PushTable) -> float:
@@ -197,14 +186,6 @@ def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel,
         again = found.predict_rows(table.inputs, table.duration)
         assert np.max(np.abs(again.mean - expected.mean) / expected.std) < 1e-3
         np.testing.assert_allclose(again.std, expected.std, rtol=5e-3)
-
-
-def test_a_shift_of_prediction_and_outcome_leaves_the_density(informed: PushModel) -> None:
-    table, step = pushes(10, 12, (0.05, 0.05)), np.array([1e-3, -5e-4, 0.02])
-    push = Push(table.inputs, table.duration, {})
-    shift = Shift(np.tile(step, (10, 1)), np.zeros((10, 3, 3)))
-    shifted = learnt(informed).shifted_log_density(push, table.outcomes + step, shift, np.ones(3))
-    np.testing.assert_allclose(shifted, informed.exact_log_density(table), rtol=1e-9)
 
 
 def test_it_needs_no_covariate_that_requests_lack() -> None:

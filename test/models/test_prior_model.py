@@ -35,7 +35,6 @@ from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.train import retrain_model, train_model
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
@@ -295,11 +294,6 @@ def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel
     assert found["n_train"] == 0
 
 
-def test_planning_takes_usual_windows_without_training_rows(untrained: PushModel) -> None:
-    assert windows_of(untrained, 1.0).count == 5
-    assert untrained.usual_speed == 0.02
-
-
 def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:
     with pytest.raises(RequestError, match="training pushes of the model: 0"):
         calibrate(untrained)
@@ -342,10 +336,3 @@ def test_command_line_trains_and_predicts_before_the_first_push(
     assert "for which the priors are meant" in capsys.readouterr().out
     assert main(["info", str(out)]) == 0
     assert "velocity_range    none\n" in capsys.readouterr().out
-
-
-def test_command_line_needs_data_for_other_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["train", "--kind", "gp", "--out", str(tmp_path / "m.pushmodel")])
-    assert ended.value.code == 2
-    assert "required: DATA" in capsys.readouterr().err

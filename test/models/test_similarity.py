@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models.features import DEVIATION
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
@@ -26,12 +26,6 @@ from push_predictor.types import Array
 
 RIG = square_rig()
 MECHANICS = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.25}, np.array([[1e-4]]))
-
-
-def targets(predictor: GaussianProcessPredictor) -> Array:
-    """What the regressions were trained on (n, 3), SI."""
-    scaled = np.column_stack([regression.outputs for regression in predictor.regressions])
-    return np.asarray(scaled * predictor.scaling.outcome_sd + predictor.scaling.outcome_mean)
 
 
 def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> PushTable:
@@ -50,11 +44,6 @@ def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> P
 
 def trained(table: PushTable, kind: str = "gp", **options: Any) -> PushModel:
     return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
-
-
-def learnt(model: PushModel) -> GaussianProcessPredictor:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return model.predictor
 
 
 def at(model: PushModel, speed: float, duration: float = 0.2, n: int = 6) -> tuple[Array, Array, Array]:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from learnt_models import learnt
 from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
@@ -20,7 +21,6 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.regression import fit_constant
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
@@ -91,21 +91,18 @@ def tabulated(shape: str, kind: str) -> TabulatedModel:
 
 
 def independent(model: PushModel) -> PushModel:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return replace(model, predictor=replace(model.predictor, correlation=None))
+    return replace(model, predictor=replace(learnt(model), correlation=None))
 
 
 def coupled(model: PushModel, bandwidth: float = 0.5) -> PushModel:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return replace(model, predictor=replace(model.predictor, correlation=sign_change(model, bandwidth)))
+    return replace(model, predictor=replace(learnt(model), correlation=sign_change(model, bandwidth)))
 
 
 def sign_change(model: PushModel, bandwidth: float) -> Correlation:
     """dx and dtheta correlate positively at angles above zero and negatively below; dy correlates with neither."""
-    assert isinstance(model.predictor, GaussianProcessPredictor)
     z = np.random.default_rng(7).standard_normal((len(model.training), 3))
     z[:, 2] = 0.2 * z[:, 2] + np.sign(model.training.inputs[:, 2]) * z[:, 0]
-    return Correlation(model.predictor.regressions[0].inputs, z.astype(np.float32).astype(float), bandwidth, 2.0)
+    return Correlation(learnt(model).regressions[0].inputs, z.astype(np.float32).astype(float), bandwidth, 2.0)
 
 
 def inside(model: PushModel, n: int, seed: int = 5) -> Array:
@@ -190,10 +187,9 @@ def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
 def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.MonkeyPatch) -> None:
     model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
     monkeypatch.setattr(table_of, "COUPLING_CELLS", 1.5)
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    posteriors = [on_grid(regression) for regression in model.predictor.regressions]
-    ends = wide_box(model, model.predictor)
-    first = prediction_table(model.predictor, posteriors, ends, REFINEMENTS[0]).spline.knots
+    posteriors = [on_grid(regression) for regression in learnt(model).regressions]
+    ends = wide_box(model, learnt(model))
+    first = prediction_table(learnt(model), posteriors, ends, REFINEMENTS[0]).spline.knots
     answers = tabulate(model)
     assert answers.table is not None and answers.table.spline.knots > first
     assert_true_to_the_model(answers)
@@ -273,8 +269,7 @@ def test_a_table_is_compared_with_the_model_outside_the_domain_too() -> None:
 
 def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) -> None:
     model = trained_widely("square", "vhgp")
-    predictor = model.predictor
-    assert isinstance(predictor, GaussianProcessPredictor)
+    predictor = learnt(model)
     first, second, third = predictor.regressions
     constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
     mixed = replace(model, predictor=replace(predictor, regressions=(first, constant, third)))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from learnt_models import learnt
 from scipy import stats
 from synthetic import noisy_pushes, square_rig
 
@@ -19,7 +20,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.predictors.tails import (
     FEWEST_PUSHES,
     INTERVAL_KINDS,
@@ -76,11 +77,6 @@ def trained(kind: str = "gp") -> PushModel:
 def tails_of(model: PushModel) -> Tails:
     assert model.predictor.tails is not None
     return model.predictor.tails
-
-
-def learnt(model: PushModel) -> GaussianProcessPredictor:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return model.predictor
 
 
 def untailed(model: PushModel) -> PushModel:

@@ -11,6 +11,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 from likelihoods import bound_and_gradient, log_marginal_likelihood
+from sparse_rows import PARAMETERS, rows
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
@@ -20,15 +21,6 @@ from push_predictor.models.gaussian_process.fit import maximise_over_noise, prec
 from push_predictor.models.gaussian_process.gp import MOST_SEARCHED, GaussianProcess, GpParameters, fit_gp, some_rows
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
-
-PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0, -0.8)
-
-
-def rows(n: int, seed: int = 0) -> tuple[Array, Array]:
-    """A sine of the first input, with noise whose standard deviation is exp(second input - 1)."""
-    rng = np.random.default_rng(seed)
-    inputs = rng.normal(size=(n, 2))
-    return inputs, np.sin(inputs[:, 0]) + rng.normal(size=n) * np.exp(inputs[:, 1] - 1.0)
 
 
 @pytest.fixture(scope="module")

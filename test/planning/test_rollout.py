@@ -136,12 +136,6 @@ def test_uncertainty_of_the_start_is_propagated() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.05)
 
 
-def test_uncertainty_grows_with_each_push() -> None:
-    rolled = rollout(model_with(NOISY), AT_REST, CERTAIN, [PUSH] * 4, 2000)
-    spread = np.linalg.det(rolled.covariance)
-    assert np.all(np.diff(spread) > 0.0) and np.all(np.diff(rolled.covariance[:, 2, 2]) > 0.0)
-
-
 def test_slider_touches_the_tip_at_the_end() -> None:
     """Deviations along the normal do not add up: a slider that went too far is touched later in the next window."""
     along = np.diag([2e-4, 0.0, 0.0]) ** 2

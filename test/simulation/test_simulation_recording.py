@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.recordings.write import write_recording
 from push_predictor.simulation import dynamics
 from push_predictor.simulation.dynamics import TRAVEL_STEP
 from push_predictor.simulation.pushes import PushPlan, grid_pushes, random_pushes
@@ -119,15 +117,6 @@ def test_rig_record_equals_the_simulated_rig(simulated: Recording) -> None:
     assert (rig.shape, rig.surface, rig.object_mass) == ("rect1", "abs", 0.837)
     assert rig.support_points is not None
     assert np.sum(rig.support_points[:, 2]) == pytest.approx(1.0, abs=1e-4)
-
-
-def test_written_recording_reads_back(simulated: Recording, tmp_path: Path) -> None:
-    write_recording(tmp_path / "bag", simulated)
-    back = read_recording(tmp_path / "bag")
-    assert np.array_equal(back.slider.stamp, simulated.slider.stamp)
-    assert np.array_equal(back.pusher.x, simulated.pusher.x)
-    assert np.allclose(back.slider.heading, simulated.slider.heading, atol=1e-12)
-    assert any("temperature" in name for name in back.scalars)
 
 
 @pytest.mark.slow
