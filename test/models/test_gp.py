@@ -11,8 +11,8 @@ from likelihoods import log_marginal_likelihood
 from scipy.stats import multivariate_normal
 
 from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process import gp
 from push_predictor.models.gaussian_process.gp import (
-    MOST_SEARCHED,
     GaussianProcess,
     GpParameters,
     fit_gp,
@@ -96,7 +96,7 @@ def test_rejects_unusable_rows(inputs: Array, outputs: Array, complaint: str) ->
 
 
 def test_jumps_are_learnt_from_part_of_the_rows() -> None:
-    rng, n = np.random.default_rng(1), MOST_SEARCHED + 50
+    rng, n = np.random.default_rng(1), 450
     side, along = rng.integers(8, size=n), rng.random(n)
     outputs = (-1.0) ** side * (2.0 * along - 1.0) + 0.1 * rng.normal(size=n)
     inputs = np.column_stack([3.0 * side + along, rng.uniform(-1.0, 1.0, n)])
@@ -104,9 +104,12 @@ def test_jumps_are_learnt_from_part_of_the_rows() -> None:
     assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
 
 
-def test_a_rough_fit_has_the_hyperparameters_of_some_rows_and_a_whole_one_those_of_all() -> None:
-    inputs, outputs = rows(MOST_SEARCHED + 50)
-    few = some_rows(len(outputs), MOST_SEARCHED)
+def test_a_rough_fit_has_the_hyperparameters_of_some_rows_and_a_whole_one_those_of_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(gp, "MOST_SEARCHED", 120)
+    inputs, outputs = rows(170)
+    few = some_rows(len(outputs), 120)
     rough, of_few, whole = (
         fit_gp(inputs, outputs, rough=True),
         fit_gp(inputs[few], outputs[few], rough=True),

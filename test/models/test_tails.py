@@ -274,7 +274,7 @@ def test_density_of_new_pushes_is_better_with_tails(kind: str) -> None:
 
 
 def test_covariances_are_those_of_the_regressions_times_the_factors() -> None:
-    model, test = trained("vhgp"), shared_errors(5, 3)
+    model, test = trained("gp"), shared_errors(5, 3)
     without = untailed(model)
     factor = np.outer(tails_of(model).factor, tails_of(model).factor)
     found, plain = predicted(model, test), predicted(without, test)
@@ -330,7 +330,7 @@ def test_training_without_tails_takes_windows_for_independent() -> None:
 
 
 def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
-    model, test = trained("vhgp"), shared_errors(20, 3)
+    model, test = trained("gp"), shared_errors(20, 3)
     table, answer = tabulate(model), predicted(model, test)
     assert table.tabulated
     for rows in (slice(None), slice(0, 1)):

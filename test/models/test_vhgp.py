@@ -14,11 +14,12 @@ from likelihoods import bound_and_gradient, log_marginal_likelihood
 from sparse_rows import PARAMETERS, rows
 
 from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process import vhgp
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import _sites as sites_from
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.fit import maximise_over_noise, precisions_from
-from push_predictor.models.gaussian_process.gp import MOST_SEARCHED, GaussianProcess, GpParameters, fit_gp, some_rows
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, some_rows
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
 
@@ -226,9 +227,12 @@ def test_vector_of_parameters_round_trips() -> None:
     assert PARAMETERS.count == 8
 
 
-def test_more_rows_than_are_searched_get_the_hyperparameters_of_some_and_their_own_noise() -> None:
-    inputs, outputs = rows(MOST_SEARCHED + 50)
-    few = some_rows(len(outputs), MOST_SEARCHED)
+def test_more_rows_than_are_searched_get_the_hyperparameters_of_some_and_their_own_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(vhgp, "MOST_SEARCHED", 120)
+    inputs, outputs = rows(170)
+    few = some_rows(len(outputs), 120)
     start = GpParameters(np.zeros(2), 0.0, -0.7)
     part = fit_vhgp(inputs[few], outputs[few], start=start, most_iterations=3)
     whole = fit_vhgp(inputs, outputs, start=start, most_iterations=3)
