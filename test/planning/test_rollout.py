@@ -184,7 +184,7 @@ def test_unimodal_steps_can_lead_to_two_modes() -> None:
 
 def test_mean_heading_is_circular() -> None:
     heading = np.pi + 0.1 * np.random.default_rng(0).standard_normal(2000)
-    mean, covariance = pose_moments(np.column_stack([np.zeros((2000, 2)), heading]))
+    mean, covariance = pose_moments(np.column_stack([np.zeros((2000, 2)), wrap_angle(heading)]))
     assert abs(mean[2]) == pytest.approx(np.pi, abs=0.01)
     assert covariance[2, 2] == pytest.approx(0.01, rel=0.1)
     rolled = rollout(model_with(NOISY), np.array([0.0, 0.0, np.pi]), CERTAIN, [PUSH], 500)
