@@ -366,10 +366,10 @@ def test_refit_keeps_physics_and_estimates_covariance(bases: dict[str, PushModel
 @pytest.mark.slow
 def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushModel]) -> None:
     table, held_out = pushes(40, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))
-    model = extended(bases["gp"], slippery(0.3))
+    model = extended(bases["analytical"], slippery(0.3))
     refit = refit_base(model, table)
     assert refit.predictor.effects == model.predictor.effects
-    plain = refit_base(bases["gp"], table)
+    plain = refit_base(bases["analytical"], table)
     assert gain(plain, refit, held_out)[1].high < 0.0
     more = with_effects(refit, table, [GRAIN])
     assert [effect.mechanism for effect in more.predictor.effects] == ["contact_friction", "anisotropic_friction"]
