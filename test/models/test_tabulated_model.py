@@ -297,10 +297,12 @@ def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: s
     fast[:, 0] = 1.001 * FASTEST * model.model.training.inputs[:, 0].max()
     table, exact = of(model, fast), of(model.model, fast)
     assert not table.in_domain.any() and model.exact_count(fast) == 30
+    known = of(model, inside(model.model, 5))
     mixed = of(model, np.concatenate([fast, inside(model.model, 5)]))
     for name in FIELDS:
         assert np.array_equal(getattr(table, name), getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
+        assert np.array_equal(getattr(mixed, name)[30:], getattr(known, name))
     assert np.array_equal(mixed.in_domain, [False] * 30 + [True] * 5)
 
 
