@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,5 +72,7 @@ def test_by_default_speeds_are_those_of_training_and_angles_at_least_one_radian(
 
 
 def test_an_untrained_model_is_pushed_at_the_usual_speed() -> None:
-    model: PushModel = train_model(empty_table(), square_pushes(1)[1], "prior", name="m")
+    corners = np.array([[0.04, 0.04, 0.5], [-0.04, 0.04, 0.25], [0.0, -0.04, 0.25]])  # a patch takes a second
+    rig = replace(square_pushes(1)[1], support_points=corners)
+    model: PushModel = train_model(empty_table(), rig, "prior", name="m")
     assert Limits().ranges(model) == ((USUAL_SPEED, USUAL_SPEED), (-1.0, 1.0))

@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drifting_models import DRIFT, extended, pushes, slippery
-from drifting_models import mechanics as drifting_mechanics
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -231,12 +230,3 @@ def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
     narrow, wide = (found(deployed, mixed, "contact_friction", DRIFT, of_size=of_size) for of_size in (False, True))
     assert 0.1 < wide.coefficients[0] < 0.3
     assert wide.covariance[0, 0] > 2.5**2 * narrow.covariance[0, 0]
-
-
-def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:
-    table, quiet = pushes(100, 5, slippery(0.4)), pushes(100, 5)
-    estimate = found(deployed, table, "contact_friction", DRIFT)
-    on, push = drifting_mechanics(), Push(table.inputs, table.duration, table.covariates)
-    left = table.outcomes - joint_shift(on, [estimate], push) - quiet.outcomes
-    whole = table.outcomes - quiet.outcomes
-    assert size_of(left) < 0.1 * size_of(whole)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from synthetic import square_pushes
 
-from push_predictor.errors import ModelFileError, RequestError
+from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
+from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push, Pushes
@@ -23,7 +23,6 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
 from push_predictor.models.train_mechanics import on_supports, predictor_about
-from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 ON_CORNERS = supported_at(
@@ -59,12 +58,6 @@ def test_needs_the_covariates_of_its_parameters() -> None:
         model.predict(Pushes(0.02, 0.1, 0.2))
     along, across = (model.predict(Pushes(0.02, 0.1, 0.2, covariates={"push_heading": h})).mean for h in (0.0, 1.5))
     assert not np.allclose(along, across)
-
-
-def test_range_of_a_needed_covariate_bounds_the_domain() -> None:
-    model = mechanics_model({"grain_x": 0.3}, push_heading=np.linspace(0.0, 0.5, 24))
-    found = model.predict(Pushes(0.02, 0.3, 0.2, covariates={"push_heading": [0.2, 2.0]}))
-    assert found.in_domain.tolist() == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -107,29 +100,6 @@ def test_model_of_several_supports_takes_those_of_other_recordings(by_recording:
     fifth = Pushes(0.02, 0.05, 0.0, covariates={"recording": 5.0})
     np.testing.assert_allclose(moved.predict(fifth).mean, narrow)
     assert on_supports(mechanics_model({}), replace(by_recording.rig, support_points=points), {}).needs == ()
-
-
-def test_rejects_a_file_whose_rows_lack_a_needed_covariate(by_recording: PushModel, tmp_path: Path) -> None:
-    table = by_recording.training
-    bare = PushTable(table.inputs, table.duration, table.outcomes, table.push_id)
-    with pytest.raises(ModelFileError, match="recording"):
-        saved(replace(by_recording, training=bare), tmp_path)
-
-
-def test_rejects_a_file_with_a_parameter_beyond_its_range(tmp_path: Path) -> None:
-    with pytest.raises(ModelFileError, match="contact_friction"):
-        saved(mechanics_model({"contact_friction": 1.6}), tmp_path)
-
-
-@pytest.mark.parametrize("scale", [1e-5, 1e5])
-def test_rejects_a_file_whose_support_does_not_match_the_outline(scale: float, tmp_path: Path) -> None:
-    model = mechanics_model({})
-    assert isinstance(model.predictor, MechanicsPredictor)
-    far = PressureDistribution(scale * ON_CORNERS.points, ON_CORNERS.shares)
-    mechanics = PushMechanics(model.rig.outline, model.rig.pusher_radius, far)
-    predictor = replace(model.predictor, fitted=FittedMechanics(mechanics))
-    with pytest.raises(ModelFileError, match="support points"):
-        saved(replace(model, predictor=predictor), tmp_path)
 
 
 def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None:

@@ -13,7 +13,7 @@ from forward_pushes import IN_METRES, RADIUS, SQUARE, mechanics, one, pushes, si
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lynch import in_equal_steps, sweeps
-from supports import FOUR_POINTS, THREE_POINTS
+from supports import THREE_POINTS
 from synthetic import triangle
 
 from push_predictor.errors import RigError
@@ -23,7 +23,7 @@ from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, squar
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import PARAMETERS, MechanicsParameter
-from push_predictor.models.mechanics.pressure import PressureDistribution, patch
+from push_predictor.models.mechanics.pressure import PressureDistribution
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.types import Array
 
@@ -42,17 +42,6 @@ def world_pose(outline: Outline, inputs: Array, moved: Array) -> Array:
 # --- limits and symmetries -------------------------------------------------------------------------------------------
 
 
-def test_ellipsoid_is_near_an_even_patch_and_far_from_four_points() -> None:
-    inputs, duration = pushes(100)
-    ellipse_, even, four = (
-        mechanics("rect1", kind).displacement({}, inputs, duration) for kind in ("ellipsoid", "patch", "four")
-    )
-    assert np.sqrt(np.mean(size(even - ellipse_) ** 2) / np.mean(size(even) ** 2)) < 0.09
-    surface = PowerSurface(FOUR_POINTS.centre, FOUR_POINTS.length)
-    approximate = PushMechanics(SQUARE, RADIUS, surface).displacement({}, inputs, duration)
-    assert np.sqrt(np.mean(size(four - approximate) ** 2) / np.mean(size(four) ** 2)) > 0.06
-
-
 @pytest.mark.parametrize("kind", ["ellipsoid", "patch"])
 @EVERY_OUTLINE
 def test_push_through_the_centre_along_the_normal_only_translates(outline: Outline, kind: str) -> None:
@@ -68,14 +57,6 @@ def test_mirrored_push_gives_the_mirrored_motion(contact: float, angle: float, f
     here = mechanics().displacement({"contact_friction": friction}, *one(contact, angle))
     there = mechanics().displacement({"contact_friction": friction}, *one(0.25 - contact, -angle))
     assert there[0] * [1.0, -1.0, -1.0] * IN_METRES == pytest.approx(here[0] * IN_METRES, abs=5e-6)
-
-
-@pytest.mark.parametrize("shape", ["rect1", "hex", "ellip3"])
-def test_turning_a_symmetric_slider_changes_nothing(shape: str) -> None:
-    (inputs, duration), order = pushes(40), shape_outline(shape).rotational_symmetry
-    turned = np.column_stack([inputs[:, 0], (inputs[:, 1] + 1.0 / order) % 1.0, inputs[:, 2]])
-    here, there = (mechanics(shape).displacement({}, rows, duration) for rows in (inputs, turned))
-    assert there * IN_METRES == pytest.approx(here * IN_METRES, abs=8e-6)
 
 
 def test_turning_outline_and_support_together_changes_nothing() -> None:
@@ -130,13 +111,6 @@ def test_no_travel_and_a_receding_pusher_move_nothing() -> None:
 # --- supports --------------------------------------------------------------------------------------------------------
 
 
-def test_rim_exponent_blends_between_the_tabulated_patches() -> None:
-    inputs, duration = pushes(30)
-    exact = PushMechanics(SQUARE, RADIUS, patch(SQUARE, 1.4)).displacement({}, inputs, duration)
-    even, blended = (mechanics().displacement({"rim_exponent": e}, inputs, duration) for e in (0.0, 1.4))
-    assert np.sqrt(np.mean(size(blended - exact) ** 2)) < 0.1 * np.sqrt(np.mean(size(exact - even) ** 2))
-
-
 def test_rejects_a_name_that_is_no_parameter() -> None:
     with pytest.raises(KeyError, match="'friction' is no parameter"):
         mechanics().displacement({"friction": 0.3}, *one())
@@ -157,10 +131,9 @@ def test_patch_of_a_circle_does_not_turn_without_contact_friction() -> None:
 # --- whole pushes on the ellipsoid, against closed forms and fine steps ----------------------------------------------
 
 
-@pytest.mark.parametrize("outline", [OUTLINES["rect1"], OUTLINES["ellip3"]], ids=["rect1", "ellip3"])
-def test_displacements_are_as_accurate_as_asked_for(outline: Outline) -> None:
+def test_displacements_are_as_accurate_as_asked_for() -> None:
     """Steps of 4e-5 m of another method, on another solution of the contact; in them corners blur to some 1e-5."""
-    inputs, duration = pushes(60, seed=3, travel=0.0145)
+    outline, (inputs, duration) = OUTLINES["rect1"], pushes(30, seed=3, travel=0.0145)
     surface = uniform_ellipsoid(outline)
     path = sweeps(outline, RADIUS, inputs, duration)
     coarse, exact = (in_equal_steps(path, surface, 0.3, steps) for steps in (256, 512))
@@ -229,15 +202,6 @@ def test_a_disc_crosses_a_notch_and_pushes_its_far_side(aside: float) -> None:
     )
     assert np.linalg.norm(expected[:2]) > 3e-3
     assert found * IN_METRES == pytest.approx(expected * IN_METRES, abs=3e-5)
-
-
-def test_off_centre_friction_turns_a_slider_pushed_at_its_middle() -> None:
-    left, right = (
-        analytical_mechanics(SQUARE, RADIUS, 0.3, PowerSurface(np.array([0.0, y]), 0.034)).displacement(*one())[0]
-        for y in (0.01, -0.01)
-    )
-    assert left[2] > 0.01  # pushed to the right of its centre of friction: counter-clockwise
-    assert right == pytest.approx(left * [1.0, -1.0, -1.0], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["rect1", "ellip2", "hex"])

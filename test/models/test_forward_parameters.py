@@ -62,41 +62,6 @@ def test_friction_by_load_lowers_friction_where_the_force_is_small() -> None:
     assert effect @ of_friction < -0.1 * of_friction @ of_friction
 
 
-def test_pressure_at_the_rim_resists_turning() -> None:
-    push = one(0.05, 0.0)
-    turn = moved(mechanics(), {}, *push)[0, 2]
-    assert np.sign(change("rim_exponent", 4.0, push)[2]) == -np.sign(turn)
-    assert np.sign(change("rim_exponent", -2.0, push)[2]) == np.sign(turn)
-
-
-def test_pressure_to_the_left_of_a_push_turns_the_slider_clockwise_about_it() -> None:
-    # Edge 0 is the left side: the push runs along body x, so body y is to its left.
-    assert change("centre_y", 0.005, one())[2] > 0.0  # the tip passes on the right of the centre: counter-clockwise
-    assert change("centre_x", 0.005, one()) == pytest.approx(0.0, abs=1e-6)
-    turn = moved(mechanics(), {}, *one(0.05))[0, 2]
-    ahead = change("centre_x", 0.01, one(0.05))[2]  # a longer arm along the push makes it turn less
-    assert np.sign(ahead) == -np.sign(turn)
-
-
-def test_push_above_the_table_shifts_the_centre_ahead() -> None:
-    push = one(0.06, 0.1)
-    raised, ahead = change("pushing_height", 0.001, push), change("centre_x", 0.001, push)
-    assert raised @ ahead > 0.0
-    assert change("pushing_height", 0.005, one()) == pytest.approx(0.0, abs=1e-6)
-
-
-@pytest.mark.parametrize("name", ["body_anisotropy", "grain_x"])
-def test_slider_gives_way_along_the_direction_in_which_it_slides_easily(name: str) -> None:
-    """The tip sticks on the left side off the middle, at an angle to body x: motion along x is easy, along y hard."""
-    ahead = [
-        rotate(moved(mechanics(), {"contact_friction": 2.0, name: v}, *one(0.2, 0.2), 0.2)[:, :2], np.array([0.2]))[
-            0, 0
-        ]
-        for v in (0.2, 0.0)
-    ]
-    assert ahead[0] > ahead[1] + 1e-5
-
-
 def test_grain_is_body_anisotropy_of_a_slider_at_the_worlds_heading() -> None:
     inputs, duration = pushes(10, travel=5e-4)
     body = moved(mechanics(), {"body_anisotropy": 0.2}, inputs, duration)
@@ -106,22 +71,6 @@ def test_grain_is_body_anisotropy_of_a_slider_at_the_worlds_heading() -> None:
     assert world == pytest.approx(body, rel=2e-3, abs=1e-6)
     turned = moved(mechanics(), {"grain_diagonal": 0.2}, inputs, duration, in_body + np.pi / 4.0)
     assert turned == pytest.approx(body, rel=2e-3, abs=1e-6)
-
-
-def test_slope_pulls_the_slider_its_way() -> None:
-    inputs, duration = one(0.125, 0.0)
-    for heading, name in ((0.0, "slope_y"), (-np.pi / 2.0, "slope_x")):  # both pull to the left of the push
-        left = moved(mechanics(), {name: 0.2}, inputs, duration, heading)[0]
-        assert left[1] > 1e-5
-    ahead = moved(mechanics(), {"slope_x": 0.2}, inputs, duration, 0.0)[0]
-    assert ahead == pytest.approx([0.004, 0.0, 0.0], abs=2e-6)
-
-
-def test_friction_that_grows_to_the_left_is_a_centre_to_the_left() -> None:
-    square_of_pressure = 0.09**2 / 12.0
-    expected = change("centre_y", 2.0 * square_of_pressure, one())
-    assert change("gradient_y", 2.0, one()) == pytest.approx(expected, rel=0.01)
-    assert change("gradient_x", 2.0, one(), -np.pi / 2.0) == pytest.approx(expected, rel=0.01)
 
 
 def test_friction_gradient_moves_the_centre_by_the_mean_squares_of_the_pressure() -> None:

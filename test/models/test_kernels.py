@@ -44,19 +44,6 @@ def test_matrix_is_symmetric_positive_and_at_most_its_diagonal(seed: int, log_sc
     assert np.linalg.eigvalsh(matrix).min() > -1e-10 * kernel.variance
 
 
-@given(st.floats(-50.0, 50.0))
-def test_only_differences_of_inputs_matter(shift: float) -> None:
-    inputs = normal(20, 3)
-    np.testing.assert_allclose(KERNEL.matrix(inputs + shift), KERNEL.matrix(inputs), rtol=1e-9, atol=1e-11)
-
-
-def test_infinite_lengthscale_removes_its_input() -> None:
-    inputs = normal(20, 3)
-    blind = ArdKernel(np.array([0.3, -0.4, 20.0]), 0.2)
-    pair = ArdKernel(np.array([0.3, -0.4]), 0.2)
-    np.testing.assert_allclose(blind.matrix(inputs), pair.matrix(inputs[:, :2]), rtol=1e-12)
-
-
 def test_gradient_equals_finite_differences() -> None:
     inputs, weights = normal(25, 3), normal(25, 25, seed=1)
     weights = weights + weights.T

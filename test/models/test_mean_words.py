@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ VALUES = {"contact_friction": 0.25, "rim_exponent": 1.5}
 MECHANICS = FittedMechanics(PushMechanics(square_rig().outline, RADIUS), VALUES, 1e-4 * np.eye(2))
 
 
+@cache
 def trained(kind: str, **options: Any) -> PushModel:
     table = empty_table() if kind == "prior" else square_pushes(30)[0]
     return train_model(table, square_rig(), kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
@@ -41,13 +43,6 @@ def test_a_model_states_its_mean_and_parameters() -> None:
     assert mean_in_words(trained("analytical").predictor) == "textbook mechanics"
     prior = trained("prior").predictor
     assert mean_of(prior) == "mechanics with uncertain parameters" and mean_parameters(prior)["contact_friction"] == 0.3
-
-
-def test_repr_states_mean_and_speeds() -> None:
-    assert "\n  mean: fitted mechanics (contact_friction 0.25, rim_exponent 1.5)\n" in repr(
-        trained("gp", about=MECHANICS)
-    )
-    assert "\n  mean: zero\n" in repr(trained("gp")) and "pusher speed 20 to 20 mm/s" in repr(trained("gp"))
 
 
 def test_info_and_registry_state_mean_and_speeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

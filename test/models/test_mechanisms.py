@@ -6,15 +6,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from repository import REPOSITORY
-from scipy.optimize import fsolve
 from synthetic import triangle
 
-from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -138,16 +135,17 @@ def test_a_plausible_parameter_lies_within_the_limit() -> None:
 # --- every mechanism on every outline --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("outline", ["ellip1", pytest.param("ellip3", marks=pytest.mark.long), "tri"])
 @EVERY_MECHANISM
-def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism, outline: str) -> None:
-    response = mechanism.response(patched(outline), pushes(30))
+def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism) -> None:
+    response = mechanism.response(patched("rect1"), pushes(30))
     assert np.all(np.isfinite(response))
-    if outline == "ellip1" and mechanism.name in ("friction_by_load", "outline_rotation"):
-        # Every normal of a circle runs through its centre and needs the same force; a turned circle is the same.
-        assert np.all(size(response) < 1e-5)
-    else:
-        assert np.all(size(response) * [p.largest for p in mechanism.parameters] > 1e-5)
+    assert np.all(size(response) * [p.largest for p in mechanism.parameters] > 1e-5)
+
+
+@pytest.mark.parametrize("name", ["friction_by_load", "outline_rotation"])
+def test_a_circle_has_no_response_to_what_its_symmetry_hides(name: str) -> None:
+    """Every normal of a circle runs through its centre and needs the same force; a turned circle is the same."""
+    assert np.all(size(mechanism_named(name).response(patched("ellip1"), pushes(30))) < 1e-5)
 
 
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
@@ -181,109 +179,7 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
 # --- responses that must be zero -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["contact_friction", "contact_asymmetry"])
-def test_contact_friction_has_no_response_where_contact_sticks(name: str) -> None:
-    straight = Push(np.array([[0.02, 0.125, angle] for angle in (-0.1, -0.05, 0.0, 0.05, 0.1)]), np.full(5, 0.2), {})
-    assert mechanism_named(name).response(mechanics_of("rect1"), straight) == pytest.approx(0.0, abs=1e-5)
-
-
-def test_contact_friction_has_a_response_where_contact_slips() -> None:
-    slipping = Push(np.array([[0.02, 0.125, 1.0], [0.02, 0.125, -1.0]]), np.full(2, 0.2), {})
-    symmetric = mechanism_named("contact_friction").response(mechanics_of("rect1"), slipping)
-    lopsided = mechanism_named("contact_asymmetry").response(mechanics_of("rect1"), slipping)
-    assert np.all(size(symmetric) > 1e-3)
-    assert lopsided[0] == pytest.approx(symmetric[0], rel=0.1, abs=1e-4)
-    assert lopsided[1] == pytest.approx(-symmetric[1], rel=0.1, abs=1e-4)
-
-
-@pytest.mark.parametrize("name", ["pressure_spread", "pushing_height"])
-def test_push_through_the_centre_does_not_turn_the_slider(name: str) -> None:
-    through = Push(np.array([[0.02, 0.125, 0.0]]), np.full(1, 0.2), {})
-    assert mechanism_named(name).response(mechanics_of("rect1"), through) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_inertia_grows_with_squared_speed_for_equal_path_length() -> None:
-    """Over a step at which the largest load of inertia is not reached."""
-    slow = pushes(50)
-    fast = Push(slow.inputs * [3.0, 1.0, 1.0], slow.duration / 3.0, slow.covariates)
-    fitted = mechanics_of("ellip1", 2.0)
-    once = fitted.shifted(("inertia",), np.full((50, 1), 0.09), slow)[0]
-    nine = fitted.shifted(("inertia",), np.full((50, 1), 0.01), fast)[0]
-    assert nine * IN_METRES == pytest.approx(once * IN_METRES, abs=1e-7)
-
-
 # --- against the limit surface solved directly -----------------------------------------------------------------------
-
-
-class Surface:
-    """One sticking push at an instant: force, moment and speed found by root finding on the limit surface itself."""
-
-    def __init__(self, mechanics: FittedMechanics, contact: float, angle: float) -> None:
-        outline, at = mechanics.outline, np.array([contact])
-        self.length = mechanics.ellipsoid.length
-        self.normal, self.point = outline.inward_normal(at)[0], outline.point(at)[0]
-        self.ahead = rotate(self.normal, np.array(angle))
-
-    def twist(self, pull: tuple[float, float] = (0.0, 0.0), height: float = 0.0) -> Array:
-        """Twist (3,) of the body's origin in the push frame, per metre of the tip's path."""
-
-        def motion(unknown: Array) -> tuple[Array, float]:
-            force, k = unknown[:2], unknown[2]
-            total = force + pull
-            centre = height * force
-            arm = self.point - centre
-            moment = (arm[0] * force[1] - arm[1] * force[0]) / self.length
-            spin = k * moment / self.length
-            linear = k * total + spin * np.array([centre[1], -centre[0]])
-            return np.array([*linear, spin]), float(total @ total + moment**2 - 1.0)
-
-        def rest(unknown: Array) -> Array:
-            (vx, vy, spin), off = motion(unknown)
-            touch = np.array([vx - spin * self.point[1], vy + spin * self.point[0]])
-            return np.array([*(touch - self.ahead), off])
-
-        found, _, fine, message = fsolve(rest, [*(0.7 * self.ahead), 1.0], full_output=True, xtol=1e-12)
-        assert fine == 1, message
-        vx, vy, spin = motion(found)[0]
-        heading = np.arctan2(self.ahead[1], self.ahead[0])
-        return np.array([*rotate(np.array([vx, vy]), np.array(-heading)), spin])
-
-
-STICKING = 5.0  # contact friction
-INSTANT = 1e-5  # m
-
-
-@pytest.mark.parametrize(("contact", "angle"), [(0.05, 0.3), (0.09, -0.4), (0.21, 0.2), (0.6, -0.3)])
-@pytest.mark.parametrize(
-    ("quantity", "setting"),
-    [
-        ("slope_x", {"pull": (0.4, 0.0)}),
-        ("slope_y", {"pull": (0.0, -0.3)}),
-        ("pushing_height", {"height": 0.01}),
-        ("pushing_height", {"height": -0.01}),
-    ],
-)
-def test_large_changes_are_those_of_the_surface_solved_by_root_finding(
-    quantity: str, setting: dict[str, Any], contact: float, angle: float
-) -> None:
-    """A pull and a height are exact on an ellipsoid, however large."""
-    mechanics = mechanics_of("rect1", STICKING)
-    push = Push(np.array([[0.02, contact, angle]]), np.array([INSTANT / 0.02]), {"slider_heading": np.zeros(1)})
-    amount = float(np.sum(np.array(next(iter(setting.values())))))
-    shift = mechanics.shifted((quantity,), np.array([[amount]]), push)[0]
-    moved = (mechanics.displacement(push.inputs, push.duration) + shift)[0] / INSTANT
-    expected = Surface(mechanics, contact, angle).twist(**setting)
-    assert moved * IN_METRES == pytest.approx(expected * IN_METRES, abs=1e-3)
-    assert np.abs((expected - Surface(mechanics, contact, angle).twist()) * IN_METRES).max() > 5e-3
-
-
-def test_a_friction_gradient_shifts_the_centre_of_friction_of_a_slider_to_the_rougher_side() -> None:
-    """Friction that rises by s per metre has its centre s a^2 / 12 from the middle of a square of uniform pressure."""
-    mechanics, push = patched("rect1"), pushes(40)
-    level = replace(push, covariates={"slider_heading": np.zeros(40)})
-    gradient = mechanism_named("friction_gradient").response(mechanics, level)
-    shift = mechanism_named("centre_of_friction").response(mechanics, level)
-    assert np.all(size(gradient - shift * 0.09**2 / 12.0) < 0.1 * size(gradient))
 
 
 # --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------

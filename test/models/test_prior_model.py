@@ -34,9 +34,7 @@ from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push, Pushes
-from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import retrain_model, train_model
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
@@ -52,17 +50,6 @@ TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
 @pytest.fixture(scope="module")
 def untrained() -> PushModel:
     return train_model(empty_table(), RIG, "prior", name="before")
-
-
-@pytest.fixture(scope="module")
-def of_few_draws(untrained: PushModel) -> PushModel:
-    """Its table takes a fraction of the time."""
-    return with_draws(untrained, 6)
-
-
-def with_draws(model: PushModel, count: int) -> PushModel:
-    """The model with the first of its draws."""
-    return replace(model, predictor=replace(predictor_of(model), draws=predictor_of(model).draws[:count]))
 
 
 def predictor_of(model: PushModel) -> PriorPredictor:
@@ -279,10 +266,8 @@ def test_squares_of_deviates_vary_over_the_draws(untrained: PushModel) -> None:
 
 def test_priors_use_what_the_rig_knows() -> None:
     on_points = train_model(empty_table(), replace(RIG, contact_friction=0.6), "prior", name="p")
-    patch = train_model(empty_table(), square_rig(), "prior", name="p")
     assert predictor_of(on_points).fitted.values["contact_friction"] == 0.6
     assert abs(predictor_of(on_points).draws[:, 0].mean() - 0.6) < 0.02
-    assert "rim_exponent" in predictor_of(patch).fitted.values
     assert "rim_exponent" not in predictor_of(on_points).fitted.values
 
 
@@ -301,26 +286,12 @@ def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel
 # --- without training rows ---------------------------------------------------------------------------------
 
 
-def test_untrained_model_describes_itself(of_few_draws: PushModel, tmp_path: Path) -> None:
-    assert "trained on no push" in repr(of_few_draws)
-    of_few_draws.save(tmp_path / "before.pushmodel")
-    registry = ModelRegistry()
-    registry.load(tmp_path / "before.pushmodel")
-    assert "kind=prior" in registry.describe("before")
-    assert "windows=0; covariates=-; defaults=-; duration=any" in registry.describe("before")
-
-
 def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel) -> None:
     test = pushed(30, 12)
     found = metrics_json(compare(untrained, test))
     rest = np.sum((test.outcomes - compare(untrained, test).mean) ** 2, axis=0) / np.sum(test.outcomes**2, axis=0)
     assert found["nmse"]["total"] == pytest.approx(rest.sum())
     assert found["n_train"] == 0
-
-
-def test_planning_takes_usual_windows_without_training_rows(untrained: PushModel) -> None:
-    assert windows_of(untrained, 1.0).count == 5
-    assert untrained.usual_speed == 0.02
 
 
 def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:
@@ -365,10 +336,3 @@ def test_command_line_trains_and_predicts_before_the_first_push(
     assert "for which the priors are meant" in capsys.readouterr().out
     assert main(["info", str(out)]) == 0
     assert "velocity_range    none\n" in capsys.readouterr().out
-
-
-def test_command_line_needs_data_for_other_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["train", "--kind", "gp", "--out", str(tmp_path / "m.pushmodel")])
-    assert ended.value.code == 2
-    assert "required: DATA" in capsys.readouterr().err

@@ -59,9 +59,3 @@ def test_lists_tuples_and_arrays_mean_the_same_and_scalars_apply_to_all(
 def test_rejects_invalid_push_by_field_and_value(arguments: tuple[Any, ...], message: str):
     with pytest.raises(RequestError, match=message):
         Pushes(*arguments)
-
-
-def test_the_repr_states_count_and_ranges():
-    assert repr(Pushes([0.01, 0.02], 0.1, 0.3)) == (
-        "Pushes(n=2: velocity 0.01 to 0.02, contact 0.1, angle 0.3, duration 0.2)"
-    )

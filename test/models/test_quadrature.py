@@ -66,10 +66,3 @@ def test_a_known_noise_level_makes_both_densities_the_same() -> None:
     np.testing.assert_allclose(
         exact_cdf(of, outcomes), ndtr((outcomes - 0.2) / np.sqrt(0.1 + np.exp(-0.5))), atol=1e-12
     )
-
-
-def test_uncertain_noise_level_has_heavier_tails() -> None:
-    of = prediction(0.0, 0.01, -1.0, 1.0, m=2)
-    outcomes = 5.0 * np.sqrt(of.outcome_variance[0]) * np.array([-1.0, 1.0])
-    assert (exact_log_density(of, outcomes) > gaussian_log_density(of, outcomes) + 1.0).all()
-    assert exact_cdf(of, outcomes)[0] == pytest.approx(1.0 - exact_cdf(of, outcomes)[1], abs=1e-12)

@@ -6,20 +6,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
+from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models.features import DEVIATION
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -27,12 +26,6 @@ from push_predictor.types import Array
 
 RIG = square_rig()
 MECHANICS = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.25}, np.array([[1e-4]]))
-
-
-def targets(predictor: GaussianProcessPredictor) -> Array:
-    """What the regressions were trained on (n, 3), SI."""
-    scaled = np.column_stack([regression.outputs for regression in predictor.regressions])
-    return np.asarray(scaled * predictor.scaling.outcome_sd + predictor.scaling.outcome_mean)
 
 
 def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> PushTable:
@@ -51,11 +44,6 @@ def pushes(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> P
 
 def trained(table: PushTable, kind: str = "gp", **options: Any) -> PushModel:
     return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
-
-
-def learnt(model: PushModel) -> GaussianProcessPredictor:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    return model.predictor
 
 
 def at(model: PushModel, speed: float, duration: float = 0.2, n: int = 6) -> tuple[Array, Array, Array]:
@@ -142,23 +130,12 @@ def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
         np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize("options", ({}, {"per_path": False}, {"about": MECHANICS}))
-def test_a_file_keeps_it(options: dict[str, Any], tmp_path: Path) -> None:
-    model = trained(pushes(0.02, 0.03), **options)
-    save_model(model, tmp_path / "m")
-    again = load_model(tmp_path / "m")
-    for speed in (0.01, 0.02, 0.1):
-        for found, expected in zip(at(again, speed), at(model, speed), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
-
-
-@pytest.mark.parametrize("n", (1, 6))
-def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel, n: int) -> None:
+def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:
     several = trained(pushes(0.02, 0.03, n=90), slow.kind)
     for model in (slow, several):
         tabulated = tabulate(model)
         assert tabulated.tabulated, tabulated.how
-        for speed in (0.005, 0.02, 0.025, 0.03, 0.06, 0.15):
+        for speed, n in product((0.005, 0.02, 0.025, 0.03, 0.06, 0.15), (1, 6)):
             inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
             assert not tabulated.exact_count(inputs)
             found, expected = (m.predict_rows(inputs, np.full(n, 0.2)) for m in (tabulated, model))

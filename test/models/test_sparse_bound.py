@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sparse_rows import PARAMETERS, rows
 
-from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
+from push_predictor.models.gaussian_process.bound import Bound, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_over_noise
 from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.sparse_vhgp import noise_prior
@@ -86,30 +86,6 @@ def test_the_prior_is_for_the_noise_alone_and_has_its_gradient() -> None:
     assert np.flatnonzero(slope).tolist() == [3, 4, 5, 7]
     np.testing.assert_allclose(twice.penalty(vector)[1][3:6], 2.0 * slope[3:6])
     assert twice.penalty(vector)[1][7] == slope[7]
-
-
-def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
-    found = problem(200, 20, 15)
-    best = maximise_over_noise(found, None, 1e-12)
-    rng = np.random.default_rng(3)
-    for size in (1e-2, 1e-1, 1.0):
-        precisions = best.sites.precisions * np.exp(size * rng.normal(size=200))
-        potentials = best.sites.potentials + size * rng.normal(size=200)
-        assert Bound.at(found, Sites(precisions, potentials)).value < best.value
-
-
-def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
-    found = problem(200, 20, 15)
-    best = maximise_over_noise(found, None, 1e-12)
-    np.testing.assert_allclose(best.tied_precisions, best.sites.precisions, atol=1e-5)
-    assert Bound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
-
-
-def test_search_for_q_converges_from_any_start() -> None:
-    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5, 0.2)
-    start = maximise_over_noise(problem(200, 20, 15, elsewhere), None, 1e-3).sites
-    fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in (None, start))
-    assert warm == pytest.approx(fresh, abs=1e-7)
 
 
 def test_unexplained_variance_is_kernel_diagonal_minus_explained() -> None:

@@ -28,7 +28,7 @@ from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, induci
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-MANY = 2000  # rows: more than a dense model takes
+MANY = 1200  # rows: more than a dense model takes
 
 
 @cache
@@ -78,13 +78,6 @@ def test_the_same_rows_give_the_same_model() -> None:
     np.testing.assert_array_equal(again.inducing_noise, one.inducing_noise)
 
 
-def test_model_is_determined_by_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
-    chosen = fitted.inducing_signal, fitted.inducing_noise
-    again = SparseVHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions, *chosen)
-    one, other = fitted.predict(fitted.inputs[:50]), again.predict(fitted.inputs[:50])
-    np.testing.assert_array_equal(one.outcome_variance, other.outcome_variance)
-
-
 def test_held_out_predictions_equal_those_of_a_dense_model() -> None:
     dense, sparse = dense_and_sparse(300)
     block = np.random.default_rng(0).integers(0, 40, size=300)
@@ -125,14 +118,6 @@ def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
         np.testing.assert_allclose(found[1].ravel(), variance, rtol=1e-7)
 
 
-def test_prediction_far_from_data_is_the_prior(fitted: SparseVHGP) -> None:
-    far, parameters = fitted.predict(np.array([[1e6, 1e6]])), fitted.parameters
-    assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
-    assert far.variance[0] == pytest.approx(parameters.signal.variance, rel=1e-5)
-    assert far.log_noise_mean[0] == pytest.approx(parameters.noise_mean)
-    assert far.log_noise_variance[0] == pytest.approx(parameters.noise.variance + parameters.nugget)
-
-
 def test_memory_grows_with_rows_times_inducing_inputs() -> None:
     inputs, outputs = rows(20_000)
     chosen = np.arange(0, 20_000, 400)
@@ -146,7 +131,7 @@ def test_memory_grows_with_rows_times_inducing_inputs() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0])
+@pytest.mark.parametrize("outputs", [np.zeros(40), np.eye(40)[3] * 30.0])
 def test_degenerate_outputs_still_give_finite_predictions(outputs: Array, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sparse_fit, "_MOST_ITERATIONS", 6)  # an outlier takes all that are allowed
     inputs = np.random.default_rng(0).normal(size=(40, 2))
@@ -155,8 +140,8 @@ def test_degenerate_outputs_still_give_finite_predictions(outputs: Array, monkey
 
 
 def test_repeated_inputs_are_accepted() -> None:
-    inputs, outputs = rows(600)
-    inputs = inputs[np.arange(600) // 40 * 40]
+    inputs, outputs = rows(300)
+    inputs = inputs[np.arange(300) // 20 * 20]
     assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 30).bound)
 
 

@@ -17,6 +17,7 @@ from repository import REPOSITORY
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import table_cache
 from push_predictor.models.store.archive import archived, read_archive
@@ -45,8 +46,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="module")
 def model() -> PushModel:
-    """A small VHGP."""
-    return train_model(noisy_pushes(45), square_rig(), "vhgp", name="small", options=TrainingOptions(mean="zero"))
+    """A small VHGP of a circle, whose table has no axis of contacts and is computed in a fraction of the time."""
+    rig = replace(square_rig(), shape="ellip1", outline=shape_outline("ellip1"))
+    return train_model(noisy_pushes(45, rig=rig), rig, "vhgp", name="small", options=TrainingOptions(mean="zero"))
 
 
 @pytest.fixture

@@ -132,7 +132,7 @@ def test_sure_push_is_chosen_near_an_obstacle_and_the_bound_is_kept():
 def test_bound_is_kept_with_new_samples():
     scene = Scene(SQUARE, TABLE, [box(-0.2, 0.2, 0.05, 0.2)])
     plans = []
-    for sd in np.linspace(0.0028, 0.0038, 41):
+    for sd in np.linspace(0.0028, 0.0038, 21):
         pushes = made_up([[0.05, 0.0, 0.0]], [0.0, sd, 0.0])
         plans.append(plan_around_obstacles(pushes, scene, START, region(-0.05, 0.0), 0.063, most_pushes=1))
     assert plans[0] is not None and plans[-1] is None

@@ -11,7 +11,7 @@ from even_physics import no_noise, uniform_field
 from scipy.optimize import minimize
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run
+from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run, steps_of
 from push_predictor.simulation.physics import GRAVITY, Physics
 from push_predictor.simulation.pushes import PusherPath, PushPlan, pusher_path, random_pushes
 from push_predictor.simulation.slider import Slider, slider_named, support_points
@@ -20,7 +20,7 @@ from push_predictor.types import Array
 RADIUS = 0.00475
 FRICTION = 0.2
 ACCELERATION = 2.5
-LET_GO_STEP = 3e-4  # s
+LET_GO_STEP = 5e-4  # s
 
 
 def even_physics(slider: Slider, n: int, contact_friction: float | Array = 0.25, friction: float = FRICTION) -> Physics:
@@ -41,11 +41,12 @@ def even_physics(slider: Slider, n: int, contact_friction: float | Array = 0.25,
 
 
 def push(
-    physics: Physics, plan: PushPlan, poses: Array | None = None, *, rest: float = 0.1, **options: Array
+    physics: Physics, plan: PushPlan, poses: Array | None = None, *, rest: float = 0.1, coarse: float = 1.0
 ) -> Motion:
+    """coarse: factor on the usual time steps, where a property holds for any."""
     start = np.zeros((len(plan), 3)) if poses is None else poses
     path = pusher_path(plan, physics.outline, physics.radius, start, ACCELERATION)
-    return run(physics, path, start, path.total_time + rest, **options)
+    return run(physics, path, start, path.total_time + rest, time_step=coarse * steps_of(path))
 
 
 def let_go(physics: Physics, velocity: Array, duration: float) -> Motion:
@@ -118,9 +119,7 @@ def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: floa
     return motion.slider[np.arange(len(plan)), reached]
 
 
-SLOW = PushPlan(
-    np.array([0.04, 0.125, 0.19, 0.33]), np.array([0.3, -0.2, 0.1, -0.5]), np.full(4, 0.005), np.full(4, 0.0055)
-)
+SLOW = PushPlan(np.array([0.04, 0.33]), np.array([0.3, -0.5]), np.full(2, 0.005), np.full(2, 0.0055))
 
 
 @pytest.mark.slow
@@ -142,14 +141,16 @@ def test_slow_push_minimises_dissipation(shape: str) -> None:
 def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
     plan = random_pushes(8, [0.005], 0.005, np.random.default_rng(1))
     physics = even_physics(slider_named(shape), 24, friction=0.15)
-    slowest, slow, fast = np.split(travelled(push(physics, at_speeds(plan, 0.005, 0.01, 0.15), rest=0.0)), 3)
+    slowest, slow, fast = np.split(
+        travelled(push(physics, at_speeds(plan, 0.005, 0.01, 0.15), rest=0.0, coarse=2.0)), 3
+    )
     assert np.all(relative(slow - slowest, slowest) < 0.005)
     assert np.all(relative(fast - slowest, slowest) > 0.05)
     assert np.any(relative(fast - slowest, slowest) > 0.12)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", "ellip3", "hex"])
+@pytest.mark.parametrize("shape", ["rect1", "ellip3"])
 def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -> None:
     rng = np.random.default_rng(2)
     speed, direction = rng.uniform(0.05, 0.15, 8), rng.uniform(-np.pi, np.pi, 8)
@@ -177,7 +178,7 @@ def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
     mirrored = np.concatenate([plan.contact, (0.25 - plan.contact) % 1.0])  # left and right of the square
     angle = np.concatenate([plan.angle, -plan.angle])
     both = PushPlan(mirrored, angle, np.tile(plan.speed, 2), np.tile(plan.travel, 2))
-    one, other = np.split(travelled(push(even_physics(slider_named("rect1"), 16), both, rest=0.0)), 2)
+    one, other = np.split(travelled(push(even_physics(slider_named("rect1"), 16), both, rest=0.0, coarse=3.0)), 2)
     assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
 
 
@@ -186,7 +187,9 @@ def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     plan = random_pushes(6, [0.04, 0.1], 0.005, np.random.default_rng(5))
     poses = np.random.default_rng(6).normal(size=(6, 3)) * [0.03, 0.03, 1.0]
     twice = PushPlan(*(np.tile(values, 2) for values in (plan.contact, plan.angle, plan.speed, plan.travel)))
-    motion = push(even_physics(slider_named("hex"), 12), twice, np.concatenate([poses, np.zeros((6, 3))]), rest=0.0)
+    motion = push(
+        even_physics(slider_named("hex"), 12), twice, np.concatenate([poses, np.zeros((6, 3))]), rest=0.0, coarse=3.0
+    )
     there, here = np.split(travelled(motion), 2)
     assert np.allclose(rotate(there[:, :2], -poses[:, 2]), here[:, :2], atol=1e-9)
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
@@ -206,7 +209,9 @@ def test_outcome_converges_with_smaller_time_steps() -> None:
 
 def test_surface_friction_changes_the_force_but_not_the_motion_of_a_slow_push() -> None:
     plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.01), np.full(2, 0.008))
-    light, heavy = (push(even_physics(slider_named("rect1"), 2, friction=f), plan, rest=0.0) for f in (0.15, 0.3))
+    light, heavy = (
+        push(even_physics(slider_named("rect1"), 2, friction=f), plan, rest=0.0, coarse=2.0) for f in (0.15, 0.3)
+    )
     assert np.all(relative(travelled(heavy) - travelled(light), travelled(light)) < 0.005)
     force = [np.median(np.hypot(m.wrench[..., 0], m.wrench[..., 1]), axis=1) for m in (light, heavy)]
     assert force[1] / force[0] == pytest.approx(2.0, rel=0.01)
@@ -222,9 +227,9 @@ def test_force_through_the_centre_equals_friction_times_weight() -> None:
 
 @pytest.mark.slow
 def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
-    plan = random_pushes(16, [0.04, 0.1], 0.006, np.random.default_rng(8))
-    physics = even_physics(slider_named("ellip3"), 16, contact_friction=0.25)
-    motion = push(physics, plan, rest=0.0)
+    plan = random_pushes(8, [0.04, 0.1], 0.006, np.random.default_rng(8))
+    physics = even_physics(slider_named("ellip3"), 8, contact_friction=0.25)
+    motion = push(physics, plan, rest=0.0, coarse=3.0)
     poses, tips = motion.slider[:, :-1].reshape(-1, 3), motion.pusher[:, :-1].reshape(-1, 2)
     normal = rotate(physics.outline.project(to_body(tips, poses)).normal, poses[:, 2])
     force = motion.wrench[:, 1:, :2].reshape(-1, 2)
@@ -236,8 +241,8 @@ def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
 
 @pytest.mark.slow
 def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
-    plan = random_pushes(12, [0.04, 0.12], 0.005, np.random.default_rng(9))
-    physics = even_physics(slider_named("rect1"), 12)
+    plan = random_pushes(6, [0.04, 0.12], 0.005, np.random.default_rng(9))
+    physics = even_physics(slider_named("rect1"), 6)
     motion = push(physics, plan)
     gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
     gap = gap.reshape(motion.time.shape)

@@ -168,14 +168,6 @@ def test_mass_added_at_the_centre_changes_the_force_but_not_the_motion() -> None
     assert of_heavy == pytest.approx(heavier * force, rel=0.05)
 
 
-def test_slider_with_load_on_its_rim_turns_less() -> None:
-    spec = spec_of(PushPlan(np.full(3, 0.19), np.zeros(3), np.full(3, 0.02), np.full(3, 0.005)))
-    points = support_points(spec.slider.outline)
-    rim = np.sum(points**2, axis=1) / np.mean(np.sum(points**2, axis=1)) - 1.0
-    loaded = Changes(load=lambda moment: np.outer(of_push([-0.8, 0.0, 0.8], moment), rim))
-    assert np.all(np.diff(np.abs(outcomes_by_push(replace(spec, changes=loaded))[:, 2])) < 0.0)
-
-
 def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     spec = spec_of(middle_pushes(np.zeros(2)))
     x = support_points(spec.slider.outline)[:, 0]
@@ -210,14 +202,6 @@ def test_grain_of_the_slider_turns_with_it() -> None:
 
     one, other = outcomes_by_push(at_headings(np.array([0.9, -0.5]), Changes(grain=grain)))
     assert one == pytest.approx(other, rel=0.02, abs=1e-7)
-
-
-def test_tilted_table_pulls_the_slider_downhill() -> None:
-    spec = spec_of(middle_pushes(np.zeros(3)))
-    ahead = spec.slider.outline.inward_normal(np.array([0.125]))[0]
-    left = np.array([-ahead[1], ahead[0], 0.0])
-    slope = Changes(pull=lambda moment: np.outer(of_push([-0.3, 0.0, 0.3], moment), left))
-    assert np.all(np.diff(outcomes_by_push(replace(spec, changes=slope))[:, 1]) > 0.0)
 
 
 def test_resting_slider_stays_on_a_gentle_slope() -> None:

@@ -19,7 +19,7 @@ from push_predictor.simulation.slider import built_shares, pressure_patterns, sl
 from push_predictor.simulation.surface import CELL, SURFACES, friction_field
 from push_predictor.types import Array
 
-CONTACTS, ANGLES, REPETITIONS = np.linspace(0.02, 0.23, 5), np.linspace(-1.2, 1.2, 5), 12
+CONTACTS, ANGLES, REPETITIONS = np.linspace(0.02, 0.23, 5), np.linspace(-1.2, 1.2, 5), 8
 
 
 @cache
