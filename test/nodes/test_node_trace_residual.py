@@ -57,9 +57,14 @@ def names(folder: Path) -> list[str]:
 
 
 def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
-    place: Path, server: Server, drifting: Path
+    server: Server, drifting: Path, tmp_path: Path
 ) -> None:
-    goal, answered = server.trace(drifting), set[str]()
+    """Of data in another place than the result, to which a validator is writing."""
+    last = (drifting / "pushes.csv").read_text().splitlines()[-1]
+    with (drifting / "pushes.csv").open("a") as stream:
+        stream.write(last[: len(last) // 2])
+    before, output = names(drifting), tmp_path / "output"
+    goal, answered = server.trace(output, data=drifting), set[str]()
     while not goal.ended:
         assert server.push().success
         answered.update(stage for stage, _ in goal.stages[-1:])
@@ -75,9 +80,10 @@ def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
 
     verdict = json.loads(result.verdict)
     assert verdict["effects"][0]["covariate"] == "elapsed_time" and verdict["motion_model_changed"]
-    assert json.loads((drifting / VERDICT).read_text()) == verdict and verdict["alpha"] == 0.01
-    assert names(drifting) == sorted(["pushes.csv", RIG, EXTENDED, REPORT, VERDICT])
-    assert result.extended_model == str(drifting / EXTENDED) and "its requests need no covariates" in result.message
+    assert json.loads((output / VERDICT).read_text()) == verdict and verdict["alpha"] == 0.01
+    assert names(output) == sorted([EXTENDED, REPORT, VERDICT]) and names(drifting) == before
+    assert result.extended_model == str(output / EXTENDED) and "its requests need no covariates" in result.message
+    assert list(load_model(output / EXTENDED).defaults) == ["elapsed_time"]
 
     loaded = harness.call(server.load, LoadModel.Request(path=result.extended_model, name="extended"))
     assert loaded.success, loaded.message
@@ -123,6 +129,7 @@ def cut(folder: Path) -> None:
 BAD = {
     "no output": ({"output": ""}, ["output: ''"]),
     "no folder": ({"output": "absent"}, ["output", "absent", "no data to trace", "pushes.csv"]),
+    "no data": ({"data": "/nowhere"}, ["data /nowhere: no data to trace"]),
     "unknown model": ({"model": "other"}, ["model: 'other'", "deployed"]),
     "not a table": ({"change": cut}, ["pushes.csv line 1", "velocity"]),
 }
@@ -179,21 +186,6 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
     task = TraceTask((drifting / "pushes.csv",), place / "deployed.pushmodel", (), 0.01, folder)
     trace_process.run_trace(SimpleNamespace(send=sent.append), task)
     assert f"Warning: {drifting}/pushes.csv: The push angles span" in sent[-1].message
-
-
-def test_the_data_may_be_in_another_place_than_the_result(server: Server, drifting: Path, tmp_path: Path) -> None:
-    last = (drifting / "pushes.csv").read_text().splitlines()[-1]
-    with (drifting / "pushes.csv").open("a") as stream:
-        stream.write(last[: len(last) // 2])  # a validator is writing
-    before = names(drifting)
-    for data in (drifting, drifting / "pushes.csv"):
-        output = tmp_path / f"result of {data.name}"
-        ended, result = server.trace(output, data=data).end()
-        assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
-        assert names(output) == sorted([EXTENDED, REPORT, VERDICT]) and names(drifting) == before
-        assert list(load_model(output / EXTENDED).defaults) == ["elapsed_time"]
-    _, result = server.trace(tmp_path / "other", data=tmp_path / "absent").end()
-    assert result.message.startswith(f"data {tmp_path}/absent: no data to trace") and not (tmp_path / "other").exists()
 
 
 def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:
