@@ -83,15 +83,6 @@ def test_rejects_array_with_a_smaller_declared_size(tmp_path: Path) -> None:
         load_model(path)
 
 
-def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_path: Path) -> None:
-    whole = files["gp"].read_bytes()
-    (tmp_path / "good.model").write_bytes(whole)
-    (tmp_path / "half.model").write_bytes(whole[: len(whole) // 2])
-    registry = ModelRegistry()
-    (problem,) = registry.load_all([str(tmp_path)])
-    assert str(tmp_path / "half.model") in problem and registry.names == ["gp"]
-
-
 # --- code ---------------------------------------------------------------------------------------------------------
 
 

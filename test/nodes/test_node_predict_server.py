@@ -34,7 +34,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.server import services
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
-from push_predictor.planning.persistence import Persistence, root_of
+from push_predictor.planning.persistence import Persistence
 from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
@@ -108,23 +108,6 @@ def test_responses_equal_the_models_predictions(server, folder, kind):
         for name in ("mean", "covariance", "process_covariance", "in_domain"):
             np.testing.assert_allclose(getattr(answered, name), getattr(expected, name), rtol=1e-12, atol=1e-18)
             np.testing.assert_allclose(getattr(single, name)[0], getattr(expected, name)[k], rtol=1e-8, atol=1e-14)
-
-
-def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch):
-    """By the correlation at the length of one window. Both covariances shrink with it."""
-    persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
-    monkeypatch.setattr(services, "persistence_of", lambda model: persistence)
-    registry = ModelRegistry()
-    registry.load(folder / "gp.model")
-    residual = np.array([2e-5, -1e-5, 3e-4])
-    plain, moved = (answered(registry, one) for one in (None, residual))
-    correlation = persistence.correlation(np.array([GOOD[0] * 0.2]))[0]
-    root = root_of(plain.covariance)[0]
-    shift = root @ (correlation * np.linalg.solve(root, residual))
-    np.testing.assert_allclose(moved.mean[0] - plain.mean[0], shift, rtol=1e-6, atol=1e-15)
-    for name in ("covariance", "process_covariance"):
-        shrunk = root_of(getattr(plain, name))[0] * np.sqrt(1.0 - correlation**2)
-        np.testing.assert_allclose(getattr(moved, name)[0], shrunk @ shrunk.T, rtol=1e-6, atol=1e-18)
 
 
 def test_residuals_of_several_windows_count_by_their_distance(folder, monkeypatch):

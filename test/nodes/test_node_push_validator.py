@@ -356,26 +356,6 @@ class TestOtherServers:
             alone.wait_for_result(before + 1, 120.0)
         assert_same_as_offline(alone.output, models["gp"], hexagon)
 
-    @pytest.mark.long
-    def test_a_server_killed_and_started_again_costs_no_window(self, alone: Bench, models, hexagon: Path, monkeypatch):
-        monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
-        before, served = alone.results, {"models": [str(models["gp"])]}
-        alone.status.wait_for_message(NO_SERVER)
-        alone.received.residuals.clear()
-        with node_process("predict_server", domain=alone.domain, params=served) as first:
-            alone.status.wait_for_server()
-            with replaying(alone.domain, recording=hexagon, **{"play.start_paused": True}):
-                play_some(alone.node, TWO_PUSHES)
-                assert wait_until(lambda: len(alone.received.residuals) >= 8, 60.0)
-                first.send_signal(signal.SIGKILL)
-                first.wait()
-                answered = len(alone.received.residuals)
-                call(alone.node.create_client(Resume, "push_replay/resume"), Resume.Request())
-                with node_process("predict_server", domain=alone.domain, params=served):
-                    alone.wait_for_result(before + 1, 120.0)
-        assert_same_as_offline(alone.output, models["gp"], hexagon)
-        assert answered < len(windows_of(alone.output))
-
     def test_refused_windows_and_invalid_gaussians_are_listed_and_not_scored(self, alone: Bench, models, hexagon: Path):
         before, stub = alone.results, StubServer(alone.node)
         alone.status.wait_for_server()
