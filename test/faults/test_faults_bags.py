@@ -21,6 +21,7 @@ from mcap.writer import CompressionType, Writer
 from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
 from repository import REPOSITORY
 
+from benchmarks.recordings import fuzz_bags
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import open_bag
@@ -59,17 +60,17 @@ def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
 
 
 @pytest.mark.slow
-def test_damaged_copies_are_read_as_far_as_they_are_intact() -> None:
+def test_damaged_copies_are_read_as_far_as_they_are_intact(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Every kind of damage, each in another form of bag, which the mcap package wrote.
 
     The long form: 2000 copies.
     """
-    numbers = map(str, COPIES)
-    command = [sys.executable, "-m", "benchmarks.recordings.fuzz_bags", "--seed", "6", "--only", *numbers]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
-    done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=400)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(rf"^{len(COPIES)} copies of {FORMS} bags in .*, 0 failed$", done.stdout, re.MULTILINE)
+    monkeypatch.setattr(sys, "argv", ["fuzz_bags", "--seed", "6", "--only", *map(str, COPIES)])
+    status, printed = fuzz_bags.main(), capfd.readouterr().out
+    assert status == 0, printed
+    assert re.search(rf"^{len(COPIES)} copies of {FORMS} bags in .*, 0 failed$", printed, re.MULTILINE)
 
 
 @pytest.mark.parametrize("length", [1 << 31, (1 << 64) - 1, 300_000], ids=["2 GB", "2^64", "300 kB"])

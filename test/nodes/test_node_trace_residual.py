@@ -98,7 +98,9 @@ def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
 ) -> None:
     before = names(drifting)
     first = server.trace(drifting, covariates=[])
-    worker = server.held(first, "motion")  # it has written something by then
+    worker = server.held()
+    (work,) = drifting.glob(".trace-*")
+    (work / VERDICT).touch()  # as if it had written something by then
     status, result = server.trace(tmp_path / "other").end()
     assert status == GoalStatus.STATUS_ABORTED and not result.success and result.error_code == result.BUSY
     assert "one at a time" in result.message and "deployed" in result.message
@@ -115,7 +117,7 @@ def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
 def test_killed_process_aborts_the_goal_and_the_server_continues(server: Server, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
-    os.kill(server.held(goal), signal.SIGKILL)
+    os.kill(server.held(), signal.SIGKILL)
     status, result = goal.end()
     assert status == GoalStatus.STATUS_ABORTED and "signal 9" in result.message
     assert names(drifting) == before and server.push().success
@@ -195,7 +197,7 @@ def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting:
         assert not server.trace(drifting).accepted
         harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE)))
         goal = server.trace(drifting, covariates=[])
-        worker = server.held(goal)
+        worker = server.held()
         assert server.process.stop() == 0
         assert harness.wait_until(lambda: not Path(f"/proc/{worker}").exists(), 30.0)
         status, result = goal.end()
