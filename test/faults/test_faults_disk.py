@@ -11,11 +11,13 @@ from __future__ import annotations
 import json
 import os
 import resource
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -48,11 +50,12 @@ from push_predictor.residuals.reporting.page import write_trace_report
 
 @contextmanager
 def full_disk(most: int = 200) -> Iterator[None]:
-    """Limit the size of files, in bytes."""
+    """Limit the size of files, in bytes. Python would keep the part of a module's bytecode that fits."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
     try:
-        yield
+        with patch.object(sys, "dont_write_bytecode", True):
+            yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 

@@ -271,10 +271,10 @@ def test_damage_a_missing_rig_and_unknown_types_are_reported(tmp_path: Path) -> 
         assert "node parameter 'rig'" in process.text()
 
 
-def test_names_filters_and_range_of_a_playback(second: Path) -> None:
+def test_names_filters_and_range_of_a_playback(with_rig: Path) -> None:
     names = ("-r", "pusher/wrench:=/ft")
     options = {"play__start_offset": 0.5, "play__playback_duration": 0.1, "play__exclude_regex_to_filter": ".*slider.*"}
-    with replay(second, *names, namespace="/rig1", play__start_paused=True, **options) as (_, client):
+    with replay(with_rig, *names, namespace="/rig1", play__start_paused=True, **options) as (_, client):
         moved: list[bytes] = []
         client.node.create_subscription(WrenchStamped, "/ft", moved.append, 1000, raw=True)
         client.wait_for("paused")
@@ -284,7 +284,7 @@ def test_names_filters_and_range_of_a_playback(second: Path) -> None:
         assert wait_until(lambda: len(moved) == 12)
         assert [stamp(data) for data in moved] == [START + 10**6 * (504 + 8 * k) for k in range(12)]
         assert client.raw["slider/pose"] == client.raw["pusher/wrench"] == []
-        assert wait_until(lambda: bool(client.raw["pusher/pose"]))
+        assert wait_until(lambda: bool(client.raw["pusher/pose"] and client.rig))
 
 
 def test_paused_player_steps_bursts_and_seeks(second: Path) -> None:

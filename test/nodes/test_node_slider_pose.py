@@ -31,15 +31,12 @@ PUSH = WorldPush(np.array([0.3, 0.1, 0.0]), np.array([0.25025, 0.11]), np.array(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A learned and an analytical model of the square."""
+    """A learned model of the square."""
     place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
     table, rig = square_pushes(60)
     shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs are correlated
     table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
-    for kind in ("gp", "analytical"):
-        save_model(
-            train_model(table, rig, kind, name=kind, options=TrainingOptions(mean="zero")), place / f"{kind}.model"
-        )
+    save_model(train_model(table, rig, "gp", name="gp", options=TrainingOptions(mean="zero")), place / "gp.model")
     return place
 
 
