@@ -17,12 +17,11 @@ from random import Random
 
 import pytest
 import zstandard
-from hosted_nodes import hosted_node
 from mcap.writer import CompressionType, Writer
 from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
 from repository import REPOSITORY
-from ros_harness import free_domain
 
+from benchmarks.recordings import fuzz_bags
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import open_bag
@@ -61,20 +60,20 @@ def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
 
 
 @pytest.mark.slow
-def test_damaged_copies_are_read_as_far_as_they_are_intact() -> None:
+def test_damaged_copies_are_read_as_far_as_they_are_intact(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Every kind of damage, each in another form of bag, which the mcap package wrote.
 
     The long form: 2000 copies.
     """
-    numbers = map(str, COPIES)
-    command = [sys.executable, "-m", "benchmarks.recordings.fuzz_bags", "--seed", "6", "--only", *numbers]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
-    done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=400)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(rf"^{len(COPIES)} copies of {FORMS} bags in .*, 0 failed$", done.stdout, re.MULTILINE)
+    monkeypatch.setattr(sys, "argv", ["fuzz_bags", "--seed", "6", "--only", *map(str, COPIES)])
+    status, printed = fuzz_bags.main(), capfd.readouterr().out
+    assert status == 0, printed
+    assert re.search(rf"^{len(COPIES)} copies of {FORMS} bags in .*, 0 failed$", printed, re.MULTILINE)
 
 
-@pytest.mark.parametrize("length", [1 << 31, 1 << 40, (1 << 64) - 1, 300_000], ids=["2 GB", "1 TB", "2^64", "300 kB"])
+@pytest.mark.parametrize("length", [1 << 31, (1 << 64) - 1, 300_000], ids=["2 GB", "2^64", "300 kB"])
 @pytest.mark.parametrize("summary", [True, False], ids=["summary", "no summary"])
 def test_chunk_with_an_excessive_length_is_noted_and_uses_no_memory(bag: Path, length: int, summary: bool) -> None:
     """With this length the rest of the file would be one chunk; reading continues at the next one."""
@@ -169,12 +168,12 @@ print(most() - before)
 def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:
-    path, chunk, rng = tmp_path / "noise.mcap", 1 << 24, Random(0)
+    path, chunk, rng = tmp_path / "noise.mcap", 1 << 23, Random(0)
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk, compression=compression)
         writer.start(profile="ros2")
         channel = writer.register_channel("/noise", "cdr", writer.register_schema(POSE, "ros2msg", b""))
-        for step in range(10_000):
+        for step in range(6000):
             writer.add_message(channel, START + step, rng.randbytes(noise) + bytes(4000 - noise), 0)
         writer.finish()
     grown = subprocess.run([sys.executable, "-c", HELD, bag, path], check=True, cwd=REPOSITORY, capture_output=True)
@@ -340,7 +339,7 @@ def test_commands_on_damaged_bags_exit_with_0_or_1_and_one_line(bag: Path, capsy
     model = str(REPOSITORY / "resource" / "simulated_square_abs.pushmodel")
     for content in (data[:40_000], data[:100], b"", b"x", data[:30_000] + bytes(9000) + data[39_000:]):
         bag.write_bytes(content)
-        validate = [["validate", model, str(bag)]] if len(content) not in (100, 1) else []
+        validate = [["validate", model, str(bag)]] if len(content) in (0, 40_000) else []
         for command in (["info", str(bag)], *validate):
             status = main(command)
             out, err = capsys.readouterr()
@@ -348,11 +347,3 @@ def test_commands_on_damaged_bags_exit_with_0_or_1_and_one_line(bag: Path, capsy
             assert (status, len(lines)) in ((0, 0), (1, 1)), err
             if command[0] == "info" and len(content) > 1000:
                 assert status == 0 and "bag.mcap at byte" in out
-
-
-def test_replay_plays_intact_messages(bag: Path) -> None:
-    bag.write_bytes(bag.read_bytes()[:20_000])
-    params = {"recording": bag, "play.rate": 20.0, "wait_for_subscribers": 0.0}
-    with hosted_node("push_replay", domain=free_domain(), params=params) as replay:
-        text = replay.wait_for_text("finished: published")
-    assert "Traceback" not in text and "damaged" in text

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import pytest
 from drifting_models import pushes
-from server_bench import GOOD, hosted_server_of
 from synthetic import square_rig
 
 from benchmarks.models.damaged_models import KINDS, damage, equal, predict_probes, undamaged_bytes, write_models
@@ -82,15 +81,6 @@ def test_rejects_array_with_a_smaller_declared_size(tmp_path: Path) -> None:
     path.write_bytes(data[:at] + b"4" + data[at + 1 :])
     with pytest.raises(ModelFileError, match=r"m\.model: .*Bad CRC-32 for file 'training.outcomes.npy'"):
         load_model(path)
-
-
-def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_path: Path) -> None:
-    whole = files["gp"].read_bytes()
-    (tmp_path / "good.model").write_bytes(whole)
-    (tmp_path / "half.model").write_bytes(whole[: len(whole) // 2])
-    registry = ModelRegistry()
-    (problem,) = registry.load_all([str(tmp_path)])
-    assert str(tmp_path / "half.model") in problem and registry.names == ["gp"]
 
 
 # --- code ---------------------------------------------------------------------------------------------------------
@@ -209,23 +199,6 @@ def test_unusable_path_is_reported_and_blocks_nothing(
 
 
 # --- under a running server ---------------------------------------------------------------------------------------
-
-
-def test_overwritten_file_has_no_effect_until_it_is_loaded_completely(files: dict[str, Path], tmp_path: Path) -> None:
-    path, new = tmp_path / "served.model", files["analytical"].read_bytes()
-    path.write_bytes(files["gp"].read_bytes())
-    with hosted_server_of([path]) as server:
-        before = list(server.push().mean)
-        for written in (0, 40, len(new) // 2, len(new) - 1):  # in place, as an unfinished copy
-            path.write_bytes(new[:written])
-            assert list(server.push().mean) == before
-            refused = server.load(path, name="gp")
-            assert not refused.success and refused.message.startswith(f"{path}: "), refused.message
-            assert list(server.push(GOOD).mean) == before
-        path.write_bytes(new)
-        assert list(server.push().mean) == before
-        assert server.load(path, name="gp").success
-        assert list(server.push().mean) != before
 
 
 def arrays_of(path: Path) -> dict[str, np.ndarray]:

@@ -21,7 +21,6 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-import ros_harness
 from diagnostic_msgs.msg import DiagnosticArray
 from hosted_nodes import hosted_node, refused_start
 from lifecycle_msgs.msg import Transition
@@ -44,51 +43,33 @@ NODES = {
     "push_replay": "push_replay",
     "push_validator": "push_validator",
 }
-BAG = REPOSITORY / "bags" / "square_abs_test"
 
 
 # --- security that the middleware does not have ----------------------------------------------------------------------
 
 
-def refused(executable: str, **environment: str) -> str:
-    """The one line on stderr of a node that ends with status 1."""
-    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}"]
-    parameters = ["--ros-args", "-p", f"recording:={BAG}"] if executable == "push_replay" else []
-    done = subprocess.run(
-        [*command, *parameters],
-        env={**node_environment(free_domain()), **environment},
-        cwd=REPOSITORY,
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-    )
-    assert (done.returncode, done.stdout) == (1, ""), done.stderr
-    assert done.stderr.count("\n") == 1 and done.stderr.startswith(f"{executable}: "), done.stderr
-    return done.stderr
-
-
-ENFORCED = {"ROS_SECURITY_STRATEGY": "Enforce", "ROS_SECURITY_KEYSTORE": str(REPOSITORY)}
+ENFORCED = {"STRATEGY": "Enforce", "KEYSTORE": str(REPOSITORY)}
 MAIN = {"predict_server": predict_server.main, "push_validator": push_validator.main}
 
 
-def test_a_node_refuses_to_start_without_the_requested_security():
-    text = refused("push_replay", ROS_SECURITY_ENABLE="true", **ENFORCED)
-    assert "built with DDS security" in text and "ROS_SECURITY_ENABLE=true" in text
-
-
 @pytest.mark.parametrize(
-    ("executable", "value", "words"),
+    ("executable", "environment", "words"),
     [
-        ("predict_server", "true", ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
-        ("push_validator", "true", ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
-        ("push_validator", "True", ["ROS_SECURITY_ENABLE=True does not enable security"]),
+        ("predict_server", {**ENFORCED, "ENABLE": "true"}, ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
+        ("push_validator", {"ENABLE": "true"}, ["built with DDS security", "ROS_SECURITY_ENABLE=true"]),
+        ("push_validator", {"ENABLE": "True"}, ["ROS_SECURITY_ENABLE=True does not enable security"]),
     ],
 )
-def test_security_that_is_not_enforced_is_refused_too(
-    executable: str, value: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+def test_a_node_refuses_to_start_without_the_requested_security_also_if_it_is_not_enforced(
+    executable: str,
+    environment: Mapping[str, str],
+    words: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ):
     """rcl alone would start an unprotected node without a warning: it enforces nothing, and accepts only `true`."""
-    monkeypatch.setenv("ROS_SECURITY_ENABLE", value)
+    for name, value in environment.items():
+        monkeypatch.setenv(f"ROS_SECURITY_{name}", value)
     line = refused_start(MAIN[executable], monkeypatch, capfd)
     assert line.startswith(f"{executable}: ") and all(word in line for word in words), line
 
@@ -140,10 +121,11 @@ def two_machines() -> Iterator[tuple[str, str]]:
 LOOK = """
 import sys, time, rclpy
 rclpy.init()
-node, end = rclpy.create_node("visitor"), time.monotonic() + float(sys.argv[1])
-while time.monotonic() < end and "push_validator" not in node.get_node_names():
+node, end = rclpy.create_node("visitor"), time.monotonic() + 25.0
+while time.monotonic() < end and "open" not in node.get_node_names():
     time.sleep(0.05)
-print("push_validator" in node.get_node_names())
+time.sleep(3.0)
+print(*node.get_node_names())
 """
 
 
@@ -158,27 +140,23 @@ def on(machine: str, environment: Mapping[str, str], *command: str, **how: Any) 
 DOMAIN = 57  # these machines have no other nodes
 
 
-def finds(machine: str, patience: float) -> bool:
-    """Whether a node on this machine, with ROS's default range, discovers the validator."""
-    visitor = on(machine, {}, sys.executable, "-c", LOOK, str(patience), stdout=subprocess.PIPE)
-    out, _ = visitor.communicate(timeout=60.0)
-    return "True" in out
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("asked", [{}, {RANGE: "SUBNET"}], ids=["as it is", "asked for the network"])
-def test_another_machine_discovers_a_node_only_on_request(asked: Mapping[str, str], tmp_path: Path):
-    log = tmp_path / "log"
-    with two_machines() as (here, there), log.open("w") as output:
-        command = (sys.executable, "-m", "push_predictor.nodes.push_validator")
-        node = on(here, asked, *command, stdout=output, stderr=output)
-        try:
-            assert wait_until(lambda: "Waiting for" in log.read_text()), log.read_text()
-            assert finds(there, 25.0 if asked else 3.0) == bool(asked)
-        finally:
-            node.terminate()
-            node.wait(30.0)
-    assert ("Other machines cannot discover this node" in log.read_text()) == (not asked)
+def test_another_machine_discovers_a_node_only_on_request(tmp_path: Path):
+    """The visitor has ROS's default range. It would discover both nodes at the same time."""
+    logs = {"push_validator": tmp_path / "closed", "open": tmp_path / "open"}
+    with two_machines() as (here, there), ExitStack() as stack:
+        for name, log in logs.items():
+            output = stack.enter_context(log.open("w"))
+            module = (sys.executable, "-m", "push_predictor.nodes.push_validator", "--ros-args", "-r")
+            asked = {RANGE: "SUBNET"} if name == "open" else {}
+            node = on(here, asked, *module, f"__node:={name}", stdout=output, stderr=output)
+            stack.callback(node.wait, 30.0)
+            stack.callback(node.terminate)
+        assert wait_until(lambda: all("Waiting for" in log.read_text() for log in logs.values()))
+        visitor = on(there, {}, sys.executable, "-c", LOOK, stdout=subprocess.PIPE)
+        assert {*visitor.communicate(timeout=60.0)[0].split()} == {"visitor", "open"}
+    limited = ["Other machines cannot discover this node" in log.read_text() for log in logs.values()]
+    assert limited == [True, False]
 
 
 # --- health and policy: four nodes, /clock standing still ------------------------------------------------------------
@@ -242,12 +220,6 @@ def assert_every_second(graph: Graph, node: str, state: str) -> None:
     assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 5, 60.0), graph.listener.reports
     gaps = np.diff(graph.listener.in_state(node, state)[1:5])
     assert 0.75 < np.median(gaps) < 1.75, gaps
-
-
-def test_an_idle_node_reports_its_health_every_second(graph: Graph):
-    assert_every_second(graph, "push_predictor", "unconfigured")
-    assert_every_second(graph, "push_validator", "waiting for samples")
-    assert_every_second(graph, "push_replay", "paused")
 
 
 RULES = {
@@ -319,11 +291,9 @@ def tf_is_there() -> bool:
     return subprocess.run([sys.executable, "-c", "import tf2_ros"], capture_output=True).returncode == 0
 
 
-def test_nodes_report_their_health_in_other_states_too(graph: Graph):
+def test_nodes_report_their_health_every_second_in_every_state(graph: Graph):
+    """The fixture has waited for those of the states in which the nodes begin."""
     assert call(graph.node.create_client(Resume, "/push_replay/resume"), Resume.Request()) is not None
     assert_every_second(graph, "push_predictor", "inactive")
     assert_every_second(graph, "push_replay", "finished")
-
-
-def test_the_test_harness_limits_discovery_to_this_machine():
-    assert ros_harness.node_environment(1)[RANGE] == "LOCALHOST"
+    assert_every_second(graph, "push_validator", "waiting for samples")

@@ -52,36 +52,19 @@ def with_slider(recording: Recording, order: np.ndarray) -> Recording:
     return replace(recording, slider=rows(recording.slider, order))
 
 
-def altered(recording: Recording, sample: int, **values: float) -> Recording:
-    """The recording with one sample of the slider changed."""
-    columns = {name: getattr(recording.slider, name).copy() for name in values}
-    for name, value in values.items():
-        columns[name][sample] = value
-    return replace(recording, slider=replace(recording.slider, **columns))
-
-
-def elsewhere(recording: Recording) -> Recording:
-    """Slider and tip are moved 0.1 m to the side during a push."""
-    late = np.arange(len(recording.slider)) > 110
-    slider, pusher = (replace(s, x=s.x + 0.1 * late) for s in (recording.slider, recording.pusher))
-    return replace(recording, slider=slider, pusher=pusher)
-
-
 def day() -> list[Recording]:
     """The recordings that the sensors publish, one push each; at last the time jumps back to the beginning."""
     n = np.arange(len(clean(0.0).slider))
-    future = clean(30.0)
-    stamp = future.slider.stamp.copy()
+    future = clean(20.0)
+    stamp, x, y = future.slider.stamp.copy(), future.slider.x.copy(), future.slider.y.copy()
     stamp[100] += DAY
+    x[110], y[110] = 0.3, -0.2  # there and back
+    x[120] = np.nan
     return [
         clean(0.0),
-        with_slider(clean(10.0), np.r_[n[:90], n[91:100], 90, n[100:]]),  # late
-        with_slider(clean(20.0), np.r_[n[:100], n[97:100], n[100:]]),  # three twice
-        replace(future, slider=replace(future.slider, stamp=stamp)),
-        with_slider(clean(40.0), np.r_[n[:100], n[130:]]),  # a dropout
-        altered(clean(50.0), 100, x=0.3, y=-0.2),  # there and back
-        altered(clean(60.0), 100, x=np.nan),
-        elsewhere(clean(70.0)),
+        # One late, three twice, and a dropout:
+        with_slider(clean(10.0), np.r_[n[:50], n[51:60], 50, n[60:80], n[77:80], n[80:100], n[130:]]),
+        replace(future, slider=replace(future.slider, stamp=stamp, x=x, y=y)),
         clean(0.0),
     ]
 
@@ -163,12 +146,10 @@ def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> N
         assert values["contact from"] == "geometry and force"
         expected = {"late": 1, "repeated": 3, "ahead": 1, "jumps": 1}
         assert {kind: int(values[f"slider {kind}"]) for kind in expected} == expected
-        assert {kind: int(values[f"streams {kind}"]) for kind in expected} == {**expected, "jumps": 2}, (
-            "also of the tip"
-        )
+        assert {kind: int(values[f"streams {kind}"]) for kind in expected} == expected
         assert values["slider rejected not finite"] == "1"
-        assert values["streams resets"] == "8"  # one during a push, and one between each two pushes
-        assert int(values["slider dropouts"]) >= 1 + 7  # and one between each two pushes, which lie 10 s apart
+        assert values["streams resets"] == "2"  # between each two pushes
+        assert int(values["slider dropouts"]) >= 1 + 2  # and one between each two pushes, which lie 10 s apart
         assert "1 samples with a stamp ahead" in status.message
         silent = "No sample from the wrench for 2 s"
         # The force sensor stops, the others continue.
@@ -176,7 +157,7 @@ def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> N
         status.wait_for_message(silent)
         assert process.stop() == 0, process.text()
     table = read_table(out / "pushes.csv")
-    assert len(expected_rows) > 30 and len(table) == len(expected_rows)
+    assert len(expected_rows) > 12 and len(table) == len(expected_rows)
     assert table.inputs == pytest.approx(expected_rows.inputs, abs=1e-9)
     assert table.outcomes == pytest.approx(expected_rows.outcomes, abs=1e-9)
     assert table.outcomes == pytest.approx(np.tile([0.004, 0.0, 0.0], (len(table), 1)), abs=1e-9), (

@@ -17,7 +17,6 @@ from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Vecto
 from std_msgs.msg import Header
 from synthetic import square_pushes
 
-from msg_adapters.predictions import refuse
 from push_predictor import errors
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import FrameError, PushPredictorError, RequestError
@@ -244,12 +243,6 @@ def test_a_rollout_takes_covariates_for_each_step_or_for_all(registry: ModelRegi
     assert after(900.0, 0.0)[1] != after(900.0)[1]
 
 
-def test_a_refusal_carries_message_and_code() -> None:
-    response = refuse(PredictPush.Response(success=True, mean=[1.0, 1.0, 1.0]), "why", ErrorCode.NO_PREDICTION)
-    assert (response.success, response.message) == (False, "why") and not response.mean.any()
-    assert response.error_code == PredictPush.Response.NO_PREDICTION
-
-
 def test_every_error_of_the_package_has_a_code() -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, PushPredictorError)]
     for kind in kinds:
@@ -257,8 +250,3 @@ def test_every_error_of_the_package_has_a_code() -> None:
         assert error_code(one) not in (ErrorCode.NONE, ErrorCode.INTERNAL_ERROR)
     assert error_code(ValueError("why")) is ErrorCode.INTERNAL_ERROR
     assert error_code(PermissionError("why")) is ErrorCode.INVALID_FILE
-
-
-def test_a_nested_field_keeps_the_code_of_its_error(registry: ModelRegistry) -> None:
-    with pytest.raises(errors.CovariateError, match=r"steps\[0\]\.covariate elapsed_time: 'missing'"):
-        HANDLERS[RolloutPushes](registry, steps({}, model="drifting"), RolloutPushes.Response())

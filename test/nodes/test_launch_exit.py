@@ -47,10 +47,6 @@ def test_a_switch_is_true_or_false(file: Path, count: int, monkeypatch: pytest.M
     assert all("Node" in {type(action).__name__ for action in run(file, monkeypatch, word)} for word in words)
 
 
-def test_rviz_is_a_dependency_of_the_package() -> None:
-    assert "<exec_depend>rviz2</exec_depend>" in (REPOSITORY / "package.xml").read_text()
-
-
 # --- the end of a node -----------------------------------------------------------------------------------------------
 
 

@@ -193,8 +193,3 @@ def test_the_recorder_gets_what_was_given_and_nothing_else(record_file):
     assert values["force"] is True and all(table[name].allows(value) for name, value in values.items())
     plain = nodes(record_file, params_file="/p.yaml")["push_recorder"]
     assert plain["parameters"] == ["/p.yaml", {}]
-
-
-def test_launch_file_is_installed():
-    assert 'glob("launch/*.launch.py")' in (REPOSITORY / "setup.py").read_text()
-    assert 'glob("config/*")' in (REPOSITORY / "setup.py").read_text()

@@ -34,7 +34,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.server import services
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
-from push_predictor.planning.persistence import Persistence, root_of
+from push_predictor.planning.persistence import Persistence
 from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
@@ -108,28 +108,6 @@ def test_responses_equal_the_models_predictions(server, folder, kind):
         for name in ("mean", "covariance", "process_covariance", "in_domain"):
             np.testing.assert_allclose(getattr(answered, name), getattr(expected, name), rtol=1e-12, atol=1e-18)
             np.testing.assert_allclose(getattr(single, name)[0], getattr(expected, name)[k], rtol=1e-8, atol=1e-14)
-
-
-def test_empty_name_means_the_default_model(server):
-    assert list(server.push().mean) == list(server.push(model="gp").mean)
-    assert list(server.push().mean) != list(server.push(model="analytical").mean)
-
-
-def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch):
-    """By the correlation at the length of one window. Both covariances shrink with it."""
-    persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
-    monkeypatch.setattr(services, "persistence_of", lambda model: persistence)
-    registry = ModelRegistry()
-    registry.load(folder / "gp.model")
-    residual = np.array([2e-5, -1e-5, 3e-4])
-    plain, moved = (answered(registry, one) for one in (None, residual))
-    correlation = persistence.correlation(np.array([GOOD[0] * 0.2]))[0]
-    root = root_of(plain.covariance)[0]
-    shift = root @ (correlation * np.linalg.solve(root, residual))
-    np.testing.assert_allclose(moved.mean[0] - plain.mean[0], shift, rtol=1e-6, atol=1e-15)
-    for name in ("covariance", "process_covariance"):
-        shrunk = root_of(getattr(plain, name))[0] * np.sqrt(1.0 - correlation**2)
-        np.testing.assert_allclose(getattr(moved, name)[0], shrunk @ shrunk.T, rtol=1e-6, atol=1e-18)
 
 
 def test_residuals_of_several_windows_count_by_their_distance(folder, monkeypatch):
@@ -282,7 +260,7 @@ def test_folder_is_loaded_and_its_damaged_file_is_reported(folder, tmp_path):
 
 def test_node_without_a_model_reports_it_and_accepts_one_later(folder):
     with hosted_server_of([folder / "damaged.model"]) as server:
-        assert server.state() == "inactive"
+        assert server.state() == "inactive" and not server.change(Transition.TRANSITION_ACTIVATE)
         refusal = server.push()
         assert not refusal.success
         assert "no model is loaded" in refusal.message
@@ -299,8 +277,14 @@ def test_only_a_good_file_replaces_a_loaded_model(folder, tmp_path):
     save_model(train_model(table, rig, "analytical", name="gp"), tmp_path / "other.model")
     foreign = tmp_path / "notes.txt"
     foreign.write_text("not a model\n")
-    with hosted_server_of([folder / "gp.model"]) as server:
+    served, new = tmp_path / "served.model", (tmp_path / "other.model").read_bytes()
+    served.write_bytes((folder / "gp.model").read_bytes())
+    with hosted_server_of([served], default_model="gp") as server:
         before = list(server.push().mean)
+        for written in (0, len(new) // 2, len(new) - 1):  # in place, as an unfinished copy
+            served.write_bytes(new[:written])
+            assert list(server.push().mean) == before and not server.load(served, name="gp").success
+        served.write_bytes(new)
         for bad in (folder / "damaged.model", foreign, tmp_path / "absent", tmp_path, ""):
             response = server.load(bad, name="gp")
             assert not response.success
@@ -325,9 +309,15 @@ def test_pushes_are_answered_while_their_model_is_replaced(folder):
             assert loading.result().success
 
 
-def test_loaded_model_can_become_the_default(folder):
-    with hosted_server_of([folder / "gp.model"]) as server:
+def test_a_missing_default_is_not_replaced_and_a_loaded_model_can_become_the_default(folder):
+    with hosted_server_of([folder / "gp.model"], default_model="newer") as server:
+        refused = server.push()
+        assert not refused.success
+        assert refused.message == "default_model: 'newer' is not accepted, give one of gp"
+        assert server.next_status()[0].level == b"\1"
+        assert server.set("default_model", "gp").successful
         first = list(server.push().mean)
+        assert first == list(server.push(model="gp").mean)
         assert server.load(folder / "vhgp.model", name="new").name == "new"
         assert server.list().default_model == "gp"
         assert list(server.push().mean) == first
@@ -336,17 +326,6 @@ def test_loaded_model_can_become_the_default(folder):
         assert list(server.push().mean) == list(server.push(model="new").mean) != first
         assert server.set("default_model", "gp").successful
         assert list(server.push().mean) == first
-
-
-def test_missing_default_model_is_not_replaced_by_another(folder):
-    with hosted_server_of([folder / "gp.model"], default_model="vhgp") as server:
-        response = server.push()
-        assert not response.success
-        assert response.message == "default_model: 'vhgp' is not accepted, give one of gp"
-        assert server.push(model="gp").success
-        assert server.next_status()[0].level == b"\1"
-        assert server.load(folder / "vhgp.model").success
-        assert server.push().success
 
 
 # --- life cycle, parameters, diagnostics ------------------------------------------------------------------------
@@ -413,20 +392,6 @@ def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder,
         rclpy.try_shutdown()
 
 
-def test_activation_fails_without_a_model():
-    with hosted_server_of([""], autostart=False) as server:
-        assert server.change(Transition.TRANSITION_CONFIGURE)
-        assert not server.change(Transition.TRANSITION_ACTIVATE)
-        assert server.state() == "inactive"
-
-
-def test_default_loads_the_shipped_model_and_warns_that_it_is_simulated():
-    with hosted_server_of(["default"]) as server:
-        assert list(server.list().names) == ["simulated_square_abs"]
-        assert server.push().success
-        assert "simulated square" in server.process.text()
-
-
 def test_what_is_read_only_or_no_model_is_refused_with_a_reason(server):
     for name, value in {"models": ["elsewhere"], "diagnostics_period": 5.0}.items():
         result = server.set(name, value)
@@ -481,13 +446,14 @@ def test_introspection_publishes_requests_when_enabled(server):
     assert not events
 
 
-def test_names_follow_the_namespace_with_the_shipped_configuration(folder):
+def test_the_shipped_configuration_in_a_namespace_serves_the_shipped_model_and_warns_that_it_is_simulated():
     domain = harness.free_domain()
-    arguments = ("--params-file", str(CONFIG), "-p", f"models:=['{folder / 'gp.model'}']")
+    arguments = ("--params-file", str(CONFIG), "-p", "models:=['default']")
     running = hosted_node("predict_server", *arguments, domain=domain, namespace="/cell1")
-    with running, harness.ros_context(domain) as node:
+    with running as process, harness.ros_context(domain) as node:
         client = node.create_client(PredictPush, "/cell1/predict_push")
-        assert harness.call(client, query_to_request("", GOOD, 0.2)).success
+        assert harness.call(client, query_to_request("simulated_square_abs", GOOD, 0.2)).success
+        assert "simulated square" in process.text()
 
 
 def memory_kb(process) -> int:

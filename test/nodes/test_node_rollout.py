@@ -125,11 +125,6 @@ def test_message_reports_samples_that_leave_the_domain(ask: Ask) -> None:
     assert response.message.startswith(expected)
 
 
-def test_duration_zero_of_a_step_means_the_models_own_window(ask: Ask) -> None:
-    zero, own = (ask(steps=[[0.02, 0.1, 0.1, duration], STEPS[1]]) for duration in (0.0, 0.2))
-    assert zero.success and zero.poses == own.poses
-
-
 @pytest.mark.parametrize("quaternion", [vertical_turn(0.7), np.array([0.6, 0.8, 0.0, 0.0])], ids=["turned", "below"])
 def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quaternion: Array) -> None:
     """A request in another frame, such as that of a camera below the table, gets the same outcome in that frame."""

@@ -24,7 +24,7 @@ from replay_bags import WRENCH, stamped, write_bag
 from ros_harness import free_domain, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, Temperature
-from std_msgs.msg import Float32, Float64, Float64MultiArray, String
+from std_msgs.msg import Float32, Float64, String
 from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator
 
 from push_predictor.errors import RequestError
@@ -42,7 +42,6 @@ from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.simulation.rig_simulator import Sensors, SimulationSpec, random_pushes, simulate
 
 pytestmark = pytest.mark.slow
@@ -145,13 +144,6 @@ def test_windows_have_the_scalar_values_of_reading_the_recording(watched: Watche
         found, expected = online.covariates[f"topic:{topic}"], offline.covariates[f"topic:{topic}"]
         assert np.ptp(expected) > 0.1
         assert np.max(np.abs(found - expected)) < 1e-9, topic
-
-
-def test_a_trace_gets_the_scalar_values(watched: Watched, recording: Path) -> None:
-    online, offline = load_evidence([watched.output / "pushes.csv"]), load_evidence([recording])
-    assert not online.dropped and set(offline.table.covariates) <= {*online.table.covariates}
-    for name, column in offline.table.covariates.items():
-        assert np.allclose(online.table.covariates[name], column, rtol=0.0, atol=1e-9), name
 
 
 def test_a_model_that_needs_a_topic_scores_as_offline(watched: Watched, model: Path, recording: Path) -> None:
@@ -296,17 +288,6 @@ def test_a_field_of_any_type_is_a_scalar(listener: Node, talker: Node) -> None:
     with offered(talker, JointState, QoSProfile(depth=10)) as publisher:
         assert gathered.has(publishing(publisher, message, 1.5))
         assert {*gathered.value} == {1.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problems()
-
-
-def test_a_field_without_a_header_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
-    subscriber = Subscriber(listener, "warmth.data[0]")
-    publisher = talker.create_publisher(Float64MultiArray, "warmth", kept())
-    begin = talker.get_clock().now().nanoseconds
-    publisher.publish(Float64MultiArray(data=[1.0, 2.0]))
-    end = talker.get_clock().now().nanoseconds
-    gathered = Gathered(subscriber, "/warmth.data[0]")
-    assert gathered.has(lambda so_far: bool(so_far.value))
-    assert gathered.value == [1.0] and begin <= gathered.stamp[0] <= end
 
 
 def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:

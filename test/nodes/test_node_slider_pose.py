@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -32,15 +31,12 @@ PUSH = WorldPush(np.array([0.3, 0.1, 0.0]), np.array([0.25025, 0.11]), np.array(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A learned and an analytical model of the square."""
+    """A learned model of the square."""
     place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
     table, rig = square_pushes(60)
     shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs are correlated
     table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
-    for kind in ("gp", "analytical"):
-        save_model(
-            train_model(table, rig, kind, name=kind, options=TrainingOptions(mean="zero")), place / f"{kind}.model"
-        )
+    save_model(train_model(table, rig, "gp", name="gp", options=TrainingOptions(mean="zero")), place / "gp.model")
     return place
 
 
@@ -72,10 +68,9 @@ def filled(message: Any, values: dict[str, Any]) -> Any:
     return message
 
 
-@pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_response_equals_the_librarys_prediction(ask: Any, folder: Path, kind: str) -> None:
-    response = ask(model=kind)
-    expected = slider_after(tabulate(load_model(folder / f"{kind}.model")), PUSH)
+def test_response_equals_the_librarys_prediction(ask: Any, folder: Path) -> None:
+    response = ask(model="gp")
+    expected = slider_after(tabulate(load_model(folder / "gp.model")), PUSH)
     assert response.success, response.message
     assert response.in_domain == expected.in_domain
     pose = response.slider_after.pose
@@ -91,18 +86,6 @@ def test_example_is_in_the_domain_and_moves_the_slider(ask: Any) -> None:
     response = ask()
     assert response.in_domain
     assert 0.002 < response.slider_after.pose.pose.position.x - 0.3 < 0.006
-
-
-def test_response_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
-    header = {"frame_id": "world", "stamp": {"sec": 7, "nanosec": 900_000_000}}
-    stamp = ask(header=header).slider_after.header.stamp
-    assert (stamp.sec, stamp.nanosec) == (8, 100_000_000)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2_ros is installed here")
-def test_refusal_states_that_tf_is_missing(ask: Any) -> None:
-    expected = "header.frame_id: 'map' is not accepted, give 'world'; tf2_ros is not installed"
-    assert ask(header={"frame_id": "map"}).message == expected
 
 
 def test_world_frame_has_the_name_from_the_parameter(folder: Path) -> None:

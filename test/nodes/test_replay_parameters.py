@@ -15,6 +15,7 @@ from replay_bags import push_messages, write_bag
 
 from push_predictor.nodes import runtime
 from push_predictor.nodes.push_replay import PushReplay
+from push_predictor.nodes.replay.topics import is_played
 
 
 @pytest.fixture(scope="module")
@@ -42,3 +43,22 @@ def test_bad_parameter_ends_in_one_line_and_status_1(
     given = {"recording": second, **params} if params else {}
     line = refused_start(partial(runtime.run, "push_replay", PushReplay), monkeypatch, capfd, **given)
     assert line.startswith("push_replay: ") and text in line
+
+
+@pytest.mark.parametrize(
+    ("given", "played"),
+    [
+        ({}, "slider pusher wrench"),
+        ({"exclude_regex_to_filter": ".*pose"}, "wrench"),
+        ({"exclude_topics_to_filter": ["slider/pose"]}, "pusher wrench"),
+        ({"topics_to_filter": ["/slider/pose"], "regex_to_filter": ".*wrench"}, "slider wrench"),
+        ({"topics_to_filter": ["/slider/pose"], "exclude_regex_to_filter": ".*slider.*"}, ""),
+        ({"regex_to_filter": "wrench"}, ""),
+    ],
+)
+def test_topics_are_filtered_as_rosbag2_does(given: dict[str, Any], played: str) -> None:
+    none: dict[str, Any] = {"regex_to_filter": "", "topics_to_filter": []}
+    none |= {f"exclude_{name}": value for name, value in none.items()}
+    values = {f"play.{name}": value for name, value in {**none, **given}.items()}
+    topics = {"slider": "/slider/pose", "pusher": "/pusher/pose", "wrench": "/pusher/wrench"}
+    assert [name for name, topic in topics.items() if is_played(topic, values)] == played.split()

@@ -328,13 +328,6 @@ def test_the_static_topic_of_tf_may_lose_its_publisher(tmp_path: Path) -> None:
     assert not any("publisher of /tf_static" in text for text in problems(recording, 1.0))
 
 
-def test_the_summary_has_one_reason_for_a_silent_topic(tmp_path: Path) -> None:
-    recording = recorder(tmp_path / "a")
-    recording.note("/pusher/pose", "/pusher/pose is not recorded: type x is not installed.")
-    found = [text for text in recording.close(1.0).problems.values() if "/pusher/pose" in text]
-    assert found == ["/pusher/pose is not recorded: type x is not installed."]
-
-
 def test_lost_messages_are_counted(messages: list[RawMessage], tmp_path: Path) -> None:
     recording = recorder(tmp_path / "a")
     feed(recording, messages[:9])
@@ -371,24 +364,6 @@ def test_a_type_without_installed_definition_is_recorded_and_named(tmp_path: Pat
 
 
 # --- other types -----------------------------------------------------------------------------------------------------
-
-
-def test_windows_are_found_in_fields_and_in_frames_of_tf(tmp_path: Path) -> None:
-    whole = short_recording()
-    assert whole.rig is not None
-    lab = Lab()
-    lab.pose("/odometry", "nav_msgs/msg/Odometry", whole.slider, "pose.pose")
-    lab.transform("/tf", "table", "tool0", whole.pusher.stamp, pose_rows(whole.pusher))
-    lab.transform("/tf_static", "world", "table", [int(whole.pusher.stamp[0])], [[0.0, 0, 0, 0, 0, 0, 1]])
-    recording = recorder(tmp_path / "a", Topics("/odometry.pose.pose", "/tf:tool0"), with_wrench=False)
-    recording.set_rig(whole.rig)
-    now = feed(recording, [RawMessage(topic, lab.kinds[topic], t, data) for t, topic, data in lab.in_order()])
-    summary = recording.close(now)
-    windows = find_windows(read_recording(tmp_path / "a"), whole.rig)
-    assert len(windows) > 5 and summary.windows == len(windows)
-    assert {each.name: each.samples for each in summary.streams}["pusher"] == len(whole.pusher)
-    assert load_topics(tmp_path / "a") == Topics("/odometry.pose.pose", "/tf:tool0")
-    assert not any("tool0" in text for text in summary.problems.values())
 
 
 def test_an_unknown_frame_is_named_with_the_known_ones(tmp_path: Path) -> None:

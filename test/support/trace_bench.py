@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -33,7 +32,6 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.srv import LoadModel, PredictPush
 
-STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
 DRIVERS = ["elapsed_time"]
 RIG = "pushes.rig.yaml"
 
@@ -81,20 +79,11 @@ class Server:
         children = [int(pid) for task in tasks for pid in task.read_text().split()]
         return [pid for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
 
-    def held(self, goal: Goal, stage: str = "") -> int:
-        """The process of a trace at work, stopped: it does not end by itself, however long the test takes.
-
-        stage: that it has reached, a little at a time; by default it has only started, which takes little processor
-        time.
-        """
+    def held(self) -> int:
+        """The process of a trace that has started, stopped: it does not end by itself, however long the test takes."""
         assert harness.wait_until(lambda: bool(self.workers()))
         (worker,) = self.workers()
         os.kill(worker, signal.SIGSTOP)
-        while stage and not goal.reached(stage, 0.1):
-            assert not goal.ended, goal.stages
-            os.kill(worker, signal.SIGCONT)
-            time.sleep(0.5)
-            os.kill(worker, signal.SIGSTOP)
         return worker
 
 
@@ -104,9 +93,6 @@ class Goal(ActionGoal):
     @property
     def stages(self) -> list[tuple[str, float]]:
         return [(each.stage, each.progress) for each in self.feedback]
-
-    def reached(self, stage: str, patience: float) -> bool:
-        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), patience)
 
 
 @contextlib.contextmanager
