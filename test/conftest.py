@@ -48,7 +48,7 @@ LONGEST = {  # files that take six seconds of processor time or more, or that wa
 }  # fmt: skip
 
 
-DRAWN_AS_FOR_READERS = {"test_canvas", "test_paper_report"}
+DRAWN_AS_FOR_READERS = {"test_canvas", "test_paper_divergence", "test_paper_report"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
