@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from geometry_msgs.msg import Point
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -26,7 +27,9 @@ from rclpy.qos import (
 )
 from ros_harness import REPOSITORY, free_domain, ros_context, wait_until
 from validator_bench import hosting_replay, hosting_validator
+from visualization_msgs.msg import Marker
 
+from docs.pictures.draw_rviz import as_fields, translated
 from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.validator.publishers import window_markers
 from push_predictor.recordings.read import read_recording
@@ -113,6 +116,27 @@ def test_rviz_has_places_for_its_panels():
     state = bytes.fromhex(RVIZ["Window Geometry"]["QMainWindow State"])
     for panel in RVIZ["Panels"]:
         assert panel["Name"].encode("utf-16-be") in state
+
+
+def test_the_translation_for_rviz_1_keeps_all_but_what_only_ros_2_has():
+    plain = translated(RVIZ)["Visualization Manager"]
+    assert "Transformation" in RVIZ["Visualization Manager"] and "Transformation" not in plain
+    assert [display["Name"] for display in plain["Displays"]] == [
+        display["Name"] for display in RVIZ["Visualization Manager"]["Displays"]
+    ]
+    topics = {display.get("Marker Topic", display.get("Topic")) for display in plain["Displays"]} - {None}
+    assert topics == {"/" + display["Topic"]["Value"] for display in displays()}
+    classes = {display["Class"] for display in plain["Displays"]} | {plain["Views"]["Current"]["Class"]}
+    assert classes == {"rviz/Grid", "rviz/MarkerArray", "rviz/Pose", "rviz/WrenchStamped", "rviz/TopDownOrtho"}
+
+
+def test_messages_for_ros_1_have_its_names_of_times_and_plain_values():
+    marker = Marker(ns="push", id=3, points=[Point(x=0.1, z=-0.2)])
+    marker.header.stamp.sec, marker.header.stamp.nanosec, marker.color.a = 4, 5, 0.5
+    fields = as_fields(marker)
+    assert fields["header"]["stamp"] == {"secs": 4, "nsecs": 5} and fields["lifetime"] == {"secs": 0, "nsecs": 0}
+    assert (fields["ns"], fields["id"], fields["color"]["a"]) == ("push", 3, 0.5)
+    assert fields["points"] == [{"x": 0.1, "y": 0.0, "z": -0.2}] and json.dumps(fields)
 
 
 def test_the_document_explains_each_marker():
