@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from push_predictor.types import IntArray
 
 PORTION = 20_000  # single messages that are gathered
-Dated: TypeAlias = tuple[tuple[str, str], int, bytes]  # topic and type, log time in ns, CDR
 
 
 class RawMessage(NamedTuple):
@@ -61,13 +60,13 @@ class Messages:
                 yield rows, data[start[rows][:, None] + np.arange(length)]
 
 
-def gathered(messages: Iterable[Dated]) -> Iterator[Messages]:
+def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:
     """Single messages as portions of each topic and type."""
     waiting = iter(messages)
     while True:
         parts: dict[tuple[str, str], tuple[list[int], list[bytes]]] = {}
-        for of, time, content in islice(waiting, PORTION):
-            times, contents = parts.get(of) or parts.setdefault(of, ([], []))
+        for topic, kind, time, content in islice(waiting, PORTION):
+            times, contents = parts.get((topic, kind)) or parts.setdefault((topic, kind), ([], []))
             times.append(time)
             contents.append(content)
         if not parts:

@@ -101,7 +101,7 @@ class Bag:
             if isinstance(file, McapFile):
                 yield from file.portions(topics)
             else:
-                yield from gathered((message[:2], *message[2:]) for message in file.messages(topics))
+                yield from gathered(file.messages(topics))
 
 
 def open_bag(path: Path) -> Bag:

@@ -108,7 +108,7 @@ def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logg
         tops = ["header", *(path.partition(".")[0].partition("[")[0] for path in paths)]
         readers[topic] = BlockReader(bag.topics[topic], definitions_of(bag.topics[topic], bag.schemas), tops)
     counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
-    for messages in gathered((message[:2], *message[2:]) for message in bag.messages(fields)):
+    for messages in gathered(bag.messages(fields)):
         topic = messages.topic
         for block in readers[topic].blocks(messages):
             if block.layout.numbers.keys() >= set(fields[topic]):
