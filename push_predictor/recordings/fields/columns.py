@@ -79,10 +79,11 @@ class Block:
 
 
 class BlockReader:
-    """Reads the wanted top-level fields of messages of one type."""
+    """Reads the top-level fields of messages of one type that the paths of wanted fields begin with."""
 
     def __init__(self, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]) -> None:
-        self._type, self._definitions, self._wanted = short_name(type_name), definitions, wanted
+        self._type, self._definitions = short_name(type_name), definitions
+        self._wanted = [path.partition(".")[0].partition("[")[0] for path in wanted]
         self._known: dict[int, tuple[str, _Layout]] = {}  # the last layout of messages of a length
 
     def blocks(self, messages: Messages) -> Iterator[Block]:

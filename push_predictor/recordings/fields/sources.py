@@ -144,8 +144,7 @@ class FieldReader:
         self._target, self._field = target, field
         self._header = header_path(field, type_name, definitions)
         self.timed = bool(self._header)
-        tops = [path.partition(".")[0].partition("[")[0] for path in (field, self._header) if path]
-        self._blocks = BlockReader(type_name, definitions, tops)
+        self._blocks = BlockReader(type_name, definitions, (field, self._header))
 
     def read(self, messages: Messages) -> Columns:
         """The columns of n messages; one that is not readable has zeros."""

@@ -103,10 +103,10 @@ class _Logged(NamedTuple):
 
 def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logged]:
     """The numbers in fields of topics, {topic: paths}. Raises ImportSourceError if a message cannot be read."""
-    readers = {}
-    for topic, paths in fields.items():
-        tops = ["header", *(path.partition(".")[0].partition("[")[0] for path in paths)]
-        readers[topic] = BlockReader(bag.topics[topic], definitions_of(bag.topics[topic], bag.schemas), tops)
+    readers = {
+        topic: BlockReader(kind := bag.topics[topic], definitions_of(kind, bag.schemas), ("header", *paths))
+        for topic, paths in fields.items()
+    }
     counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
     for messages in gathered(bag.messages(fields)):
         topic = messages.topic
