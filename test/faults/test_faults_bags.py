@@ -217,10 +217,10 @@ def test_chunk_with_missing_bytes_is_not_treated_as_truncated(bag: Path) -> None
     assert any("damaged or cut off" in note for note in notes)
 
 
-def hundred_poses(path: Path, enable_data_crcs: bool = False) -> int:
-    """Write a bag without chunks; returns the offset of the end of its data."""
+def hundred_poses(path: Path, **options: object) -> int:
+    """Write a bag, by default without chunks; returns the offset of the end of its data then."""
     with path.open("wb") as stream:
-        writer = Writer(stream, use_chunking=False, enable_data_crcs=enable_data_crcs)
+        writer = Writer(stream, **{"use_chunking": False, **options})
         writer.start(profile="ros2")
         channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
         for step in range(100):
@@ -238,6 +238,17 @@ def test_zeros_at_the_end_lose_no_message_before_them(bag: Path) -> None:
     found, notes = messages_and_notes(bag)
     assert len(found) == 100
     assert any(f"at byte {end}, is damaged" in note for note in notes)
+
+
+def test_a_message_shorter_than_its_own_header_is_noted_and_those_before_it_are_used(bag: Path) -> None:
+    hundred_poses(bag, use_chunking=True, compression=CompressionType.NONE, enable_crcs=False)
+    whole, _ = messages_and_notes(bag)
+    data = bytearray(bag.read_bytes())
+    struct.pack_into("<Q", data, data.index(whole[40]) - 30, 10)  # the length, before the 22 bytes of the header
+    bag.write_bytes(data)
+    found, notes = messages_and_notes(bag)
+    assert found == whole[:40]
+    assert any("a message has 10 bytes, its header alone needs 22" in note for note in notes)
 
 
 @pytest.mark.parametrize("what", ["type", "encoding"])

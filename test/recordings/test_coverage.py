@@ -125,6 +125,11 @@ def test_a_contact_that_rolls_around_the_tip_does_not_slide() -> None:
 def test_windows_that_overlap_say_nothing_about_sliding() -> None:
     table = pushes()
     assert covered(replace(table, covariates={"elapsed_time": 0.01 * np.arange(len(table))})).sliding is None
+    assert covered(replace(table, covariates={"elapsed_time": 0.2 * np.arange(len(table))})).sliding == 1.0
+
+
+def test_a_contact_slides_in_either_direction() -> None:
+    assert covered(pushes(slip=0.5)).sliding == covered(pushes(slip=-0.5)).sliding == 1.0
 
 
 def test_without_an_outline_sides_and_sliding_are_unknown() -> None:

@@ -60,9 +60,12 @@ def test_a_body_that_the_lifted_tip_carries_is_refused() -> None:
     assert refused(on_hand(replace(push, pusher=raised), tuple(TOUCHING * AHEAD)))
 
 
-@pytest.mark.parametrize(("push", "size"), [(LONG, 0.03), (Push(end=0.9), 0.004)])
-def test_a_body_whose_place_at_the_tip_varies_is_not_judged(push: Push, size: float) -> None:
+@pytest.mark.parametrize(
+    ("push", "size", "judged"),
+    [(LONG, 0.03, False), (LONG, 0.012, False), (LONG, 0.008, True), (Push(end=0.9), 0.004, False)],
+)
+def test_a_body_whose_place_at_the_tip_varies_is_not_judged(push: Push, size: float, judged: bool) -> None:
     """By more than 10 mm, or by as much as the tip travels."""
     body = on_hand(translating_push(push), (0.12, 0.0))
     swing = size * np.sin(np.linspace(0.0, 60.0, len(body.slider)))
-    assert not refused(replace(body, slider=replace(body.slider, x=body.slider.x + swing)))
+    assert refused(replace(body, slider=replace(body.slider, x=body.slider.x + swing))) is judged
