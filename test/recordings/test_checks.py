@@ -28,7 +28,7 @@ from mistakes import (
     late,
     mirrored,
     on_hand,
-    outline_altered,
+    outline_scaled,
     spatial_rows,
     stream_part,
     tracked,
@@ -86,7 +86,7 @@ def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
 
 
 def test_a_wrong_size_is_found() -> None:
-    finding = found(bag(SMALL), outline_altered(rig_of(SMALL), size=1.03))["outline_size"]
+    finding = found(bag(SMALL), outline_scaled(rig_of(SMALL), 1.03))["outline_size"]
     assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
     half = 1e3 * float(np.linalg.norm(np.mean(rig_of(SMALL).outline.vertices[:2], axis=0)))
     stated = re.search(r", (-\d+\.\d) mm a side", finding.sentence)
@@ -94,7 +94,7 @@ def test_a_wrong_size_is_found() -> None:
 
 
 def test_a_wrong_size_seen_from_one_side_is_reported_with_its_rival() -> None:
-    finding = found(sample(ONE_SIDE), outline_altered(rig_of(ONE_SIDE), size=1.03))["outline_shifted"]
+    finding = found(sample(ONE_SIDE), outline_scaled(rig_of(ONE_SIDE), 1.03))["outline_shifted"]
     assert "Or the size is wrong" in finding.advice
 
 
@@ -161,7 +161,7 @@ def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
 
 
 def test_a_rig_in_millimetres_is_refused() -> None:
-    assert "units_rig" in found(bag(SMALL), outline_altered(rig_of(SMALL), size=1e3))
+    assert "units_rig" in found(bag(SMALL), outline_scaled(rig_of(SMALL), 1e3))
 
 
 def test_stamps_in_a_wrong_unit_are_refused() -> None:

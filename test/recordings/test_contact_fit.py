@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from mistakes import outline_altered, stream_part
+from mistakes import outline_scaled, stream_part
 from repository import REPOSITORY
 
 from push_predictor.recordings.checks.motion import ContactFit, contact_fit
@@ -36,7 +36,7 @@ def fit_of(recording: Recording, rig: Rig) -> ContactFit:
 
 @pytest.mark.parametrize("size", [0.96, 1.04])
 def test_gaps_have_the_size_and_sign_of_the_outlines_error(size: float) -> None:
-    fit = fit_of(hexagon(), outline_altered(require_rig(hexagon()), size=size))
+    fit = fit_of(hexagon(), outline_scaled(require_rig(hexagon()), size))
     assert fit.side == "side" and len(fit.gaps) == 6
     for gap in fit.gaps:
         assert gap == pytest.approx(APOTHEM * (1.0 - size), abs=2e-4)

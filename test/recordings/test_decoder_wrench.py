@@ -48,7 +48,7 @@ def wrench() -> WrenchStream:
     return found
 
 
-def lab(values: Array, frame: str, tf: bool = False, world: str = "world", lifts: bool = True) -> Lab:
+def lab(values: Array, frame: str, tf: bool = False, lifts: bool = True) -> Lab:
     """Slider, a tip that turns about a tilted axis, and a sensor with values (n, 6); tf: also frames to the sensor."""
     made = Lab()
     made.pose(SLIDER, "geometry_msgs/msg/PoseStamped", original().slider, "pose")
@@ -56,7 +56,7 @@ def lab(values: Array, frame: str, tf: bool = False, world: str = "world", lifts
     add_tip(made, TIP, pusher.stamp, tip_rows(pusher, pusher.stamp))
     add_wrench(made, SENSOR, wrench().stamp, values, frame)
     if tf:
-        sensor_tf(made, original().pusher, BASE, world)
+        sensor_tf(made, original().pusher, BASE, "world")
     return made
 
 

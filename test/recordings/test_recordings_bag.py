@@ -31,8 +31,8 @@ POSES = np.column_stack([0.001 * np.arange(N), np.zeros((N, 5)), np.ones(N)])
 Content = dict[str, tuple[MessageType, list[bytes]]]
 
 
-def pose_topics(frame_id: str = "world") -> Content:
-    messages = encode(STAMP, POSES, POSE_STAMPED, frame_id)
+def pose_topics() -> Content:
+    messages = encode(STAMP, POSES, POSE_STAMPED)
     return {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
 
 

@@ -89,9 +89,11 @@ def slippery(size: float) -> Effect:
     return planted("contact_friction", "elapsed_time", DRIFT, size)
 
 
-def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", **other: Any) -> Trace:
+def made_up_trace(*effects: Effect, count: int = 150, **other: Any) -> Trace:
     """A trace that found exactly these effects; other: fields to replace."""
-    model = train_model(pushes(60, 1), square_rig(), kind, name="deployed", options=TrainingOptions(mean="zero"))
+    model = train_model(
+        pushes(60, 1), square_rig(), "analytical", name="deployed", options=TrainingOptions(mean="zero")
+    )
     table = pushes(count, 2, *effects)
     held = held_out_rows(table)
     return replace(traced(model, table.take(~held), table.take(held), effects), **other)

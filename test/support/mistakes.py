@@ -28,9 +28,9 @@ UPRIGHT, UPSIDE_DOWN = np.array([0.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 
 Mistake = Callable[[Recording], Recording]
 
 
-def outline_altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
-    """The rig with an outline turned, then shifted, then scaled; for polygons."""
-    return replace(rig, outline=Outline(size * (rotate(rig.outline.vertices, np.array(yaw)) + shift)))
+def outline_scaled(rig: Rig, size: float) -> Rig:
+    """The rig with a scaled outline; for polygons."""
+    return replace(rig, outline=Outline(size * rig.outline.vertices))
 
 
 def mirrored(recording: Recording, y: float, heading: float) -> Recording:

@@ -62,10 +62,10 @@ def made_up_table(pushes: int, windows: int, speeds: tuple[float, ...], seed: in
     return PushTable(inputs, np.full(len(inputs), 0.2), mean + sd * rng.standard_normal(mean.shape), names)
 
 
-def made_up_corpus(pushes: int = 40, windows: int = 3, speeds: tuple[float, ...] = SPEEDS) -> Corpus:
+def made_up_corpus(speeds: tuple[float, ...] = SPEEDS) -> Corpus:
     """Four sets whose truth is the same formula."""
-    sets = {p: PushSet(made_up_table(pushes, windows, speeds, k), rig_of(*p)) for k, p in enumerate(PAIRS)}
-    return Corpus("simulated", f"made up: {len(sets)} sets of {pushes} pushes", sets, PAIRS[0])
+    sets = {p: PushSet(made_up_table(40, 3, speeds, k), rig_of(*p)) for k, p in enumerate(PAIRS)}
+    return Corpus("simulated", f"made up: {len(sets)} sets of 40 pushes", sets, PAIRS[0])
 
 
 def made_up_grid(plan: Plan = PLAN, surface: str = "plywood", seed: int = 0) -> RepeatedGrid:
