@@ -200,7 +200,7 @@ class McapFile:
         except UNREADABLE as error:
             self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
         for number in sorted(set(page.places[before::4])):
-            self._check_unwanted(number, topics, offset)
+            self._check_channel(number, topics, offset)
         return (len(page.places) - before) // 4
 
     def _unpacked(self, page: _Page, start: int, end: int) -> bytes | None:
@@ -217,8 +217,8 @@ class McapFile:
             self._note(offset, f"{count} messages cannot be decompressed and were skipped")
         page.records = b""
 
-    def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
-        """Note a message that is wanted but cannot be decoded; others are ignored."""
+    def _check_channel(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
+        """Note a channel that has no description, or one that is wanted and has another encoding than CDR."""
         if (known := self._channels.get(channel)) is None:
             self._note(offset, f"channel {channel} has no description; its messages were skipped")
         elif topics and known.topic in topics and known.message_encoding != "cdr":
