@@ -101,8 +101,11 @@ def test_mcube_bag_has_the_frames_of_the_text_files(tmp_path: Path) -> None:
             "/vicon/Block/Block": ("geometry_msgs/msg/TransformStamped", None, body),
             "/netft_data": ("geometry_msgs/msg/WrenchStamped", None, force),
             "/tip_pose": ("geometry_msgs/msg/PoseStamped", None, tip),
+            "/other": ("other_msgs/msg/Other", "float64 something\n", []),
         },
     )
+    # The definition of a topic that is not imported cannot be read.
+    path.write_bytes(path.read_bytes().replace(b"float64 something", b"float64 = nothing"))
     report = import_source("rosbag1", [path], tmp_path / "out")
     recording = read_recording(report.written[0])
     assert recording.rig is not None and recording.rig.shape == "steel_block" and recording.wrench is not None

@@ -107,6 +107,7 @@ def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logg
         topic: BlockReader(kind := bag.topics[topic], definitions_of(kind, bag.schemas), ("header", *paths))
         for topic, paths in fields.items()
     }
+    opened = len(bag.notes)  # of them some on topics that are not read
     counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
     for messages in gathered(bag.messages(fields)):
         topic = messages.topic
@@ -117,8 +118,8 @@ def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logg
                 order = counts[topic] + block.rows
                 parts[topic].append((order, time, stamp, block.numbers(fields[topic])))
         counts[topic] += len(messages)
-    if bag.notes:
-        raise ImportSourceError(bag.notes[0])
+    if len(bag.notes) > opened:
+        raise ImportSourceError("; ".join(bag.notes))
     found = {}
     for topic, paths in fields.items():
         nothing = (*np.empty((3, 0), np.int64), np.empty((0, len(paths))))
