@@ -9,13 +9,13 @@ from collections import Counter
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
 from push_predictor.recordings.windows.cut import PushContext, WindowCutter
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.stamp_order import ISOLATION
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -158,6 +158,6 @@ def free_motion(rig: Rig, slider: PoseStream, pusher: PoseStream, stamp: IntArra
     free = np.array([touches_nothing(sample, WindowOptions()) and not sample.in_break for sample in samples])
     joined = ~np.array([sample.after_break for sample in samples])
     after = np.searchsorted(track.stamp, stamp)
-    within = (after > 0) & (after < len(track)) & (np.maximum.accumulate(stamp) - stamp < ISOLATION)
+    within = (after > 0) & (after < len(track)) & (np.maximum.accumulate(stamp) - stamp < CLOCK_SET)
     after = np.clip(after, 1, len(track) - 1)
     return np.asarray(within & free[after - 1] & free[after] & joined[after])

@@ -18,11 +18,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.types import Array, BoolArray, IntArray
 
 LOOKAHEAD = 8  # samples examined before the first of them is accepted
 LATE_RUN = LOOKAHEAD // 2  # consecutive late samples after which the clock was set back a little and data are missing
-ISOLATION = 1_000_000_000  # ns; a sample this far from both neighbours is discarded; a clock this far back was set
+ISOLATION = 1_000_000_000  # ns; a sample this far from both neighbours is discarded
 CLOCK_LEAP = 30 * 86_400_000_000_000  # ns; a clock this far ahead was set: no recording pauses for a month
 REMEMBERED = 2000  # accepted stamps kept to recognise a repeated one
 NO_STAMP = np.iinfo(np.int64).min // 2
@@ -153,7 +154,7 @@ class StampOrder:
     def _decide_late(self, block: list[int]) -> tuple[bool, int, bool]:
         sequence = _longest_increasing(block, NO_STAMP)
         increasing = len(block) == LOOKAHEAD and 2 * len(sequence) >= LOOKAHEAD
-        if increasing and block[sequence[0]] < self._last - ISOLATION:
+        if increasing and block[sequence[0]] < self._last - CLOCK_SET:
             return False, 0, True
         self._discard(self._kind_of_old(block[0]))
         return False, 1, False
