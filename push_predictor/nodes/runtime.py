@@ -29,8 +29,6 @@ TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
 LONGEST = 3.0  # s in which a callback of an executor with one thread may: less than a launch waits for
 _GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
-
-
 MakeNode: TypeAlias = Callable[["Stop"], Any]
 
 
