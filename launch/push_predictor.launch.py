@@ -32,7 +32,7 @@ CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
 ARGUMENTS = (
     ("namespace", "", "Namespace of all nodes."),
     ("params_file", "", "YAML file with parameters, such as those in config/. Other arguments override it."),
-    ("use_sim_time", "false", "Use the time on /clock, which the replay publishes."),
+    ("use_sim_time", "false", "Use the time on /clock. With a recording, the replay publishes it at 40 Hz."),
     ("log_level", "info", "debug, info, warn, error or fatal."),
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),

@@ -12,6 +12,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from msg_adapters import ns_to_stamp
 
 
+def level_of(failed: object, problems: object) -> bytes:
+    """The level of a status: ERROR if something failed, WARN if there are problems, else OK."""
+    level: bytes = DiagnosticStatus.WARN if problems else DiagnosticStatus.OK
+    return DiagnosticStatus.ERROR if failed else level
+
+
 def diagnostic_status(
     node: str, subject: str, level: bytes, message: str, values: Mapping[str, object], hardware_id: str
 ) -> DiagnosticStatus:

@@ -37,6 +37,10 @@ class NoExecutor(CallbackGroup):
         """Do nothing: execution never begins."""
 
 
+def not_called(*_: object) -> None:
+    """The callback that such an entity must have; the node takes its messages or requests itself."""
+
+
 class Taken(NamedTuple):
     """A message, its number (counted by the publisher), and when it was sent and received (ns)."""
 
@@ -116,7 +120,7 @@ class FollowingSubscription:
             self._subscription = self._node.create_subscription(
                 found,
                 self._topic,
-                _not_called,
+                not_called,
                 profile,
                 callback_group=self._group,
                 qos_overriding_options=self._overriding,
@@ -150,7 +154,3 @@ def _overriding(node: Node, name: str) -> QoSOverridingOptions:
     if given_value(node, f"qos_overrides.{name}.subscription.reliability") is not None:
         policies.append(QoSPolicyKind.RELIABILITY)
     return QoSOverridingOptions(policies)
-
-
-def _not_called(message: object) -> None:
-    """The callback that a subscription must have: `taken` takes the messages instead."""

@@ -132,7 +132,7 @@ class PredictServer(LifecycleNode):
     @property
     def abandons_callbacks(self) -> bool:
         """Whether a long request or a transition still runs: the process cannot wait for it when it ends."""
-        one_of_each_group = (*self._long_services, self._short_services[0], self._timer)  # the second: transitions too
+        one_of_each_group = (*self._long_services, self._short_services[0], self._timer)  # a short one: transitions too
         idle = all(each.callback_group.can_execute(each) for each in one_of_each_group)
         return not (idle and all(action.settled for action in self._actions))
 

@@ -30,7 +30,7 @@ from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.polling import FollowingSubscription
-from push_predictor.nodes.qos import common_profile
+from push_predictor.nodes.qos import DEEPEST, common_profile
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.live_recording import LiveRecording
@@ -40,7 +40,6 @@ from push_predictor.recordings.decoder.sources import resolved
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.topics import load_topics, topics_of
 
-DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones
 LOOK = 0.1  # s between two looks at the publishers
 PERIOD = 0.02  # s between two looks at what has arrived
 SHOWN = 1.0  # s between two updates of the line
@@ -104,7 +103,7 @@ class RecorderSubscriptions:
 
     def __init__(self, node: Node, recording: LiveRecording) -> None:
         self._node, self._recording = node, recording
-        self._topics = {topic.name: FollowingSubscription(node, topic.name, DEPTH) for topic in recording.wanted}
+        self._topics = {topic.name: FollowingSubscription(node, topic.name, DEEPEST) for topic in recording.wanted}
         self._looked = 0.0
 
     def look(self) -> None:

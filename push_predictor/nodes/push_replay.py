@@ -20,14 +20,14 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array, diagnostic_status, level_of
 from msg_adapters.rigs import rig_to_message
 from push_predictor.errors import RecordingError, RequestError, RigError
 from push_predictor.nodes.parameter_tables import PUSH_REPLAY
@@ -251,13 +251,7 @@ class PushReplay(Node):
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
-        level = (
-            DiagnosticStatus.ERROR
-            if self._checks.failed
-            else DiagnosticStatus.WARN
-            if report.warnings
-            else DiagnosticStatus.OK
-        )
+        level = level_of(self._checks.failed, report.warnings)
         message = "; ".join(report.warnings) or report.state
         name, recording = self.get_fully_qualified_name(), self._recording.name
         status = diagnostic_status(name, "replay", level, message, report.values, recording)

@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy
 
 from msg_adapters.rigs import rig_from_message
 from push_predictor.errors import RigError
-from push_predictor.nodes.polling import NoExecutor, take_all
+from push_predictor.nodes.polling import NoExecutor, not_called, take_all
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor_interfaces.msg import PushRig
@@ -31,9 +31,7 @@ class RigSource:
         self._node, self._from_file = node, bool(path)
         self.rig: Rig | None = load_rig(Path(path).expanduser()) if path else None
         self._refusal = ""
-        self._subscription = node.create_subscription(
-            PushRig, "rig", lambda message: None, LATCHED, callback_group=NoExecutor()
-        )  # work() takes the messages
+        self._subscription = node.create_subscription(PushRig, "rig", not_called, LATCHED, callback_group=NoExecutor())
 
     @property
     def problem(self) -> str:

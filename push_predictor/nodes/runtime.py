@@ -29,8 +29,6 @@ TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
 LONGEST = 3.0  # s in which a callback of an executor with one thread may: less than a launch waits for
 _GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
-
-
 MakeNode: TypeAlias = Callable[["Stop"], Any]
 
 
@@ -119,6 +117,9 @@ class Life:
             if self._executor is not None:
                 self._close(self._executor)
         finally:
+            if isinstance(self._executor, MultiThreadedExecutor) and not self.leaves_threads:
+                # rclpy's own shutdown would not wait for its threads, and destroy what they still use.
+                self._executor._executor.shutdown()
             if self._executor is not None:
                 self._executor.shutdown(timeout_sec=0.0 if self.leaves_threads else None)
             if self._node is not None:

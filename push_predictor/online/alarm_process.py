@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from push_predictor.online.child_process import Child
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +117,7 @@ class AlarmProcess:
             self._fire(self.state, reply.fired)
 
 
-def _work(connection: Any, model: PushModel, rate: float) -> None:
+def _work(connection: Connection, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
     try:
         calibration = calibrate(model)

@@ -9,7 +9,7 @@ While a recording is made, the samples so far are checked again each time that t
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.online.child_process import Child
@@ -18,6 +18,9 @@ from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, joined, set_back
 from push_predictor.recordings.topics import Topics
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 PENDING = "not checked yet"
 FIRST = 1000  # samples of the slider's pose before the first check
@@ -84,7 +87,7 @@ class CheckProcess:
         self._child = None
 
 
-def _check(connection: Any, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
+def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.read import read_recording, require_rig
 

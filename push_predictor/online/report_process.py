@@ -49,7 +49,7 @@ class ReportWriter:
 
     def stop(self) -> None:
         """End a report that is being written; its unfinished files are removed."""
-        if self._child is not None and self.busy:
+        if self._child is not None:
             self._child.stop()
 
 

@@ -257,20 +257,11 @@ def points_of(marker) -> np.ndarray:
     return np.array([[point.x, point.y] for point in marker.points])
 
 
-def by_name(markers) -> dict:
-    return {marker.ns: marker for marker in markers}
-
-
-def some_markers(mirror: float = 1.0) -> dict:
-    flip = np.array([1.0, mirror, mirror])
-    covariance = np.array([[4e-6, mirror * 1e-6], [mirror * 1e-6, 1e-6]])
-    vertices = shape_outline("rect1").vertices
-    poses = [flip * pose for pose in ([0.1, 0.2, 0.3], [0.11, 0.22, 0.4], [0.112, 0.219, 0.45])]
-    return by_name(prediction_markers(Sheet("world", 5), vertices, *poses[:2], covariance, poses[2]))
-
-
 def test_markers_have_the_slider_poses():
-    markers = {name: over_the_wire(marker) for name, marker in some_markers().items()}
+    start, predicted, observed = np.array([[0.1, 0.2, 0.3], [0.11, 0.22, 0.4], [0.112, 0.219, 0.45]])
+    covariance, vertices = np.array([[4e-6, 1e-6], [1e-6, 1e-6]]), shape_outline("rect1").vertices
+    drawn = prediction_markers(Sheet("world", 5), vertices, start, predicted, covariance, observed)
+    markers = {marker.ns: over_the_wire(marker) for marker in drawn}
     for name, pose in {"start_outline": [0.1, 0.2], "predicted_outline": [0.11, 0.22]}.items():
         outline = points_of(markers[name])
         assert np.allclose(outline[0], outline[-1])  # closed

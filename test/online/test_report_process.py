@@ -31,7 +31,7 @@ def handlers() -> Iterator[None]:
 def test_report_has_the_alarm_of_the_live_validation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
     monkeypatch.setattr(report_process, "report_windows", lambda *_, **named: given.update(named))
-    report_process._write(None, [], None, [], tmp_path, FIRED)  # type: ignore[arg-type]
+    report_process._write(None, [], None, [], tmp_path, FIRED)  # type: ignore[arg-type]  # what draws them is replaced
     assert given == {"alarm": FIRED}
 
 

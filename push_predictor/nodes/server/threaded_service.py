@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
-from push_predictor.nodes.polling import NoExecutor, take_request
+from push_predictor.nodes.polling import NoExecutor, not_called, take_request
 
 JOIN_TIMEOUT = 5.0  # s
 RETRY_DELAY = 0.1  # s after an error
@@ -40,7 +40,7 @@ class ThreadedService:
         self.service: Service = node.create_service(
             kind, name, callback, qos_profile=qos_profile, callback_group=(apart := NoExecutor())
         )
-        self._wake = node.create_guard_condition(lambda: None, apart)
+        self._wake = node.create_guard_condition(not_called, apart)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from push_predictor.nodes.polling import NoExecutor, take_request
+from push_predictor.nodes.polling import NoExecutor, not_called, take_request
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.result_writer import ResultWriter
@@ -31,7 +31,7 @@ class FinishService:
         self._served: list[Any] = []  # of the run that has ended
         self._failure: str | None = None  # why its result could not be written; None until that is known
         self._session, self._models, self._rigs, self._writer = session, models, rigs, writer
-        self._service = node.create_service(Trigger, "~/finish", _not_called, callback_group=NoExecutor())
+        self._service = node.create_service(Trigger, "~/finish", not_called, callback_group=NoExecutor())
 
     @property
     def requested(self) -> bool:
@@ -73,8 +73,3 @@ class FinishService:
             return Trigger.Response(success=False, message=text)
         text = str(output or "The parameter output is empty: nothing was written.")
         return Trigger.Response(success=True, message=text)
-
-
-def _not_called(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-    """The callback that a service must have: `work` takes the calls instead."""
-    return response

@@ -15,6 +15,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.nodes.qos import DEEPEST
 from push_predictor.online.topic_report import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
@@ -24,7 +25,6 @@ from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.sources import TF_TYPES, Source
 from push_predictor.types import IntArray
 
-DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones; memory grows as the queue fills
 SILENT = 5.0  # s without a sample that are reported
 TF_TYPE = TF_TYPES[0]
 NOT_INSTALLED = "install ros-jazzy-tf2-msgs, or run scripts/install_tf2_msgs.sh"
@@ -34,15 +34,15 @@ NO_WRENCH = "No publisher: contact is found from geometry alone."
 class TopicStream:
     """Moves the messages of a topic into an input of a decoder.
 
-    earlier: also take what was sent before. Call `look` and
-    `report` in the executor's thread; not at the same time as `move`.
+    earlier: also take what was sent before. Call `look` and `report` in the executor's thread; not at the same time as
+    `move`.
     """
 
     def __init__(self, node: Node, own: TopicInput, earlier: bool = False) -> None:
         self.input = own
         topic = own.source.topic
-        self.name = node.resolve_topic_name(topic) + own.source.text[len(topic) :]  # after remapping, for people
-        self._subscription = FollowingSubscription(node, topic, DEPTH, earlier=earlier, overridable=not earlier)
+        self._subscription = FollowingSubscription(node, topic, DEEPEST, earlier=earlier, overridable=not earlier)
+        self.name = self._subscription.name + own.source.text[len(topic) :]  # after remapping, for people
         self.refusals: dict[str, str] = {}  # by type
         self._offered: list[tuple[str, ReliabilityPolicy]] = []  # type and reliability of each publisher
         self._heard = monotonic()  # when the last message came, or the last publisher
@@ -156,8 +156,8 @@ class TransformTopics:
         self.buffer = buffer
         self.problem, self.refused = "No publisher.", False
         self.heard = monotonic()  # when the last message came, or the last publisher
-        self._moving = FollowingSubscription(node, topic, DEPTH, earlier=False, overridable=True)
-        self._static = FollowingSubscription(node, topic + STATIC, DEPTH)
+        self._moving = FollowingSubscription(node, topic, DEEPEST, earlier=False, overridable=True)
+        self._static = FollowingSubscription(node, topic + STATIC, DEEPEST)
         self._published = False
 
     @property
@@ -218,15 +218,13 @@ class FrameStream:
     def report(self, stream: str) -> TopicReport:
         """What is known of the frame now."""
         transforms, frame = self._topics.buffer, self._source.frame
-        stamp = transforms.recent(frame, RECENT)
-        figures = stamp_figures(stamp, None)
         return TopicReport(
             stream=stream,
             topic=self.name,
             kind=TF_TYPE,
             reliability=self._topics.reliability,
             frames=(transforms.world,) if transforms.world else (),
-            figures=figures,
+            figures=stamp_figures(transforms.recent(frame, RECENT), None),
             problem=self._problem(),
             refused=self._topics.refused,
         )

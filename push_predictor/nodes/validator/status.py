@@ -11,7 +11,7 @@ from time import monotonic
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array, diagnostic_status, level_of
 from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.rig_source import RigSource
@@ -86,7 +86,7 @@ class StatusPublisher:
         if not client.server_available:
             warnings.append(NO_SERVER)
         wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
-        level = DiagnosticStatus.ERROR if wrong else DiagnosticStatus.WARN if warnings else DiagnosticStatus.OK
+        level = level_of(wrong, warnings)
         state = self._activity()
         values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
         values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
