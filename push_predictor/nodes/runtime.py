@@ -117,9 +117,6 @@ class Life:
             if self._executor is not None:
                 self._close(self._executor)
         finally:
-            if isinstance(self._executor, MultiThreadedExecutor) and not self.leaves_threads:
-                # rclpy's own shutdown would not wait for its threads, and destroy what they still use.
-                self._executor._executor.shutdown()
             if self._executor is not None:
                 self._executor.shutdown(timeout_sec=0.0 if self.leaves_threads else None)
             if self._node is not None:

@@ -6,18 +6,14 @@
 from __future__ import annotations
 
 import sys
-import threading
 from importlib import import_module
 from typing import Any
 
 import pytest
-from rclpy.context import Context
-from rclpy.node import Node
-from ros_harness import free_domain
 
 from push_predictor import __version__
 from push_predictor.errors import PushPredictorError
-from push_predictor.nodes.runtime import Life, Stop, run
+from push_predictor.nodes.runtime import Stop, run
 
 
 def test_the_first_error_is_kept_and_requests_the_end() -> None:
@@ -90,25 +86,3 @@ def test_an_error_of_the_program_keeps_its_traceback(capsys: pytest.CaptureFixtu
     with pytest.raises(RuntimeError, match="changed size"):
         run("push_replay", make_node, [])
     assert capsys.readouterr().err == ""
-
-
-def test_an_ending_node_waits_for_its_threads_before_what_they_use_is_destroyed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
-    context, stop, before = Context(), Stop(), {*threading.enumerate()}
-
-    class Busy(Node):
-        threads = 2
-
-        def __init__(self, stop: Stop) -> None:
-            super().__init__("busy", context=context)
-            self.create_timer(0.001, stop.request)
-
-        def close(self) -> None:
-            assert {*threading.enumerate()} > before, "the timer's"
-
-    life = Life("busy", Busy, stop, [], context)
-    life.spin()
-    assert life.end() == 0
-    assert {*threading.enumerate()} == before
