@@ -150,7 +150,7 @@ def close_the_loop(model: Path, name: str, out: Path, hidden: Hidden, stages: St
     print_scores(closed.story)
     truth = json.loads(hidden.truth.read_text())  # not before
     revealed = ", ".join(f"{key} {value}".replace("_", " ") for key, value in truth.items() if key != "right names")
-    print(f"   The hidden change was: {revealed}.")
+    print(f"   The hidden change was: {revealed} (the simulator's own parameter).")
     picture = draw_story(out / "loop.png", closed.story, closed.traced.verdict, truth)
     return [
         Page(out / BEFORE / "trace.html", "the traced cause: evidence, rivals, gain"),

@@ -8,7 +8,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,7 +36,8 @@ class Child:
         resource_tracker.ensure_running()  # the start of its process would unblock the signal
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a child inherits it
         try:
-            self.process.start()
+            with _not_interrupted():
+                self.process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         theirs.close()
@@ -52,6 +55,25 @@ class Child:
         (self.process.kill if at_once else self.process.terminate)()
         self.process.join()
         self._pipe.close()
+
+
+@contextmanager
+def _not_interrupted() -> Iterator[None]:
+    """Hold back the alarm that ends a slow start of the node: cut off from its data, a new process prints a traceback.
+
+    Masking it would not do: another thread of the node would take it.
+    """
+    if threading.current_thread() is not threading.main_thread():  # the others see no signals
+        yield
+        return
+    late: list[int] = []
+    handler = signal.signal(signal.SIGALRM, lambda number, frame: late.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGALRM, handler)
+        if late:
+            signal.raise_signal(signal.SIGALRM)
 
 
 def _begin(work: Callable[..., None], pipe: Connection, *arguments: Any) -> None:

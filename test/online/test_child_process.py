@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
+from multiprocessing import util
 from multiprocessing.connection import Connection
+from typing import Any
 
 import pytest
 
@@ -32,3 +35,31 @@ def test_no_sigint_reaches_a_child_and_the_parent_still_gets_it() -> None:
     assert child.process.exitcode == -signal.SIGKILL
     with pytest.raises(EOFError):
         child.received()
+
+
+def test_an_alarm_during_the_start_of_a_child_waits_until_the_child_has_its_data(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It interrupts a node that starts too slowly. The child would end with a traceback, unknown to kill_children."""
+
+    def begun_when_the_alarm_comes(*arguments: Any) -> int:
+        pid: int = spawn(*arguments)
+        signal.raise_signal(signal.SIGALRM)
+        return pid
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    spawn, before = util.spawnv_passfds, signal.signal(signal.SIGALRM, interrupt)
+    try:
+        Child("report", report).stop()  # with it the process that multiprocessing starts once
+        monkeypatch.setattr(util, "spawnv_passfds", begun_when_the_alarm_comes)
+        with pytest.raises(KeyboardInterrupt):
+            Child("report", report)
+        assert signal.getsignal(signal.SIGALRM) is interrupt
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    (child,) = multiprocessing.active_children()
+    kill_children()
+    child.join(60.0)
+    assert "Traceback" not in capfd.readouterr().err
