@@ -136,7 +136,7 @@ def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, loaded_be
     outside = served.model.training.inputs[:1] * [1.9, 1.0, 1.0]
     found = served.predict_rows(outside, served.model.training.duration[:1])
     assert np.all(np.isfinite(found.mean)) and not found.in_domain.any()
-    assert not any(MATRICES & vars(regression).keys() for regression in regressions), "nor for pushes outside the domain"
+    assert not any(MATRICES & vars(regression).keys() for regression in regressions), "nor for others"
 
 
 def test_a_model_without_tables_predicts_exactly_until_they_are_computed(
