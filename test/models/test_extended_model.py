@@ -112,6 +112,18 @@ def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushM
     np.testing.assert_allclose(ours.process_covariance, scale @ theirs.process_covariance @ scale, atol=1e-18)
 
 
+def test_effect_on_mechanics_with_a_grain_follows_the_heading_of_the_slider(bases: dict[str, PushModel]) -> None:
+    """Also where it is all that differs from the pushes before."""
+    base, table = bases["analytical"], pushes(20, 1)
+    grained = replace(mechanics(), values={"grain_x": 0.4}, covariance=np.zeros((1, 1)))
+    model = extended(replace(base, predictor=replace(base.predictor, fitted=grained)), slippery(0.2)).predictor
+    turned = {**table.covariates, "slider_heading": table.covariates["slider_heading"] + 1.0}
+    before, after = (model.shift(Push.of(replace(table, covariates=each))).mean for each in (table.covariates, turned))
+    again = replace(model).shift(Push.of(replace(table, covariates=turned))).mean
+    np.testing.assert_array_equal(after, again)
+    assert not np.allclose(after, before, rtol=0.01, atol=0.0)
+
+
 def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
     base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
     shift = joint_shift(mechanics(), [effect], Push(table.inputs, table.duration, table.covariates))

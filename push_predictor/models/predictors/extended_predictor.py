@@ -22,7 +22,7 @@ from push_predictor.models.remembered import Remembered
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 
-SIDE, HEADING = "edge", "push_heading"
+SIDE, HEADING = "edge", "slider_heading"
 GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
 
 
@@ -128,6 +128,7 @@ class ExtendedPredictor:
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
+        # Mechanics with a grain take the slider's heading, where it is given, in place of the push heading they need.
         used = [push.covariates[name] for name in (*self.covariates, HEADING) if name in push.covariates]
         return self._known.of(lambda: self._shift(push), push.inputs, push.duration, *used)
 
