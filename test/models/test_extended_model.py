@@ -101,7 +101,7 @@ def test_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kind: 
 @pytest.mark.parametrize("kind", KINDS)
 def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushModel], kind: str) -> None:
     base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
-    model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
+    model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push.of(table)
     ours, theirs = predicted(model, table), predicted(base, table)
     together = joint(model.predictor.mechanics, effects, push)
     pairs = zip(together.designs, effects, strict=True)
@@ -126,7 +126,7 @@ def test_effect_on_mechanics_with_a_grain_follows_the_heading_of_the_slider(base
 
 def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
     base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
-    shift = joint_shift(mechanics(), [effect], Push(table.inputs, table.duration, table.covariates))
+    shift = joint_shift(mechanics(), [effect], Push.of(table))
     moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
     np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
 
@@ -168,7 +168,7 @@ def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     for (i, j), shared in predictor.cross.items():
         whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
         whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     design = np.concatenate(joint(predictor.mechanics, predictor.effects, push).designs, axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
 
@@ -183,7 +183,7 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
     base = refit_base(bases["analytical"], table)
     both, one = (with_effects(base, table, some) for some in (terms, terms[:1]))
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     np.testing.assert_allclose(both.predictor.shift(push)[1], joint_covariance(both, table), rtol=1e-9, atol=1e-18)
     # Without the errors of the mechanics, which widen the interval of a size.
     evidence = evidence_of(base, table)
@@ -337,7 +337,7 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
     alike = DriverBasis("quadratic", ("elapsed_time",), (500.0,), (300.0,))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
     predictor = with_effects(refit_base(bases["analytical"], table), table, terms).predictor
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     shift, _ = predictor.shift(push)
     planted = joint_shift(mechanics(), [slippery(0.2)], push)
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
@@ -393,7 +393,7 @@ def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[
     refit = refit_base(bases["analytical"], table)
     after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
     assert gain(refit, after, held_out)[1].high < 0.0
-    design = design_of(None, DRIFT, mechanics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
+    design = design_of(None, DRIFT, mechanics(), Push.of(table), np.ones(3))
     assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 
