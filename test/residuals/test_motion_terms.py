@@ -133,8 +133,8 @@ def warmed(table: PushTable) -> PushTable:
     return replace(table, covariates={**table.covariates, "topic:/warmth": 20.0 + time + uneven})
 
 
-def both(seed: int = 3) -> PushTable:
-    return warmed(pushes(120, seed, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
+def both() -> PushTable:
+    return warmed(pushes(120, 3, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
 
 
 def test_terms_that_are_needed_stay(deployed: PushModel) -> None:
