@@ -75,12 +75,6 @@ def gaussian_log_density(prediction: LatentPrediction, outcomes: Array) -> Array
     return _log_normal(outcomes, prediction.mean, prediction.outcome_variance)
 
 
-def exact_cdf(prediction: LatentPrediction, outcomes: Array) -> Array:
-    """P(y <= outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
-    deviations = (outcomes - prediction.mean)[:, None] / np.sqrt(_variances_at_nodes(prediction))
-    return np.asarray(scipy.special.ndtr(deviations) @ np.exp(_LOG_WEIGHTS))
-
-
 def _variances_at_nodes(prediction: LatentPrediction) -> Array:
     spread = np.sqrt(prediction.log_noise_variance)[:, None] * _NODES
     return np.asarray(prediction.variance[:, None] + np.exp(prediction.log_noise_mean[:, None] + spread))
