@@ -233,16 +233,18 @@ class TestSuggestedPushes:
         assert expected.max() > 0.05
         np.testing.assert_allclose([noise[0, k, 2, k] for k in range(3)], expected)
 
-    def test_a_window_that_a_push_lacks_tells_nothing(self, learnt: PushModel) -> None:
+    @pytest.mark.parametrize("name", ["learnt", "untrained"])
+    def test_a_window_that_a_push_lacks_tells_nothing(self, name: str, request: pytest.FixtureRequest) -> None:
+        model = request.getfixturevalue(name)
         inputs = np.array([[0.02, 0.1, 0.3]])
-        windows = courses(learnt, inputs, 0.012)
+        windows = courses(model, inputs, 0.012)
         longer = Courses(
             np.concatenate([windows.inputs, windows.inputs[:, :1]], axis=1),
             np.concatenate([windows.kept, [[False]]], axis=1),
             windows.duration,
         )
-        matter = Push(candidate_pushes(learnt, Limits(), 64), np.full(64, 0.2), {})
-        gains = [information_of(learnt, one, matter).gains() for one in (windows, longer)]
+        matter = Push(candidate_pushes(model, Limits(), 64), np.full(64, 0.2), {})
+        gains = [information_of(model, one, matter).gains() for one in (windows, longer)]
         np.testing.assert_allclose(*gains, rtol=0.02)
 
     def test_with_a_transfer_speed_the_way_around_the_slider_counts(

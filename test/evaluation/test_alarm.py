@@ -225,7 +225,7 @@ def test_effects_are_kept_while_the_base_is_refitted_without_them(models: dict[s
     drift = DriverBasis("linear", ("slider_heading",), (0.0,), (3.0,))
     effect = Effect(None, "slider_heading", drift, np.full(18, 0.3), 1e-4 * np.eye(18), np.array([0.02, 0.02, 0.5]))
     predictor = ExtendedPredictor(base.predictor.base, (effect,), np.array([1.0, 1.2, 1.0]))
-    shift = predictor.shift(Push(rows.inputs, rows.duration, rows.covariates)).mean
+    shift = predictor.shift(Push.of(rows)).mean
     moved = replace(rows, outcomes=rows.outcomes + shift)
     mean, covariance = held_out_moments(replace(base, predictor=predictor, training=moved))
     of_base, without = held_out_moments(base)

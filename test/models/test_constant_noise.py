@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Noise that is the same everywhere: its density, its fit, and held-out predictions that are computed once."""
+"""Noise that is the same everywhere: its density and its fit."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from push_predictor.models.gaussian_process.prediction import (
-    MOST_ROWS,
     LatentPrediction,
-    Remembered,
     density_of_constant_noise,
     exact_log_density,
 )
 from push_predictor.models.gaussian_process.regression import fit_constant
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 
 def outcomes(count: int, mean: float, spread: float) -> Array:
@@ -52,33 +50,3 @@ def test_fit_is_where_density_and_prior_are_highest(spread: float) -> None:
     for mean, log_spread in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02)):
         assert score(found.noise_mean + mean, float(np.log(found.noise_spread)) + log_spread) < best
     assert found.noise_spread <= 1.5 + 1e-12
-
-
-def test_predictions_are_computed_again_for_other_rows_only() -> None:
-    asked = []
-
-    def asked_for(rows: IntArray) -> Array:
-        def predicted() -> Array:
-            asked.append(rows.tolist())
-            return rows.astype(np.float64)
-
-        return remembered.of(predicted, rows)
-
-    remembered: Remembered[Array] = Remembered()
-    rows = np.array([0, 0, 1])
-    first = asked_for(rows)
-    assert asked_for(rows.copy()) is first
-    rows[0] = 1  # the caller's array may change
-    assert asked_for(rows).tolist() == [1.0, 0.0, 1.0]
-    assert asked_for(np.array([0, 0, 1])) is first
-    assert asked == [[0, 0, 1], [1, 0, 1]]
-    for other in range(2, 6):  # the first is forgotten
-        asked_for(np.array([other, other]))
-    assert asked_for(np.array([0, 0, 1])) is not first
-
-
-@pytest.mark.parametrize("rows", [1, MOST_ROWS + 1])
-def test_a_planners_single_pushes_and_huge_batches_are_not_remembered(rows: int) -> None:
-    remembered: Remembered[Array] = Remembered()
-    first, again = (remembered.of(lambda: np.zeros(rows), np.zeros(rows)) for _ in range(2))
-    assert first is not again

@@ -129,7 +129,7 @@ def test_push_model_holds_out_one_push_by_default(kind: str) -> None:
 def test_held_out_moments_of_extended_model_include_its_effects() -> None:
     base = train_model(pushes(20), square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero"))
     model, rows = extended(base, slippery(0.2, 0.05)), base.training
-    shift = model.predictor.shift(Push(rows.inputs, rows.duration, rows.covariates))
+    shift = model.predictor.shift(Push.of(rows))
     found, plain = model.held_out_moments(), base.held_out_moments()
     np.testing.assert_allclose(found.mean, plain.mean + shift.mean)
     np.testing.assert_allclose(found.covariance, plain.covariance + shift.covariance)

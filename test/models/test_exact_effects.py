@@ -187,7 +187,7 @@ def test_the_heading_of_the_slider_turns_effects_of_the_table() -> None:
 def test_a_push_alone_gets_the_same_shift_as_among_others(name: str, size: list[float]) -> None:
     model = extended(train_model(pushes(20), square_rig(), "analytical", name="m"), effect(name, *size))
     table = pushes(6, 3)
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     among = model.predictor.moments(push)
     scalar = tabulate(model)
     for k in range(len(table)):

@@ -101,7 +101,7 @@ def test_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kind: 
 @pytest.mark.parametrize("kind", KINDS)
 def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushModel], kind: str) -> None:
     base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
-    model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
+    model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push.of(table)
     ours, theirs = predicted(model, table), predicted(base, table)
     together = joint(model.predictor.mechanics, effects, push)
     pairs = zip(together.designs, effects, strict=True)
@@ -112,9 +112,21 @@ def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushM
     np.testing.assert_allclose(ours.process_covariance, scale @ theirs.process_covariance @ scale, atol=1e-18)
 
 
+def test_effect_on_mechanics_with_a_grain_follows_the_heading_of_the_slider(bases: dict[str, PushModel]) -> None:
+    """Also where it is all that differs from the pushes before."""
+    base, table = bases["analytical"], pushes(20, 1)
+    grained = replace(mechanics(), values={"grain_x": 0.4}, covariance=np.zeros((1, 1)))
+    model = extended(replace(base, predictor=replace(base.predictor, fitted=grained)), slippery(0.2)).predictor
+    turned = {**table.covariates, "slider_heading": table.covariates["slider_heading"] + 1.0}
+    before, after = (model.shift(Push.of(replace(table, covariates=each))).mean for each in (table.covariates, turned))
+    again = replace(model).shift(Push.of(replace(table, covariates=turned))).mean
+    np.testing.assert_array_equal(after, again)
+    assert not np.allclose(after, before, rtol=0.01, atol=0.0)
+
+
 def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
     base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
-    shift = joint_shift(mechanics(), [effect], Push(table.inputs, table.duration, table.covariates))
+    shift = joint_shift(mechanics(), [effect], Push.of(table))
     moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
     np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
 
@@ -156,7 +168,7 @@ def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     for (i, j), shared in predictor.cross.items():
         whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
         whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     design = np.concatenate(joint(predictor.mechanics, predictor.effects, push).designs, axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
 
@@ -171,7 +183,7 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
     base = refit_base(bases["analytical"], table)
     both, one = (with_effects(base, table, some) for some in (terms, terms[:1]))
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     np.testing.assert_allclose(both.predictor.shift(push)[1], joint_covariance(both, table), rtol=1e-9, atol=1e-18)
     # Without the errors of the mechanics, which widen the interval of a size.
     evidence = evidence_of(base, table)
@@ -325,7 +337,7 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
     alike = DriverBasis("quadratic", ("elapsed_time",), (500.0,), (300.0,))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
     predictor = with_effects(refit_base(bases["analytical"], table), table, terms).predictor
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     shift, _ = predictor.shift(push)
     planted = joint_shift(mechanics(), [slippery(0.2)], push)
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
@@ -381,7 +393,7 @@ def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[
     refit = refit_base(bases["analytical"], table)
     after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
     assert gain(refit, after, held_out)[1].high < 0.0
-    design = design_of(None, DRIFT, mechanics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
+    design = design_of(None, DRIFT, mechanics(), Push.of(table), np.ones(3))
     assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 

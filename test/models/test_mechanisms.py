@@ -176,12 +176,6 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
     assert there == pytest.approx(sign * here, abs=1e-9)
 
 
-# --- responses that must be zero -------------------------------------------------------------------------------------
-
-
-# --- against the limit surface solved directly -----------------------------------------------------------------------
-
-
 # --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------
 
 

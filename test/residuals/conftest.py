@@ -5,14 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from coarse import coarsely
 
-import pytest
-from coarse import coarse_simulator
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarsely() -> Iterator[None]:
-    """For all tests of this folder."""
-    with coarse_simulator(4.0):
-        yield
+__all__ = ["coarsely"]

@@ -126,7 +126,7 @@ def test_an_unknown_constant_effect_keeps_no_name(deployed: PushModel) -> None:
 @pytest.mark.parametrize("mechanism", REFINEMENTS, ids=lambda m: m.name)
 def test_an_effect_of_a_refinement_is_its_response(mechanism: Any) -> None:
     table = pushes(8, 2)
-    push, mechanics = Push(table.inputs, table.duration, table.covariates), physics()
+    push, mechanics = Push.of(table), physics()
     if mechanism.name == "rim_pressure":  # of a patch
         mechanics = FittedMechanics(PushMechanics(mechanics.outline, mechanics.mechanics.pusher_radius))
     sizes = 0.5 * np.array([BY_NAME[name].spread for name in mechanism.quantities])

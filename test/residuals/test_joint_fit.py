@@ -260,9 +260,7 @@ def test_scores_of_an_exact_effect_are_those_of_a_refit_without_each_fold(deploy
     for fold in range(FOLDS):
         out = fit.rows.block % FOLDS == fold
         again = fit_along(evidence.take(~out), "contact_friction")
-        whole = fitted(FitRows(evidence), [candidate(evidence, "contact_friction", "elapsed_time", DRIFT)])
-        change = again.coefficients - whole.coefficients
-        left[out] -= (fit.columns @ change)[out]
+        left[out] -= (fit.columns @ (again.coefficients - fit.coefficients))[out]
     share = fit.rows.share
     unit = np.sqrt(np.average(left**2 * (fit.weighted.weight / share)[:, None], axis=0, weights=share))
     expected = -0.5 * (DEGREES + 3.0) * np.log1p(np.sum((left / unit) ** 2, axis=1) / DEGREES) - np.log(unit).sum()

@@ -133,8 +133,8 @@ def warmed(table: PushTable) -> PushTable:
     return replace(table, covariates={**table.covariates, "topic:/warmth": 20.0 + time + uneven})
 
 
-def both(seed: int = 3) -> PushTable:
-    return warmed(pushes(120, seed, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
+def both() -> PushTable:
+    return warmed(pushes(120, 3, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
 
 
 def test_terms_that_are_needed_stay(deployed: PushModel) -> None:
@@ -169,12 +169,22 @@ def test_an_only_term_stays_as_it_was_chosen(deployed: PushModel) -> None:
 def test_a_term_must_gain_its_error_and_a_further_one_five_nats_a_coefficient(
     deployed: PushModel, gain: float, further: bool, size: int, enough: bool
 ) -> None:
-    """A standard error of 10 nats over 100 blocks."""
-    rows = FitRows(evidence_of(deployed, pushes(100, 1)))
-    search = _Search(cast("Gate", None), rows)
-    uneven = np.where(np.arange(100) % 2, 1.0, -1.0)
-    before, after = (
-        cast("Fit", SimpleNamespace(scores=scores, coefficients=np.zeros(count)))
-        for scores, count in ((np.zeros(100), 0), (uneven + gain / 100.0, size))
-    )
-    assert search._worthwhile(after, before, further) == enough
+    search = _Search(cast("Gate", None), FitRows(evidence_of(deployed, pushes(100, 1))))
+    assert search._worthwhile(gaining(gain, size), gaining(0.0, 0), further) == enough
+
+
+@pytest.mark.parametrize(("gain", "dropped"), [(-12.0, True), (8.0, True), (12.0, False)])
+def test_a_term_is_dropped_unless_it_gains_what_a_further_one_must(
+    deployed: PushModel, gain: float, dropped: bool
+) -> None:
+    evidence = evidence_of(deployed, pushes(100, 1))
+    chosen = [_linear(evidence.table, deployed, *label) for label in (FRICTION, SPREAD)]
+    each = {((c.mechanism, c.covariate, c.basis),): gaining(0.0, 1) for c in chosen}
+    after = _Search(cast("Gate", None), FitRows(evidence), known=each)._dropped(chosen, gaining(gain, 2))
+    assert (after is not None) == dropped
+
+
+def gaining(gain: float, size: int) -> Fit:
+    """A fit of `size` coefficients that gains so many nats, with a standard error of 10 nats over 100 blocks."""
+    uneven = np.where(np.arange(100) % 2, 1.0, -1.0) if gain else np.zeros(100)
+    return cast("Fit", SimpleNamespace(scores=uneven + gain / 100.0, coefficients=np.zeros(size)))

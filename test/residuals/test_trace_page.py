@@ -13,33 +13,17 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
-import made_up_traces as made_up
 import numpy as np
 import pytest
-from made_up_traces import DRIFT, GRAIN, JUMP, PLACE, made_up_trace, planted, slippery, without_motion_effect
+from made_up_traces import LATE, TRACES, shifted, trace_of, without_motion_effect
 
 from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.measurement import CORRECTIONS
-from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.outcome import Sized, Trace, Verdict, trace_json
-from push_predictor.residuals.reporting.figures.channels import error_charts
-from push_predictor.residuals.reporting.figures.driver_basis import (
-    analysis_rows,
-    basis_charts,
-    binned,
-    bins_of,
-    determined,
-    per_push,
-    responses,
-    strength_of,
-)
-from push_predictor.residuals.reporting.figures.gallery import effect_figures
-from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
+from push_predictor.residuals.outcome import Sized, Trace, trace_json
 from push_predictor.residuals.reporting.page import best_of, role_of, write_trace_report
 from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval, interval_cell
 from push_predictor.residuals.reporting.sentences import answer, evidence, separating_words, summary_lines, worth
@@ -47,39 +31,17 @@ from push_predictor.residuals.reporting.sizes import shift_sizes
 
 ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
-LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
-MORE = Sized("relative change of the force over the driver's range", 0.2, 0.1, 0.3, "1")
-FASTER = ShiftedInput("velocity", (0.01, 0.05), (0.1, 0.15), 0.97)
-SIDES = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
-UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
 
 
-def shifted(trace: Trace, verdict: Verdict = "input_shift") -> Trace:
-    """A copy of a trace whose pushes were faster than those of training."""
-    return replace(trace, verdict=verdict, input_shift=(FASTER,))
+@pytest.fixture
+def drift() -> Trace:
+    """Contact friction that drifts; the push count correlates with the time."""
+    return trace_of("mechanism_only")
 
 
-TRACES: dict[str, Callable[[], Trace]] = {
-    "none": lambda: made_up_trace(count=90),
-    "effect": lambda: made_up_trace(planted("contact_friction", "elapsed_time", JUMP, 0.15)),
-    "constant": lambda: made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08)),
-    "two effects": lambda: made_up_trace(slippery(0.06), planted(*GRAIN, 0.1, 0.05)),
-    "category": lambda: made_up_trace(planted("contact_friction", "edge", SIDES, 0.1, -0.1, 0.05)),
-    "map": lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
-    "mechanism_only": lambda: made_up_trace(
-        slippery(0.06), verdict="mechanism_only", equivalent=("push_index",), undecided=True
-    ),
-    "driver_only": lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
-    "wrench_only": lambda: without_motion_effect("wrench_only", "surface_friction", "model_inputs", MORE),
-    "measurement": lambda: without_motion_effect("measurement", "clock_offset", "model_inputs", LATE),
-    "variance": lambda: without_motion_effect("variance", "", "elapsed_time", None),
-    "input_shift": lambda: shifted(made_up_trace(count=60)),
-}
-
-
-@cache
-def trace_of(name: str) -> Trace:
-    return TRACES[name]()
+@pytest.fixture
+def nothing() -> Trace:
+    return trace_of("none")
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +60,13 @@ def text_of(page: str) -> str:
     """What a reader sees, hover texts included."""
     body = page[page.index("<body>") :]
     return unescape(re.sub(r"<[^>]+>", "\n", body))
+
+
+def written(path: Path, trace: Trace) -> str:
+    """The text of the page."""
+    page = write_trace_report(path / "new" / "trace.html", trace).read_text()
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page), "the page is not self-contained"
+    return unescape(re.sub(r"<[^>]+>", " ", page))
 
 
 def sentences_of(page: str) -> list[str]:
@@ -249,7 +218,7 @@ def test_unknown_numbers_are_dashes(tmp_path: Path) -> None:
     assert not re.search(RAW, text)
 
 
-# --- order, folding and pictures -------------------------------------------------------------------------------------
+# --- sections and pictures -------------------------------------------------------------------------------------------
 
 
 def test_all_candidates_are_listed_and_the_found_one_is_marked(pages: Callable[[str], str]) -> None:
@@ -266,29 +235,6 @@ def test_key_picture_names_single_pushes(pages: Callable[[str], str], name: str)
     names = set(re.findall(r"<title>push (2-\d+): ", key))
     pushes = set(trace_of(name).analysis.pushes)
     assert names <= pushes and len(names) > 0.5 * len(pushes)
-
-
-def test_bins_that_do_not_determine_the_parameter_are_not_drawn() -> None:
-    assert determined(np.array([1.0, 1.2, 3.0, 1e9])).tolist() == [True, True, True, False]
-    assert determined(np.zeros(0)).tolist() == []
-
-
-def test_key_chart_shows_the_step_of_the_effect() -> None:
-    trace = trace_of("effect")
-    (chart,) = basis_charts(trace, strength_of(trace.terms[0]), analysis_rows(trace))
-    dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
-    before, after = dots.x < JUMP.place, dots.x > JUMP.place
-    assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
-
-
-def test_effect_is_drawn_once_with_all_its_parameters() -> None:
-    """The key picture shows the first effect's only parameter, and the noise along the covariate if it is unknown."""
-    along = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
-    grain = made_up_trace(slippery(0.06), planted("anisotropic_friction", "elapsed_time", along, 0.1, 0.05))
-    (figure,) = effect_figures(grain)
-    assert figure.count('<svg class="chart') == 2
-    assert "irection-dependent friction of the table against elapsed time (linear)" in figure
-    assert effect_figures(trace_of("effect")) == [] == effect_figures(trace_of("driver_only"))
 
 
 def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
@@ -337,21 +283,6 @@ def test_late_clock_is_drawn_against_the_speed_into_the_contact(tmp_path: Path) 
     assert "as the error predicts" in key
 
 
-def test_held_out_errors_are_shown_for_each_push_before_and_after() -> None:
-    trace = trace_of("effect")
-    shown = trace.comparisons
-    position, heading = error_charts(trace.held_out.table, "elapsed_time", [shown[0], shown[-1]])
-    for chart in (position, heading):
-        before, after = (mark for mark in chart.marks if isinstance(mark, Dots))
-        assert len(before.x) == len(after.x) == len(trace.held_out.table.pushes)
-        late = before.x > JUMP.place
-        assert np.mean(before.y[late]) > 1.3 * np.mean(after.y[late])
-    error = 1e3 * (shown[0].observed - shown[0].mean)[:, :2]
-    square = [np.mean(np.sum(error[shown[0].push_id == push] ** 2, axis=1)) for push in np.unique(shown[0].push_id)]
-    dots = next(mark for mark in position.marks if isinstance(mark, Dots))
-    np.testing.assert_allclose(dots.y, np.sqrt(square))
-
-
 def test_held_out_section_shows_errors_before_and_after_and_scores_with_intervals(pages: Callable[[str], str]) -> None:
     page = pages("effect")
     section = page[page.index("Before, refit, after") : page.index("<details>")]
@@ -377,66 +308,6 @@ def test_json_lists_the_input_shift() -> None:
     ranges = {"training": [0.01, 0.05], "now": [0.1, 0.15]}
     assert listed == [{"covariate": "velocity", **ranges, "share_outside": 0.97, "share_unvisited": 0.0}]
     assert trace_json(trace_of("none"))["input_shift"] == []
-
-
-# --- numbers ---------------------------------------------------------------------------------------------------------
-
-
-def test_no_number_is_minus_zero() -> None:
-    assert interval_cell(Estimate(-8.0, -13.0, -0.2)) == "−8\n[−13, 0]"
-
-
-def test_interval_of_a_small_shift_contains_it() -> None:
-    trace = trace_of("constant")
-    uncertain = replace(trace.terms[0], coefficients=np.array([1e-4]), covariance=np.array([[0.01]]))
-    for size in shift_sizes(trace, uncertain, trace.analysis).values():
-        assert size.low <= size.value <= size.high
-
-
-# --- bins ------------------------------------------------------------------------------------------------------------
-
-
-def test_levels_of_a_covariate_are_bins_of_their_own() -> None:
-    rng = np.random.default_rng(0)
-    speed = np.repeat([0.01, 0.02, 0.05], [30, 90, 30]) + 1e-4 * rng.standard_normal(150)
-    bins = bins_along(speed, 10)
-    assert [len(np.unique(bins[part])) for part in (slice(0, 30), slice(30, 120), slice(120, 150))] == [1, 1, 1]
-    assert len(np.unique(bins)) == 3 and len(np.unique(bins_along(rng.random(500), 10))) == 10
-
-
-def test_bins_have_the_mean_and_an_interval_around_it() -> None:
-    table = made_up.pushes(80, 4)
-    bins = means_along(axis_of(table, "elapsed_time"), table.push_id, table.covariates["elapsed_time"])
-    np.testing.assert_allclose(bins.place, bins.value)
-    assert len(bins.place) == 10
-    assert np.all((bins.low <= bins.value) & (bins.value <= bins.high))
-    bars = bins.bars("before", "s", "pushes, in bins")
-    assert bars.y is bins.value and bars.low is bins.low and bars.high is bins.high and " s (95 % CI " in bars.titles[0]
-
-
-def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:
-    table = made_up.pushes(10, 4)
-    assert axis_of(table, "model_inputs").label == "Elapsed time (s)"
-    assert axis_of(replace(table, covariates={}), "model_inputs").label == "Push count"
-    assert axis_of(table, "slider_heading").x.max() > 10.0  # degrees
-
-
-@pytest.fixture
-def drift() -> Trace:
-    """Contact friction that drifts; the push count correlates with the time."""
-    return trace_of("mechanism_only")
-
-
-@pytest.fixture
-def nothing() -> Trace:
-    return trace_of("none")
-
-
-def written(path: Path, trace: Trace) -> str:
-    """The text of the page."""
-    page = write_trace_report(path / "new" / "trace.html", trace).read_text()
-    assert not re.search(r'(?:src|href)="(?!data:|#)', page), "the page is not self-contained"
-    return unescape(re.sub(r"<[^>]+>", " ", page))
 
 
 # --- the page --------------------------------------------------------------------------------------------------------
@@ -521,6 +392,10 @@ def test_every_mechanism_and_covariate_has_a_phrase() -> None:
     assert all(phrases) and not any("_" in phrase for phrase in phrases)
 
 
+def test_no_number_is_minus_zero() -> None:
+    assert interval_cell(Estimate(-8.0, -13.0, -0.2)) == "−8\n[−13, 0]"
+
+
 def test_intervals_show_the_digits_that_they_determine() -> None:
     assert interval(Estimate(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
     assert interval(Estimate(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
@@ -533,56 +408,6 @@ def test_advice_matches_the_rivals() -> None:
     assert separating_words(["topic:/a", "topic:/b"]) == [
         "Vary topic /a and topic /b independently: change one while the others stay constant."
     ]
-
-
-# --- what the pictures show ------------------------------------------------------------------------------------------
-
-
-def test_bins_recover_the_planted_drift_with_and_without_an_extended_model(drift: Trace) -> None:
-    strength = strength_of(drift.terms[0])
-    for rows in (analysis_rows(drift), analysis_rows(replace(drift, extended=None))):
-        time = rows.table.covariates["elapsed_time"]
-        found = binned(strength, rows, responses(drift, strength, rows), time, bins_of(DRIFT, rows.table))
-        truth = 0.06 * (found.place - 500.0) / 300.0
-        inside = (found.low[:, 0] <= truth) & (truth <= found.high[:, 0])
-        assert len(found.place) >= 3 and inside.mean() >= 0.6
-        np.testing.assert_allclose(found.value[:, 0], truth, atol=0.04)
-
-
-@pytest.mark.slow
-def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
-    """A step, fitted by a line: the bins stay on the step."""
-    trace = trace_of("effect")
-    line = made_up.traced(trace.model, trace.analysis, trace.held_out.table, (slippery(0.1),))
-    strength, rows = strength_of(line.terms[0]), analysis_rows(line)
-    time = rows.table.covariates["elapsed_time"]
-    found = binned(strength, rows, responses(line, strength, rows), time, bins_of(DRIFT, rows.table))
-    jump = found.value[found.place > 650.0, 0].mean() - found.value[found.place < 600.0, 0].mean()
-    assert jump == pytest.approx(0.15, abs=0.04)
-    early = found.value[found.place < 600.0, 0]
-    assert abs(early[-1] - early[0]) < 0.4 * 0.15
-
-
-def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
-    strength = strength_of(drift.terms[0])
-    _, half = strength.curve({"elapsed_time": np.array([500.0, 800.0])}, 2)
-    np.testing.assert_allclose(half[:, 0], [0.0, 1.96 * np.sqrt(drift.terms[0].covariance[0, 0])], rtol=1e-12)
-
-
-def test_single_pushes_have_the_curve_as_median(drift: Trace) -> None:
-    strength, rows = strength_of(drift.terms[0]), analysis_rows(drift)
-    place, value = per_push(strength, rows, responses(drift, strength, rows), rows.table.covariates["elapsed_time"])
-    assert len(place) == len(drift.analysis.pushes)
-    off = value[:, 0] - strength.curve({"elapsed_time": place}, len(place))[0][:, 0]
-    assert abs(np.nanmedian(off)) < 0.02
-
-
-def test_shift_intervals_contain_the_planted_size(drift: Trace) -> None:
-    sizes = shift_sizes(drift, drift.terms[0], drift.analysis)
-    exact = replace(drift.terms[0], coefficients=np.array([0.06]), covariance=np.zeros((1, 1)))
-    true = shift_sizes(drift, exact, drift.analysis)
-    for size, truth in zip(sizes.values(), true.values(), strict=True):
-        assert size.low <= truth.value <= size.high and truth.low == pytest.approx(truth.value)
 
 
 def test_tested_candidates_are_unique_pairs_with_smallest_p_and_role(drift: Trace) -> None:

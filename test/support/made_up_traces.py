@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -22,11 +24,12 @@ from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import compared, gain
-from push_predictor.residuals.outcome import FoundEffect, HeldOut, Sized, Tested, Trace
+from push_predictor.residuals.outcome import FoundEffect, HeldOut, Sized, Tested, Trace, Verdict
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
 DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
@@ -148,3 +151,39 @@ def without_motion_effect(verdict: Any, mechanism: str, covariate: str, size: Si
     effect = FoundEffect(mechanism or None, covariate, outputs, "constant", size, 0.002, float("nan"))
     kind: Literal["mean", "variance"] = "variance" if verdict == "variance" else "mean"
     return replace(made_up_trace(count=60), verdict=verdict, effects=(effect,), kind=kind, **other)
+
+
+LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
+MORE = Sized("relative change of the force over the driver's range", 0.2, 0.1, 0.3, "1")
+FASTER = ShiftedInput("velocity", (0.01, 0.05), (0.1, 0.15), 0.97)
+SIDES = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
+UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
+
+
+def shifted(trace: Trace, verdict: Verdict = "input_shift") -> Trace:
+    """A copy of a trace whose pushes were faster than those of training."""
+    return replace(trace, verdict=verdict, input_shift=(FASTER,))
+
+
+TRACES: dict[str, Callable[[], Trace]] = {
+    "none": lambda: made_up_trace(count=90),
+    "effect": lambda: made_up_trace(planted("contact_friction", "elapsed_time", JUMP, 0.15)),
+    "constant": lambda: made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08)),
+    "two effects": lambda: made_up_trace(slippery(0.06), planted(*GRAIN, 0.1, 0.05)),
+    "category": lambda: made_up_trace(planted("contact_friction", "edge", SIDES, 0.1, -0.1, 0.05)),
+    "map": lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
+    "mechanism_only": lambda: made_up_trace(
+        slippery(0.06), verdict="mechanism_only", equivalent=("push_index",), undecided=True
+    ),
+    "driver_only": lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
+    "wrench_only": lambda: without_motion_effect("wrench_only", "surface_friction", "model_inputs", MORE),
+    "measurement": lambda: without_motion_effect("measurement", "clock_offset", "model_inputs", LATE),
+    "variance": lambda: without_motion_effect("variance", "", "elapsed_time", None),
+    "input_shift": lambda: shifted(made_up_trace(count=60)),
+}
+
+
+@cache
+def trace_of(name: str) -> Trace:
+    """The trace of this name in TRACES."""
+    return TRACES[name]()

@@ -9,18 +9,12 @@ section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from push_predictor.types import Array
-
-Found = TypeVar("Found")
-MOST_REMEMBERED, MOST_ROWS = 4, 5_000  # results, and rows of one: a planner's batch of a million would take 100 MB
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
 # With a hundred nodes the density is accurate to 1e-6 up to a standard deviation of g of 1.5.
@@ -51,23 +45,6 @@ class LatentPrediction:
         return self.variance + self.process_variance
 
 
-class Remembered(Generic[Found]):
-    """The last few results of several rows: moments, densities, correlation and tails of the same rows share them."""
-
-    def __init__(self) -> None:
-        self._known: dict[bytes, Found] = {}
-
-    def of(self, compute: Callable[[], Found], *given: NDArray[Any]) -> Found:
-        """The result for these arrays, computed if it is not known. It must not be changed."""
-        if not 1 < len(given[0]) <= MOST_ROWS:
-            return compute()
-        key = b"".join(each.tobytes() for each in given)
-        if (known := self._known.get(key)) is None:
-            known = compute()
-            self._known = dict([*self._known.items(), (key, known)][-MOST_REMEMBERED:])
-        return known
-
-
 def exact_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
     """Log p(outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
     variances = _variances_at_nodes(prediction)
@@ -96,12 +73,6 @@ def density_of_constant_noise(squares: Array, noise_mean: float, noise_spread: f
 def gaussian_log_density(prediction: LatentPrediction, outcomes: Array) -> Array:
     """Log N(outcomes | mean, outcome_variance), the Gaussian of the same mean and variance, shape (m,)."""
     return _log_normal(outcomes, prediction.mean, prediction.outcome_variance)
-
-
-def exact_cdf(prediction: LatentPrediction, outcomes: Array) -> Array:
-    """P(y <= outcomes) under the exact predictive, outcomes (m,), shape (m,)."""
-    deviations = (outcomes - prediction.mean)[:, None] / np.sqrt(_variances_at_nodes(prediction))
-    return np.asarray(scipy.special.ndtr(deviations) @ np.exp(_LOG_WEIGHTS))
 
 
 def _variances_at_nodes(prediction: LatentPrediction) -> Array:

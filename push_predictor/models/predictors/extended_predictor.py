@@ -14,15 +14,15 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
 from push_predictor.models.effects.traced_session import TracedSession
-from push_predictor.models.gaussian_process.prediction import Remembered
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Shift
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
+from push_predictor.models.remembered import Remembered
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 
-SIDE, HEADING = "edge", "push_heading"
+SIDE, HEADING = "edge", "slider_heading"
 GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
 
 
@@ -128,6 +128,7 @@ class ExtendedPredictor:
         if not self.effects:
             return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
         push = self.completed(push)
+        # Mechanics with a grain take the slider's heading, where it is given, in place of the push heading they need.
         used = [push.covariates[name] for name in (*self.covariates, HEADING) if name in push.covariates]
         return self._known.of(lambda: self._shift(push), push.inputs, push.duration, *used)
 

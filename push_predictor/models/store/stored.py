@@ -149,9 +149,8 @@ def _correlation(a: SimpleNamespace) -> None:
 
 def _regression(a: SimpleNamespace) -> None:
     """One length scale for each input; others would be broadcast."""
-    for name in ("log_lengthscales", "noise_log_lengthscales"):
-        found = getattr(a.parameters, name, a.inputs[0])
-        if found.shape != a.inputs.shape[1:]:
+    for name, found in vars(a.parameters).items():
+        if name.endswith("log_lengthscales") and found.shape != a.inputs.shape[1:]:
             raise ValueError(f"parameters.{name}: shape {found.shape} is not accepted, give {a.inputs.shape[1:]}")
 
 
