@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from numpy.typing import NDArray
 
 Found = TypeVar("Found")
-MOST_REMEMBERED, MOST_ROWS = 4, 5_000  # results, and rows of one: a planner's batch of a million would take 100 MB
+MOST_REMEMBERED, MOST_ROWS = 4, 50_000  # results, and rows of one: a batch of a million would take 100 MB
 
 
 class Remembered(Generic[Found]):
