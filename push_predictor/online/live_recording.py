@@ -54,7 +54,7 @@ class LiveRecording:
         """Declare the type and QoS of a topic, once."""
         try:
             schema, problem = definition_text(topic.type), ""
-        except (RecordingError, OSError, UnicodeDecodeError) as error:
+        except RecordingError as error:
             schema, problem = "", f"{topic.name} is recorded without the definition of its type: {error}."
         self.note(f"{topic.name} definition", problem)
         self._declared[topic.name] = topic, schema

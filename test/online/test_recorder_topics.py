@@ -82,3 +82,6 @@ def test_definitions_contain_each_inner_type_once(tmp_path: Path) -> None:
     assert definition_text("lab/msg/A", [Path("/nowhere"), tmp_path]) == (
         f"B one\nB[] two\nother/C c\n{rule}\nMSG: lab/B\nint32 COUNT=3\nfloat64 x\n{rule}\nMSG: other/C\nstring name\n"
     )
+    (tmp_path / "other" / "msg" / "C.msg").write_bytes(b"# \xff\nstring name\n")
+    with pytest.raises(RecordingError, match=r"other/msg/C\.msg cannot be read: 'utf-8' codec"):
+        definition_text("lab/msg/A", [tmp_path])

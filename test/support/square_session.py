@@ -67,7 +67,7 @@ def with_effect(table: PushTable, mechanism: str, basis: DriverBasis, *coefficie
     """The pushes with an effect on the mechanics that made them, exact for large ones."""
     size = np.array(coefficients)
     effect = Effect(mechanism, "any", basis, size, np.zeros((len(size), len(size))), np.ones(3))
-    push = Push(table.inputs, table.duration, table.covariates)
+    push = Push.of(table)
     return replace(table, outcomes=table.outcomes + joint_shift(MECHANICS, [effect], push))
 
 

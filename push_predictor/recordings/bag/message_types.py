@@ -121,7 +121,10 @@ def _installed_text(type_name: str, shares: Sequence[Path]) -> str:
     for share in shares:
         file = share / package / "msg" / f"{name}.msg"
         if file.is_file():
-            return file.read_text(encoding="utf-8").rstrip("\n") + "\n"
+            try:
+                return file.read_text(encoding="utf-8").rstrip("\n") + "\n"
+            except (OSError, UnicodeDecodeError) as error:
+                raise RecordingError(f"{file} cannot be read: {error}") from error
     raise RecordingError(f"{package}/msg/{name}.msg: not found in {', '.join(map(str, shares))}")
 
 
