@@ -52,7 +52,7 @@ def section(study: Study) -> Section:
     window, weights = study.work.run("modes of repeated pushes", shape, calls)[0], block_weights(grid.seen)
     of_model = _model(study, grid)
     loss = model_loss(grid.seen, window, of_model)
-    power, _ = found_at(FAR, _repetitions(grid), 3 * len(grid.seen), LEVEL)
+    power = found_at(FAR, _repetitions(grid), 3 * len(grid.seen), LEVEL)
     return Section(
         {
             "modes": modes(window, power),
