@@ -111,7 +111,8 @@ def _by_speed(plan: Plan, table: PushTable) -> tuple[IntArray, IntArray]:
 
 def _half_width(cell: Repetitions) -> Array:
     """Half-width (3,) of the interval of each standard deviation, as a share of it."""
-    return np.asarray((cell.intervals[1][1] - cell.intervals[1][0]) / 2.0 / cell.sd)
+    low, high = cell.sd_interval
+    return np.asarray((high - low) / 2.0 / cell.sd)
 
 
 def _corpus_table(corpus: Corpus) -> Table:
