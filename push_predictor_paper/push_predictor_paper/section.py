@@ -19,6 +19,8 @@ from push_predictor_paper.verdict import Evidence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
+OUTPUT_NAMES = ("dx", "dy", "rotation")
+
 
 class TooFewError(Exception):
     """The data are too few for the claims of a section. The message states what they lack."""
@@ -79,6 +81,11 @@ class Section:
     tables: Sequence[Table] = ()
     pictures: Sequence[Picture] = ()
     notes: Sequence[str] = ()
+
+
+def speed_text(speed: float) -> str:
+    """A speed (m/s) in words: 20 mm/s."""
+    return f"{1e3 * speed:.0f} mm/s"
 
 
 def picture(path: Path, size: tuple[float, float], paint: Callable[[Canvas], None], caption: str) -> Picture:

@@ -54,6 +54,11 @@ class Corpus:
         """Short name for a sentence: "simulated", "measured: mit_square/pushes_a"."""
         return self.origin if self.origin == "simulated" else self.title.partition(",")[0]
 
+    @property
+    def reference_name(self) -> str:
+        """The reference pair in a sentence: "rect1 on plywood"."""
+        return " on ".join(self.reference)
+
 
 def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus:
     """Simulate the training recordings of a plan and find their windows. keep: folder for the recordings."""

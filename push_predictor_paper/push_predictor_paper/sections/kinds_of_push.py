@@ -17,7 +17,7 @@ from push_predictor_paper.data.repetitions import DRAWS, FEWEST, STEP, RepeatedG
 from push_predictor_paper.estimate import of_draws
 from push_predictor_paper.painters.trajectories import Trajectories, paint_trajectories
 from push_predictor_paper.plan import GRID_SPEED
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.statistics.grid_maps import place_text
 from push_predictor_paper.statistics.modes import FAR, count_with_modes, dip_tests, found_at
 from push_predictor_paper.study import Study
@@ -124,7 +124,7 @@ def _table(grid: RepeatedGrid, kinds: Kinds) -> Table:
     )
     broken = sum(len(c.paths) - len(p) for c, p in zip(kinds.cells, kinds.paths, strict=True))
     caption = (
-        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {1e3 * GRID_SPEED:.0f} mm/s. Chosen "
+        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {speed_text(GRID_SPEED)}. Chosen "
         f"among {len(kinds.cells)} that move the slider to their end ({kinds.dropped} do not, or begin at a corner). "
         f"Intervals resample repetitions; for the first two, the half that did not choose them. {broken} of "
         f"{sum(len(c.paths) for c in kinds.cells)} repetitions are dropped, see below."
@@ -164,7 +164,7 @@ def _picture(study: Study, kinds: Kinds) -> Picture:
         (10.0, 9.0),
         lambda figure: paint_trajectories(figure, grid.rig, shown),
         "Trajectories of the most convergent push, the most divergent one, and the one with the largest dip. All "
-        f"repetitions of three pushes of 1 cm at {1e3 * GRID_SPEED:.0f} mm/s, simulated, {grid.shape} on "
+        f"repetitions of three pushes of 1 cm at {speed_text(GRID_SPEED)}, simulated, {grid.shape} on "
         f"{grid.surface}. c: contact as a fraction of the side; angle from its normal. Above: slider at the start, tip "
         "and its path (grey), trajectories of the slider's centre (green). Middle: the same trajectories. Below: final "
         "poses (dots) about their mean, with the 95 % ellipse of a Gaussian (red).",

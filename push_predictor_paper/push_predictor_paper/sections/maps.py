@@ -22,7 +22,7 @@ from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.painters.trajectories import paint_outcomes
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
     OF_BLOCKS,
@@ -54,7 +54,6 @@ NAMED: dict[str, tuple[Place, ...]] = {
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 PEAK_CLAIMS = ("forward", "sideways", "turning")  # by output
 ONE_STEP = Bound(high=1.0 + 1e-6)
-NAMES = ("dx", "dy", "rotation")
 QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the process noise alone"}
 NOTES = (
     "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
@@ -170,11 +169,11 @@ def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]
 
 def agreement_evidence(found: Likenesses) -> dict[str, Evidence]:
     """Do the maps of mean and of standard deviation agree?"""
-    plain = ", ".join(f"{n} {like.correlation.text()}" for n, like in zip(NAMES, found["sd", "GP"], strict=True))
+    plain = ", ".join(f"{n} {like.correlation.text()}" for n, like in zip(OUTPUT_NAMES, found["sd", "GP"], strict=True))
     notes = {"mean": "", "sd": f"The GP has one noise level for all pushes: {plain}."}
     return {
         f"{quantity}_map": Evidence(
-            [Figure(n, like.correlation) for n, like in zip(NAMES, found[quantity, "VHGP"], strict=True)], note
+            [Figure(n, like.correlation) for n, like in zip(OUTPUT_NAMES, found[quantity, "VHGP"], strict=True)], note
         )
         for quantity, note in notes.items()
     }
@@ -207,7 +206,7 @@ def _agreement_table(study: Study, found: Likenesses) -> Table:
     models = list(dict.fromkeys(model for _, model in found))
     rows = []
     for quantity, what in QUANTITIES.items():
-        for k, name in enumerate(NAMES):
+        for k, name in enumerate(OUTPUT_NAMES):
             likes = [found[quantity, model][k] for model in models]
             cells: list[object] = []
             for like in likes:

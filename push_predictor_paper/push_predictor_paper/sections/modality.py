@@ -17,7 +17,7 @@ from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, exactly, of_draws
 from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.painters.histograms import WIDTHS, Histogram, paint_histograms, shown_values
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, block_weights, place_text
 from push_predictor_paper.statistics.modes import (
     FAR,
@@ -32,7 +32,6 @@ from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
 LISTED = 10
-OUTPUT_NAMES = ("dx", "dy", "rotation")
 NOTES = (
     "Hartigan's dip test measures the distance of the outcomes' distribution from the nearest unimodal one. Its p "
     "value is against the uniform, the unimodal distribution hardest to distinguish from two modes, so that it rejects "
