@@ -67,8 +67,7 @@ def _maps(study: Study, questions: Sequence[Question]) -> list[ModelMap]:
     calls = []
     for corpus, pair, kind, seed, grid in questions:
         pushes = corpus.sets[pair]
-        n = min(study.plan.size, len(pushes.table))
-        calls.append((pushes, Fit(kind, n, "none", seed), _inputs(pushes, grid)))
+        calls.append((pushes, Fit(kind, study.size_of(pushes), "none", seed), _inputs(pushes, grid)))
     return [_map(answer) for answer in study.work.run("models asked for maps", ask, calls)]
 
 

@@ -254,4 +254,4 @@ def _picture(study: Study, model: ModelMap, predicted: Array, quantity: str) -> 
 
 
 def _windows(study: Study) -> int:
-    return min(study.plan.size, len(study.simulated.sets[study.simulated.reference].table))
+    return study.size_of(study.simulated.sets[study.simulated.reference])

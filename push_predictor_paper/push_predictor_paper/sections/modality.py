@@ -113,7 +113,7 @@ def gaussian_good(at: Shape, loss: Array, weights: Array) -> Evidence:
 def _model(study: Study, grid: RepeatedGrid) -> list[LogDensities]:
     """The VHGP's densities of every push: at its repetitions, then at the values of the plot."""
     pushes = study.simulated.sets[study.simulated.reference]
-    fit = Fit("vhgp", min(study.plan.size, len(pushes.table)), "none", 0)
+    fit = Fit("vhgp", study.size_of(pushes), "none", 0)
     outcomes = [np.concatenate([cell.outcomes, shown_values(cell.outcomes)]) for cell in grid.seen]
     sizes = [len(rows) for rows in outcomes]
     call = (pushes, fit, np.repeat(grid.typical_inputs, sizes, axis=0), np.concatenate(outcomes))

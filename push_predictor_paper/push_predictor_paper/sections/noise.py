@@ -131,7 +131,7 @@ def _learned_table(study: Study, corpus: Corpus) -> list[Table]:
     ]
     caption = (
         f"The process noise learned from {corpus.reference_name}. {corpus.title}. VHGPs of "
-        f"{min(study.plan.size, len(corpus.sets[corpus.reference].table))} training windows at 20 mm/s, 61 angles and "
+        f"{study.size_of(corpus.sets[corpus.reference])} training windows at 20 mm/s, 61 angles and "
         f"41 contacts within the training data; mean over {study.plan.seeds} draws of training windows with Student's "
         "interval. The paper: 10 to 40 %, up to an order of magnitude."
     )
