@@ -10,7 +10,7 @@ import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor_paper.estimate import Estimate
@@ -19,20 +19,11 @@ from push_predictor_paper.verdict import Evidence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
+OUTPUT_NAMES = ("dx", "dy", "rotation")
+
 
 class TooFewError(Exception):
     """The data are too few for the claims of a section. The message states what they lack."""
-
-
-@runtime_checkable
-class Shown(Protocol):
-    """A number with its interval, as text for a cell (the interval on a second line) and for the JSON."""
-
-    def cell(self) -> str:
-        """The text."""
-
-    def json(self) -> Any:
-        """The number."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +53,11 @@ class Table:
     @property
     def texts(self) -> list[list[str]]:
         """The text of every cell; the interval of a number is its second line."""
-        return [[cell.cell() if isinstance(cell, Shown) else str(cell) for cell in row] for row in self.rows]
+        return [[cell.cell() if isinstance(cell, Number) else str(cell) for cell in row] for row in self.rows]
 
     def json(self) -> dict[str, Any]:
         """Caption, and a list of rows by head."""
-        rows = [[cell.json() if isinstance(cell, Shown) else cell for cell in row] for row in self.rows]
+        rows = [[cell.json() if isinstance(cell, Number) else cell for cell in row] for row in self.rows]
         return {"caption": self.caption, "rows": [dict(zip(self.head, row, strict=True)) for row in rows]}
 
     def csv(self) -> str:
@@ -90,6 +81,11 @@ class Section:
     tables: Sequence[Table] = ()
     pictures: Sequence[Picture] = ()
     notes: Sequence[str] = ()
+
+
+def speed_text(speed: float) -> str:
+    """A speed (m/s) in words: 20 mm/s."""
+    return f"{1e3 * speed:.0f} mm/s"
 
 
 def picture(path: Path, size: tuple[float, float], paint: Callable[[Canvas], None], caption: str) -> Picture:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from push_predictor_paper.data.corpus import Corpus, simulated_corpus
+from push_predictor_paper.data.corpus import Corpus, PushSet, simulated_corpus
 from push_predictor_paper.data.measured import measured_corpora
 from push_predictor_paper.data.repetitions import RepeatedGrid, repeated_grid
 from push_predictor_paper.plan import Plan
@@ -36,6 +36,10 @@ class Study:
     def reference_grid(self) -> RepeatedGrid:
         """The grid on the reference surface."""
         return self.grids[self.simulated.reference[1]]
+
+    def size_of(self, pushes: PushSet) -> int:
+        """Training windows of a model that holds nothing back: the plan's size, or all that the set has."""
+        return min(self.plan.size, len(pushes.table))
 
     def file(self, name: str, corpus: Corpus, *more: str) -> Path:
         """The file of a picture of a corpus."""

@@ -72,14 +72,14 @@ def test_repetitions_of_one_push_differ_and_follow_its_command() -> None:
     assert np.all(cell.sd > 0.0)
     assert np.all(np.abs(cell.inputs.mean(axis=0) - [0.02, 0.125, 0.0]) < [5e-4, 2e-3, 2e-2])
     np.testing.assert_allclose(cell.paths[:, 10, :2], cell.outcomes[:, :2], atol=2e-4)  # 10 steps of 20 ms are a window
-    low, high = cell.intervals[0]
-    assert np.all(low < cell.mean) and np.all(cell.mean < high)
+    low, high = cell.sd_interval
+    assert np.all(low < cell.sd) and np.all(cell.sd < high)
 
 
 def test_push_with_too_few_repetitions_has_no_mean() -> None:
     cell = made_up_grid().cells[0]
     few = replace(cell, outcomes=cell.outcomes[: FEWEST - 1])
-    assert np.isnan(few.mean).all() and np.isnan(few.sd).all() and np.isnan(few.intervals[0]).all()
+    assert np.isnan(few.mean).all() and np.isnan(few.sd).all() and np.isnan(few.sd_interval).all()
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> 
 
 
 def test_one_of_many_tests_finds_less_than_one_alone() -> None:
-    corrected, single = found_at(5.0, 60, 30, 0.05)
+    corrected, single = (found_at(5.0, 60, tests, 0.05) for tests in (30, 1))
     assert 0.0 < corrected < single
 
 

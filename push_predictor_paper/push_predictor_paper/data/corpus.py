@@ -19,6 +19,7 @@ from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
+from push_predictor.simulation.spec import simulated_rig
 from push_predictor.types import Array
 from push_predictor_paper.plan import SHAPES, SURFACES, WINDOW, Plan
 from push_predictor_paper.work import Work
@@ -54,6 +55,11 @@ class Corpus:
         """Short name for a sentence: "simulated", "measured: mit_square/pushes_a"."""
         return self.origin if self.origin == "simulated" else self.title.partition(",")[0]
 
+    @property
+    def reference_name(self) -> str:
+        """The reference pair in a sentence: "rect1 on plywood"."""
+        return " on ".join(self.reference)
+
 
 def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus:
     """Simulate the training recordings of a plan and find their windows. keep: folder for the recordings."""
@@ -71,11 +77,9 @@ def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus
 def learning_set(plan: Plan, shape: str, surface: str, keep: Path | None = None) -> PushSet:
     """Simulate one training recording and find its windows."""
     spec = learning_spec(plan, shape, surface)
-    recording = simulate(spec)
+    recording, rig = simulate(spec), simulated_rig(spec)
     if keep is not None:
         write_recording(keep / spec.name, recording)
-    rig = recording.rig
-    assert rig is not None  # the simulator knows its rig
     return PushSet(bare(windows_to_table(find_windows(recording, rig))), rig)
 
 

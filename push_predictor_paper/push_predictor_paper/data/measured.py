@@ -57,7 +57,7 @@ class Imported:
 class MitPush:
     """A straight push at constant speed (mm/s); pair: shape and surface; place: its file."""
 
-    pair: tuple[str, str]
+    pair: Pair
     speed: float
     place: MitPlace
 

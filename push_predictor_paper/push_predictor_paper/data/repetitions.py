@@ -68,13 +68,12 @@ class Repetitions:
         return self.outcomes.std(axis=0, ddof=1) if self.enough else np.full(3, np.nan)
 
     @cached_property
-    def intervals(self) -> tuple[Array, Array]:
-        """95 % intervals (2, 3) of mean and sd, from resampling repetitions; each is a separate push."""
+    def sd_interval(self) -> Array:
+        """95 % interval (2, 3) of the sd, from resampling repetitions; each is a separate push."""
         if not self.enough:
-            return np.full((2, 3), np.nan), np.full((2, 3), np.nan)
+            return np.full((2, 3), np.nan)
         rows = np.random.default_rng(0).integers(0, len(self.outcomes), (DRAWS, len(self.outcomes)))
-        drawn, ends = self.outcomes[rows], [0.025, 0.975]
-        return np.quantile(drawn.mean(axis=1), ends, axis=0), np.quantile(drawn.std(axis=1, ddof=1), ends, axis=0)
+        return np.asarray(np.quantile(self.outcomes[rows].std(axis=1, ddof=1), [0.025, 0.975], axis=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,6 @@ from push_predictor_paper.data.corpus import on_the_table, pair_number
 from push_predictor_paper.plan import Plan
 
 SCALED_SPEED = 0.01  # m/s, to which all pushes are scaled
-TURN = (0.05, 0.08)  # m/s, the top speed at which the paper's models are best
 TRAVEL = 0.005  # m of the tip in a window, at every speed
 WINDOWS = 4  # of a push
 # m/s^2, so that a tip at 500 mm/s, too, starts 4 mm before the touch: a push then meets the same draws at every speed

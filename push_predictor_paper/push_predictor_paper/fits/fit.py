@@ -24,11 +24,7 @@ from push_predictor_paper.work import Work
 
 SplitName = Literal["push", "random", "none"]
 SPLITS: tuple[SplitName, ...] = ("push", "random")
-SPLIT_WORDS = {
-    "push": "whole pushes held out (5 folds)",
-    "random": "random split of windows",
-    "none": "trained on this set, scored on another",
-}
+SPLIT_WORDS = {"push": "whole pushes held out (5 folds)", "random": "random split of windows"}
 SPLIT_SHORT = {"push": "by push", "random": "random"}
 KINDS = ("analytical", "gp", "vhgp")
 KIND_NAMES = {"analytical": "analytical", "gp": "GP", "vhgp": "VHGP"}
@@ -66,11 +62,6 @@ class Score:
     def nlpd(self) -> Array:
         """NLPD by output (3,), moment-matched Gaussian, SI units."""
         return np.asarray(self.push_scores.totals().nlpd[0])
-
-    @property
-    def exact_nlpd(self) -> Array:
-        """NLPD by output (3,), exact predictive density, SI units."""
-        return np.asarray(self.push_scores.totals().exact_nlpd[0])
 
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:

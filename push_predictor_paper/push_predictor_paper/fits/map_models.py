@@ -58,18 +58,8 @@ def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
 
 def averaged(models: Sequence[ModelMap]) -> ModelMap:
     """Mean map of models of several draws of training windows; known where all of them are."""
-    mean, sd, process_sd = (_mean(models, what) for what in ("mean", "sd", "process_sd"))
+    mean, sd, process_sd = (np.mean([getattr(m, of) for m in models], axis=0) for of in ("mean", "sd", "process_sd"))
     return ModelMap(mean, sd, process_sd, None)
-
-
-def together(answers: Sequence[Answer]) -> Answer:
-    """Mean of the predictions of such models for the same pushes."""
-    mean, sd, process_sd = (_mean(answers, what) for what in ("mean", "sd", "process_sd"))
-    return Answer(mean, sd, process_sd, np.all([a.in_domain for a in answers], axis=0))
-
-
-def _mean(several: Sequence[ModelMap | Answer], what: str) -> Array:
-    return np.asarray(np.mean([getattr(one, what) for one in several], axis=0))
 
 
 def _maps(study: Study, questions: Sequence[Question]) -> list[ModelMap]:
@@ -77,8 +67,7 @@ def _maps(study: Study, questions: Sequence[Question]) -> list[ModelMap]:
     calls = []
     for corpus, pair, kind, seed, grid in questions:
         pushes = corpus.sets[pair]
-        n = min(study.plan.size, len(pushes.table))
-        calls.append((pushes, Fit(kind, n, "none", seed), _inputs(pushes, grid)))
+        calls.append((pushes, Fit(kind, study.size_of(pushes), "none", seed), _inputs(pushes, grid)))
     return [_map(answer) for answer in study.work.run("models asked for maps", ask, calls)]
 
 

@@ -143,9 +143,9 @@ def _table(corpus: Corpus, found: Curves, split: SplitName, n: int) -> Table:
             gaps = [difference_by_push(scores[a], scores[b], statistic) for a, b in PAIRS_OF_KINDS]
             rows.append((f"{label}, {name}", *(Number(e, form) for e in (*values, *gaps))))
     caption = (
-        f"Scores at n = {n}, {SPLIT_WORDS[split]}. {_pair(corpus)}, pushes: {corpus.name}, {len(scores['gp'].windows)} "
-        "scored. Intervals resample whole pushes; differences are paired. NLPD in SI units; for the analytical model, "
-        "of a Gaussian with the covariance of its training residuals."
+        f"Scores at n = {n}, {SPLIT_WORDS[split]}. {corpus.reference_name}, pushes: {corpus.name}, "
+        f"{len(scores['gp'].windows)} scored. Intervals resample whole pushes; differences are paired. NLPD in SI "
+        "units; for the analytical model, of a Gaussian with the covariance of its training residuals."
     )
     gaps_of = (f"{KIND_NAMES[b]} minus {KIND_NAMES[a]}" for a, b in PAIRS_OF_KINDS)
     return Table(caption, ("", *(KIND_NAMES[kind] for kind in KINDS), *gaps_of), tuple(rows))
@@ -160,7 +160,7 @@ def _paper_table(corpus: Corpus, found: Curves, n: int) -> Table:
         shifted = (Number(Estimate(e.value + shift, e.low + shift, e.high + shift)) for e in ours)
         rows.append((label, *PAPER[measure], *shifted))
     caption = (
-        f"The paper's table next to ours: {corpus.name}, {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
+        f"The paper's table next to ours: {corpus.name}, {corpus.reference_name}, n = {n}, {SPLIT_WORDS['push']}, "
         f"{len(scores['gp'].windows)} pushes, interval by push. The paper learns from the MIT push data set. It names "
         "neither test set, split, size nor units of its table. Its NLPD are in the range of mm and rad, so ours are in "
         "these units here (SI + 13.8155)."
@@ -176,7 +176,7 @@ def _gain_table(corpus: Corpus, gains: Gains) -> Table:
         for n in gains[split]
     ]
     caption = (
-        f"NMSE of the VHGP minus that of the GP; below 0 the VHGP's mean is better. {_pair(corpus)}, pushes: "
+        f"NMSE of the VHGP minus that of the GP; below 0 the VHGP's mean is better. {corpus.reference_name}, pushes: "
         f"{corpus.name}. Intervals by push, paired. The paper: 0.37 minus 0.38, total."
     )
     return Table(caption, ("n", "total", *OUTPUTS), rows)
@@ -204,7 +204,7 @@ def _gain_picture(study: Study, corpus: Corpus, gains: Gains) -> Picture:
         (7.4, 3.4),
         partial(paint_curves, rows=rows),
         "Difference in NMSE between VHGP and GP over training size, total and per output. Below 0 the VHGP's mean is "
-        f"better. Bands: 95 % intervals by push. {_pair(corpus)}, pushes: {corpus.name}.",
+        f"better. Bands: 95 % intervals by push. {corpus.reference_name}, pushes: {corpus.name}.",
     )
 
 
@@ -227,7 +227,8 @@ def _picture(study: Study, corpus: Corpus, found: Curves, sizes: Sizes, where: C
         partial(paint_curves, rows=rows),
         "NMSE and NLPD of analytical model, GP and VHGP over training size. Bands: 95 % intervals by push. Marks at "
         "the foot: size from which GP and VHGP beat the analytical model, with interval (pointing right: beyond the "
-        f"last size). A triangle at the top marks a value beyond the axis. {_pair(corpus)}, pushes: {corpus.name}.",
+        f"last size). A triangle at the top marks a value beyond the axis. {corpus.reference_name}, pushes: "
+        f"{corpus.name}.",
     )
 
 
@@ -235,7 +236,3 @@ def _line(corpus: Corpus, found: Curves, kind: str, split: SplitName, measure: s
     statistic = output_statistic(measure, None)
     points = [by_push(found.push_scores(corpus.reference, kind, split, n), statistic) for n in sizes]
     return Line(KIND_NAMES[kind], KIND_LOOKS[kind], sizes, points)
-
-
-def _pair(corpus: Corpus) -> str:
-    return " on ".join(corpus.reference)

@@ -17,7 +17,7 @@ from push_predictor_paper.data.corpus import Corpus, learning_spec
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, exactly
 from push_predictor_paper.plan import Plan
-from push_predictor_paper.section import Number, Section, Table
+from push_predictor_paper.section import Number, Section, Table, speed_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
@@ -111,7 +111,8 @@ def _by_speed(plan: Plan, table: PushTable) -> tuple[IntArray, IntArray]:
 
 def _half_width(cell: Repetitions) -> Array:
     """Half-width (3,) of the interval of each standard deviation, as a share of it."""
-    return np.asarray((cell.intervals[1][1] - cell.intervals[1][0]) / 2.0 / cell.sd)
+    low, high = cell.sd_interval
+    return np.asarray((high - low) / 2.0 / cell.sd)
 
 
 def _corpus_table(corpus: Corpus) -> Table:
@@ -121,7 +122,7 @@ def _corpus_table(corpus: Corpus) -> Table:
 
 
 def _speed_table(counts: list[SpeedCount]) -> Table:
-    rows = tuple((f"{1e3 * c.speed:.0f} mm/s", c.pushes, Number(c.share, ".0%"), c.windows, c.fewest) for c in counts)
+    rows = tuple((speed_text(c.speed), c.pushes, Number(c.share, ".0%"), c.windows, c.fewest) for c in counts)
     head = ("commanded speed", "pushes", "share with a window", "windows", "windows in the poorest set")
     return Table("Training data by speed, simulated. Shares with Wilson's interval.", head, rows)
 

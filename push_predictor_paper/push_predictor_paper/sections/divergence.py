@@ -169,7 +169,7 @@ def _table(study: Study, of: Mapping[str, Divergences], floor: float) -> Table:
     caption = (
         f"KL (nats, three outputs) of models from {len(study.reference_grid.seen)} simulated pushes of the grid, "
         f"{study.plan.repetitions} repetitions each. Models of windows of all speeds of "
-        f"{' on '.join(study.simulated.reference)}, none of the grid; mean of {study.plan.seeds} seeds. {OF_BLOCKS} "
+        f"{study.simulated.reference_name}, none of the grid; mean of {study.plan.seeds} seeds. {OF_BLOCKS} "
         "Over seeds: least to largest. A perfect model: the expected KL with so many repetitions."
     )
     return Table(caption, head, (*rows, ("a perfect model", f"{floor:.3f}", *("–",) * 10)))

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,9 @@ from push_predictor_paper.data.repetitions import DRAWS, FEWEST, STEP, RepeatedG
 from push_predictor_paper.estimate import of_draws
 from push_predictor_paper.painters.trajectories import Trajectories, paint_trajectories
 from push_predictor_paper.plan import GRID_SPEED
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.statistics.grid_maps import place_text
-from push_predictor_paper.statistics.modes import FAR, RESOLUTION, count_with_modes, dip, found_at, holm, p_values
+from push_predictor_paper.statistics.modes import FAR, count_with_modes, dip_tests, found_at
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
@@ -101,7 +101,7 @@ def apart_evidence(kinds: Kinds) -> Evidence:
 def modes_evidence(kinds: Kinds) -> Evidence:
     """The number of pushes with more than one mode."""
     repetitions = int(np.median([len(p) for p in kinds.paths]))
-    power, _ = found_at(FAR, repetitions, kinds.p.size, LEVEL)
+    power = found_at(FAR, repetitions, kinds.p.size, LEVEL)
     several = int((kinds.p <= LEVEL).any(axis=1).sum())
     note = (
         f"Least family-wise p: {kinds.p.min():.2g}. Two equal modes {FAR:.0f} of their sd "
@@ -124,7 +124,7 @@ def _table(grid: RepeatedGrid, kinds: Kinds) -> Table:
     )
     broken = sum(len(c.paths) - len(p) for c, p in zip(kinds.cells, kinds.paths, strict=True))
     caption = (
-        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {1e3 * GRID_SPEED:.0f} mm/s. Chosen "
+        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {speed_text(GRID_SPEED)}. Chosen "
         f"among {len(kinds.cells)} that move the slider to their end ({kinds.dropped} do not, or begin at a corner). "
         f"Intervals resample repetitions; for the first two, the half that did not choose them. {broken} of "
         f"{sum(len(c.paths) for c in kinds.cells)} repetitions are dropped, see below."
@@ -164,7 +164,7 @@ def _picture(study: Study, kinds: Kinds) -> Picture:
         (10.0, 9.0),
         lambda figure: paint_trajectories(figure, grid.rig, shown),
         "Trajectories of the most convergent push, the most divergent one, and the one with the largest dip. All "
-        f"repetitions of three pushes of 1 cm at {1e3 * GRID_SPEED:.0f} mm/s, simulated, {grid.shape} on "
+        f"repetitions of three pushes of 1 cm at {speed_text(GRID_SPEED)}, simulated, {grid.shape} on "
         f"{grid.surface}. c: contact as a fraction of the side; angle from its normal. Above: slider at the start, tip "
         "and its path (grey), trajectories of the slider's centre (green). Middle: the same trajectories. Below: final "
         "poses (dots) about their mean, with the 95 % ellipse of a Gaussian (red).",
@@ -179,9 +179,9 @@ def kinds_of(grid: RepeatedGrid) -> Kinds | None:
         return None
     cells, paths = zip(*kept, strict=True)
     order = np.argsort([growth(one[::2]) for one in paths])
-    p = _modes(paths)
-    modal, several = int(np.argmin(p.min(axis=1))), holm(p.ravel()).reshape(p.shape)
-    return Kinds(cells, paths, int(order[0]), int(order[-1]), modal, several, len(grid.cells) - len(kept))
+    alone, p = dip_tests([one[:, -1] for one in paths])
+    modal = int(np.argmin(alone.min(axis=1)))
+    return Kinds(cells, paths, int(order[0]), int(order[-1]), modal, p, len(grid.cells) - len(kept))
 
 
 def to_the_end(paths: Array) -> bool:
@@ -233,11 +233,6 @@ def resampled(paths: Array, figure: OfPaths, seed: int = 0) -> tuple[float, Arra
 
 def _middle(paths: Array) -> int:
     return int(paths.shape[-2]) // 2
-
-
-def _modes(paths: Sequence[Array]) -> Array:
-    draws = RESOLUTION * 3 * len(paths)
-    return np.array([p_values(dip(one[:, -1].T), len(one), draws) for one in paths])
 
 
 COLUMNS: tuple[tuple[OfPaths, str], ...] = (

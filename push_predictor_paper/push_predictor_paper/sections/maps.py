@@ -19,17 +19,10 @@ from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import FEWEST, RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, of_draws, over_seeds
 from push_predictor_paper.fits.fit import Answer
-from push_predictor_paper.fits.map_models import (
-    ANGLES,
-    FRACTIONS,
-    ModelMap,
-    averaged,
-    reference_maps,
-    together,
-)
+from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.painters.trajectories import paint_outcomes
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
     OF_BLOCKS,
@@ -61,7 +54,6 @@ NAMED: dict[str, tuple[Place, ...]] = {
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 PEAK_CLAIMS = ("forward", "sideways", "turning")  # by output
 ONE_STEP = Bound(high=1.0 + 1e-6)
-NAMES = ("dx", "dy", "rotation")
 QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the process noise alone"}
 NOTES = (
     "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
@@ -113,43 +105,29 @@ def section(study: Study) -> Section:
     answers = {
         name: [m.at_pushes for m in maps if m.at_pushes is not None] for name, maps in (("VHGP", models), ("GP", plain))
     }
-    alike, shown, answer = likenesses(grid.seen, answers), averaged(models), together(answers["VHGP"])
+    alike, shown = likenesses(grid.seen, answers), averaged(models)
+    predicted = np.mean([answer.mean for answer in answers["VHGP"]], axis=0)
     return Section(
         {**peak_evidence(peaks_of(grid, models)), **agreement_evidence(alike)},
         (_agreement_table(study, alike),),
-        [_picture(study, shown, answer, quantity) for quantity in ("mean", "sd")],
+        [_picture(study, shown, predicted, quantity) for quantity in ("mean", "sd")],
         NOTES,
     )
 
 
 def peaks_of(grid: RepeatedGrid, models: Sequence[ModelMap]) -> Peaks:
     """Find all peaks; models: one per draw of training rows."""
-    drawn = np.abs(grid.as_map(redrawn(grid.seen)[0]))
-    shown = np.abs(grid.mean)
-    repeated = [
-        peak(grid.fractions, grid.angles, shown[..., k], drawn[..., k], NAMED[name], unbiased)
-        for k, name in enumerate(OUTPUTS)
-    ]
-    seeds = np.abs(np.array([model.mean for model in models]))
+    shown, drawn = np.abs(grid.mean), np.abs(grid.as_map(redrawn(grid.seen)[0]))
+    mean, seeds = np.abs(averaged(models).mean), np.abs([model.mean for model in models])
+    repeated = _peaks(grid.fractions, grid.angles, shown, drawn, unbiased)
+    # the place is that of the mean map, the value the mean over the draws
+    learned = _peaks(FRACTIONS, ANGLES, mean, seeds, lambda _, draws: over_seeds(draws.tolist()))
     turned = (
         _handedness(grid.fractions, grid.angles, np.concatenate([shown[None], drawn])[..., 2]),
         _handedness(FRACTIONS, ANGLES, seeds[..., 2]),
     )
     handedness = (of_draws(float(turned[0][0]), turned[0][1:]), over_seeds(turned[1].tolist()))
-    return Peaks(tuple(repeated), model_peaks(models), handedness)
-
-
-def model_peaks(models: Sequence[ModelMap]) -> tuple[Peak, ...]:
-    """Peaks of the mean map of models of several draws of training rows; values are means over the draws."""
-    seeds = np.abs(np.array([model.mean for model in models]))
-    mean = np.abs(np.mean([model.mean for model in models], axis=0))
-
-    def spread(_: float, draws: Array) -> Estimate:
-        return over_seeds(draws.tolist())
-
-    return tuple(
-        peak(FRACTIONS, ANGLES, mean[..., k], seeds[..., k], NAMED[name], spread) for k, name in enumerate(OUTPUTS)
-    )
+    return Peaks(repeated, learned, handedness)
 
 
 def peak_evidence(peaks: Peaks) -> dict[str, Evidence]:
@@ -191,14 +169,22 @@ def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]
 
 def agreement_evidence(found: Likenesses) -> dict[str, Evidence]:
     """Do the maps of mean and of standard deviation agree?"""
-    plain = ", ".join(f"{n} {like.correlation.text()}" for n, like in zip(NAMES, found["sd", "GP"], strict=True))
+    plain = ", ".join(f"{n} {like.correlation.text()}" for n, like in zip(OUTPUT_NAMES, found["sd", "GP"], strict=True))
     notes = {"mean": "", "sd": f"The GP has one noise level for all pushes: {plain}."}
     return {
         f"{quantity}_map": Evidence(
-            [Figure(n, like.correlation) for n, like in zip(NAMES, found[quantity, "VHGP"], strict=True)], note
+            [Figure(n, like.correlation) for n, like in zip(OUTPUT_NAMES, found[quantity, "VHGP"], strict=True)], note
         )
         for quantity, note in notes.items()
     }
+
+
+def _peaks(
+    fractions: Array, angles: Array, shown: Array, drawn: Array, interval: Callable[[float, Array], Estimate]
+) -> tuple[Peak, ...]:
+    """The peak of each output of maps (A, C, 3) with draws (d, A, C, 3)."""
+    named = [NAMED[name] for name in OUTPUTS]
+    return tuple(peak(fractions, angles, shown[..., k], drawn[..., k], named[k], interval) for k in range(3))
 
 
 def _handedness(fractions: Array, angles: Array, turned: Array) -> Array:
@@ -220,7 +206,7 @@ def _agreement_table(study: Study, found: Likenesses) -> Table:
     models = list(dict.fromkeys(model for _, model in found))
     rows = []
     for quantity, what in QUANTITIES.items():
-        for k, name in enumerate(NAMES):
+        for k, name in enumerate(OUTPUT_NAMES):
             likes = [found[quantity, model][k] for model in models]
             cells: list[object] = []
             for like in likes:
@@ -236,7 +222,8 @@ def _agreement_table(study: Study, found: Likenesses) -> Table:
     return Table(caption, head, tuple(rows))
 
 
-def _picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -> Picture:
+def _picture(study: Study, model: ModelMap, predicted: Array, quantity: str) -> Picture:
+    """Maps of the mean or sd; predicted: mean outcomes (len(seen), 3) of the grid's pushes by the model."""
     grid, what = study.reference_grid, "mean" if quantity == "mean" else "standard deviation"
     known = np.abs([getattr(cell, quantity) for cell in grid.seen])
     largest = known.argmax(axis=0)  # push of each output
@@ -250,7 +237,7 @@ def _picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -> Pi
             row.append(Map(title, fractions, angles, values[..., k] * UNITS[k], scale, UNIT_NAMES[k], marked=place))
 
     def example(ax: Axes, k: int) -> None:
-        paint_outcomes(ax, grid.rig, grid.seen[largest[k]], answer.mean[largest[k]])
+        paint_outcomes(ax, grid.rig, grid.seen[largest[k]], predicted[largest[k]])
 
     rows = list(zip(("VHGP", "repetitions"), maps, strict=True))
     return picture(
@@ -267,4 +254,4 @@ def _picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -> Pi
 
 
 def _windows(study: Study) -> int:
-    return min(study.plan.size, len(study.simulated.sets[study.simulated.reference].table))
+    return study.size_of(study.simulated.sets[study.simulated.reference])

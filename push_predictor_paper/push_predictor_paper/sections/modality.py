@@ -17,7 +17,7 @@ from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, exactly, of_draws
 from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.painters.histograms import WIDTHS, Histogram, paint_histograms, shown_values
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, block_weights, place_text
 from push_predictor_paper.statistics.modes import (
     FAR,
@@ -32,7 +32,6 @@ from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
 LISTED = 10
-OUTPUT_NAMES = ("dx", "dy", "rotation")
 NOTES = (
     "Hartigan's dip test measures the distance of the outcomes' distribution from the nearest unimodal one. Its p "
     "value is against the uniform, the unimodal distribution hardest to distinguish from two modes, so that it rejects "
@@ -52,7 +51,7 @@ def section(study: Study) -> Section:
     window, weights = study.work.run("modes of repeated pushes", shape, calls)[0], block_weights(grid.seen)
     of_model = _model(study, grid)
     loss = model_loss(grid.seen, window, of_model)
-    power, _ = found_at(FAR, _repetitions(grid), 3 * len(grid.seen), LEVEL)
+    power = found_at(FAR, _repetitions(grid), 3 * len(grid.seen), LEVEL)
     return Section(
         {
             "modes": modes(window, power),
@@ -114,7 +113,7 @@ def gaussian_good(at: Shape, loss: Array, weights: Array) -> Evidence:
 def _model(study: Study, grid: RepeatedGrid) -> list[LogDensities]:
     """The VHGP's densities of every push: at its repetitions, then at the values of the plot."""
     pushes = study.simulated.sets[study.simulated.reference]
-    fit = Fit("vhgp", min(study.plan.size, len(pushes.table)), "none", 0)
+    fit = Fit("vhgp", study.size_of(pushes), "none", 0)
     outcomes = [np.concatenate([cell.outcomes, shown_values(cell.outcomes)]) for cell in grid.seen]
     sizes = [len(rows) for rows in outcomes]
     call = (pushes, fit, np.repeat(grid.typical_inputs, sizes, axis=0), np.concatenate(outcomes))

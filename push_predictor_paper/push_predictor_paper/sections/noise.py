@@ -19,7 +19,7 @@ from push_predictor_paper.estimate import Estimate, of_ends, over_seeds
 from push_predictor_paper.fits.map_models import ModelMap, square_maps, surface_maps
 from push_predictor_paper.painters.curves import LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import FEWEST_PUSHES, OF_BLOCKS, in_degrees
 from push_predictor_paper.statistics.noise import (
     HIGH,
@@ -38,7 +38,7 @@ from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
 WIDE = 1.0  # rad; beyond it the tip soon slides along the side
-NAMES = ("dx", "dy", "rotation", "whole motion")
+NAMES = (*OUTPUT_NAMES, "whole motion")
 MOSTLY = Bound(low=0.8)  # of the pushes
 NOTES = (
     "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. That "
@@ -83,7 +83,7 @@ def section(study: Study) -> Section:
 
 def size(ratios: Sequence[Ratios]) -> Evidence:
     """Is the noise 10 to 40 % of the mean outcome? ratios: dx, dy, rotation, whole motion of all pushes."""
-    figures = [Figure(name, part.overall) for name, part in zip(NAMES[:3], ratios[:3], strict=True)]
+    figures = [Figure(name, part.overall) for name, part in zip(OUTPUT_NAMES, ratios[:3], strict=True)]
     return Evidence([*figures, Figure("share of pushes", ratios[3].within, MOSTLY)])
 
 
@@ -97,9 +97,13 @@ def shape(found: Mapping[str, Sequence[Shape]], most: Shape | None) -> Evidence:
     figures = [
         Figure(f"{name}, {source}", of_ends(np.min, [pair.correlations[k] for pair in pairs]))
         for source, pairs in found.items()
-        for k, name in enumerate(NAMES[:3] if pairs else ())
+        for k, name in enumerate(OUTPUT_NAMES if pairs else ())
     ]
-    halves = ", ".join(f"{n} {e.text()}" for n, e in zip(NAMES, most.correlations, strict=False)) if most else "unknown"
+    halves = (
+        ", ".join(f"{n} {e.text()}" for n, e in zip(OUTPUT_NAMES, most.correlations, strict=True))
+        if most
+        else "unknown"
+    )
     return Evidence(figures, f"Two halves of one surface's repetitions reach: {halves}.")
 
 
@@ -123,11 +127,11 @@ def _learned_table(study: Study, corpus: Corpus) -> list[Table]:
     forms = (".0%", ".0%", ".0%", ".1f")
     rows = [
         (name, *(Number(e, form) for e, form in zip(learned_figures(models, k), forms, strict=True)))
-        for k, name in enumerate(NAMES[:3] if models else ())
+        for k, name in enumerate(OUTPUT_NAMES if models else ())
     ]
     caption = (
-        f"The process noise learned from {' on '.join(corpus.reference)}. {corpus.title}. VHGPs of "
-        f"{min(study.plan.size, len(corpus.sets[corpus.reference].table))} training windows at 20 mm/s, 61 angles and "
+        f"The process noise learned from {corpus.reference_name}. {corpus.title}. VHGPs of "
+        f"{study.size_of(corpus.sets[corpus.reference])} training windows at 20 mm/s, 61 angles and "
         f"41 contacts within the training data; mean over {study.plan.seeds} draws of training windows with Student's "
         "interval. The paper: 10 to 40 %, up to an order of magnitude."
     )
@@ -172,7 +176,7 @@ def _shape_table(study: Study, found: Mapping[str, Sequence[Shape]]) -> Table:
         f"{study.plan.size} training windows or all on each surface. Halves of one surface's repetitions: the largest "
         f"correlation that so few repetitions can show. {OF_BLOCKS}"
     )
-    return Table(caption, ("surfaces", "pushes", *NAMES[:3]), rows)
+    return Table(caption, ("surfaces", "pushes", *OUTPUT_NAMES), rows)
 
 
 def _ratio_picture(study: Study, ratios: Sequence[Ratios]) -> Picture:

@@ -30,7 +30,7 @@ from push_predictor_paper.data.time_scaled import (
 from push_predictor_paper.estimate import Estimate, of_draws, of_ends, total_nmse
 from push_predictor_paper.painters.curves import LOOKS, SPEED_TICKS, Line, Panel, paint_curves
 from push_predictor_paper.plan import Plan
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
 
@@ -197,11 +197,6 @@ def departure(slowest: Array, other: Array) -> Estimate:
     return of_draws(float(squared.mean()), squared[rows].mean(axis=1))
 
 
-def speed_text(speed: float) -> str:
-    """A speed in m/s with its unit."""
-    return f"{1e3 * speed:.0f} mm/s"
-
-
 def _weights(push: np.ndarray) -> Array:
     """Weights (1 + draws, p) of pushes: each once, then resampled folds and, within them, resampled pushes."""
     drawn = push_bootstrap(push)
@@ -285,7 +280,7 @@ def _picture(study: Study, models: Brackets, departures: Mapping[float, Estimate
         (11.0, 4.0),
         partial(paint_curves, rows=[panels], shared=False),
         "NMSE by the top speed of the training pushes, and departure from quasi-static outcomes. Simulated, "
-        f"{' on '.join(study.simulated.reference)}. Left and middle: NMSE (sum of 3) on held-out pushes of the same "
+        f"{study.simulated.reference_name}. Left and middle: NMSE (sum of 3) on held-out pushes of the same "
         f"speeds, and on those of up to {speed_text(SLOW)} only; {models.rows} windows of every speed, or the same "
         "number in every bracket (equal n). Right: departure of the outcome from that at "
         f"{speed_text(study.plan.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s.",

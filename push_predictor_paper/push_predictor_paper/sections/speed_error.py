@@ -18,7 +18,7 @@ from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS
 from push_predictor_paper.fits.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
 from push_predictor_paper.painters.curves import KIND_LOOKS, SPEED_TICKS, Line, Panel, paint_curves
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
@@ -53,7 +53,7 @@ def section(study: Study, corpus: Corpus) -> Section:
 def unreliable(windows: HeldOut) -> Evidence:
     """Does the analytical model's error grow with speed? By rank correlation over pushes."""
     fast = windows.speeds[windows.group] >= 0.99 * FAST
-    parts = {"all speeds": windows, f"from {_speed(FAST)}": windows.take(fast)}
+    parts = {"all speeds": windows, f"from {speed_text(FAST)}": windows.take(fast)}
     figures = [Figure(name, rank_correlation(part, "analytical")) for name, part in parts.items()]
     return Evidence(figures, f"{windows.pushes} pushes, interval by push.")
 
@@ -61,7 +61,7 @@ def unreliable(windows: HeldOut) -> Evidence:
 def captured(windows: HeldOut) -> Evidence:
     """Do the learned models, whose input is the speed, lead at each speed from FAST on?"""
     fast = [k for k, speed in enumerate(windows.speeds) if speed >= 0.99 * FAST]
-    figures = [Figure(_speed(windows.speeds[k]), within_nmse(windows.at(k), ("analytical", "vhgp"))) for k in fast]
+    figures = [Figure(speed_text(windows.speeds[k]), within_nmse(windows.at(k), ("analytical", "vhgp"))) for k in fast]
     return Evidence(figures, f"n = {windows.size}, {SPLIT_WORDS['push']}, interval by push.")
 
 
@@ -117,7 +117,7 @@ def _table(corpus: Corpus, windows: HeldOut, found: dict[str, SpeedCurve]) -> Ta
         rows.append((at.speed_range, at.pushes, len(at.push_id), *(Number(c.nmse[k]) for c in found.values()), *biases))
     caption = (
         f"NMSE (sum of 3) over the variance at each speed, and bias of the analytical model. "
-        f"{' on '.join(corpus.reference)}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}; "
+        f"{corpus.reference_name}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}; "
         f"neighbouring speeds with fewer than {FEWEST_PUSHES} pushes are joined. Bias: mean of observed minus "
         "predicted, per cent of the pusher's travel; across: towards the predicted side. Interval by push. The paper "
         "gives no numbers."
@@ -147,9 +147,5 @@ def _picture(study: Study, corpus: Corpus, windows: HeldOut, found: dict[str, Sp
         partial(paint_curves, rows=[panels], shared=False),
         "Error of analytical model, GP and VHGP against the pusher's speed. NMSE within each speed, and mean of "
         "observed minus predicted along and across the push, as a share of the pusher's travel. Bands: 95 % by push. "
-        f"{' on '.join(corpus.reference)}, pushes: {corpus.name}.",
+        f"{corpus.reference_name}, pushes: {corpus.name}.",
     )
-
-
-def _speed(speed: float) -> str:
-    return f"{1e3 * speed:.0f} mm/s"

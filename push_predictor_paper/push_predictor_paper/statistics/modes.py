@@ -10,6 +10,7 @@ with samples of the uniform distribution, the unimodal distribution that is hard
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -56,18 +57,22 @@ class Shape:
 def shape(outcomes: Array, sizes: IntArray) -> Shape:
     """Test the outcomes (n, 3) of p pushes, of the first of which are the first sizes[0] >= 10, and so on."""
     samples = np.split(outcomes, np.cumsum(sizes)[:-1])
-    draws = RESOLUTION * 3 * len(samples)
-    p = np.array([p_values(dip(s.T), len(s), draws) for s in samples])
     normal = np.array([[shapiro(column).pvalue for column in s.T] for s in samples])
     one, two = zip(*(held_out(s.T) for s in samples), strict=True)
-    return Shape(p, holm(p.ravel()).reshape(p.shape), normal, np.array(one), np.array(two))
+    return Shape(*dip_tests(samples), normal, np.array(one), np.array(two))
 
 
-def found_at(separation: float, n: int, tests: int, level: float) -> tuple[float, float]:
-    """Power to find two equal modes in n outcomes, separation in their sd: among `tests` tests, and alone."""
+def dip_tests(samples: Sequence[Array]) -> tuple[Array, Array]:
+    """P values (p, 3) against one mode of p samples (r, 3): of each by itself, and family-wise over all (Holm)."""
+    draws = RESOLUTION * 3 * len(samples)
+    p = np.array([p_values(dip(s.T), len(s), draws) for s in samples])
+    return p, holm(p.ravel()).reshape(p.shape)
+
+
+def found_at(separation: float, n: int, tests: int, level: float) -> float:
+    """Power to find two equal modes in n outcomes, separation in their sd, in one of `tests` tests."""
     null = uniform_dips(n, RESOLUTION * tests)
-    corrected, single = (float(np.quantile(null, 1.0 - p, method="higher")) for p in (level / tests, level))
-    return power(n, separation, corrected), power(n, separation, single)
+    return power(n, separation, float(np.quantile(null, 1.0 - level / tests, method="higher")))
 
 
 def count_with_modes(found: int, power: float) -> Estimate:
