@@ -12,7 +12,7 @@ import pytest
 from checked_bags import bag, rig_of
 
 from push_predictor.geometry.shapes import transformed
-from push_predictor.recordings.checks.frames import contacts_of
+from push_predictor.recordings.checks.geometry import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem
 

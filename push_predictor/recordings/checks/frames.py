@@ -1,240 +1,70 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Streams exchanged, frames or outline mirrored, an outline turned, shifted or of the wrong size, and clocks apart.
-
-The tip's positions in contact decide. Each hypothesis about the streams is fitted; the one that leaves the smallest gap
-between tip and outline is named if the streams as recorded leave a large one.
-"""
+"""Frames: whether the tracked body lies on the surface, and which way it is up."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
-from push_predictor.geometry.frames import rotate, to_body, to_world
-from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
+from push_predictor.geometry.frames import to_body
+from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
-from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
-from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.geometry import tip_follows
+from push_predictor.recordings.checks.motion import Motion, body_velocity
+from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.types import Array, BoolArray
 
-FEWEST_CONTACTS = 20  # samples
-LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
-BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
-LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
-AT_REST = 0.1  # share of the slider's motion; a slider moves only with the tip, or in a hand
-EXACT = 5e-5  # m; no further hypothesis is tried after one with a smaller gap, which is less than a tracker's noise
-FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wrong
-FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
-
-RIGHT_HANDED = "Use right-handed frames, seen from above."
-IN_ORDER = "Give x before y, in right-handed frames seen from above."
-TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
+HELD = 0.01  # m: spread of the tip in the frame of a body fixed to it; clocks and calibration spread it
+COVERED = 95.0  # percentile of the spread
+TRAVEL = 5.0  # the tip travels so many times farther in the world
+AWAY = 0.3  # cosine between the tip's velocity and the direction away from the body
+LEAST_SHARE = 0.1  # of the body's motion that no push explains, where the tip is near the outline
 
 
-@dataclass(frozen=True)
-class Mirror:
-    """What undoes the mistake: rows that multiply the slider's x and y, and the sign of its heading.
+def frame_stage(evidence: Evidence) -> Evidence:
+    """Whether the tracked body lies on the surface, and which way it is up."""
+    recording, rig, motion = evidence.recording, evidence.rig, evidence.motion
+    if held := fixed_to_tip(motion, rig):
+        return evidence.found([held])
+    oriented = orientation_finding(recording.slider)
+    # A tip has a constant heading too: the exchange of topics explains more, and the geometry shows it.
+    if oriented is not None and oriented.severity == "refused" and tip_follows(motion, recording, rig):
+        return evidence
+    return evidence.found([oriented])
 
-    A constant turn of the heading is part of the fitted yaw.
+
+def fixed_to_tip(motion: Motion | None, rig: Rig) -> Finding | None:
+    """A refusal if the tracked body is fixed to the robot's hand instead of lying on the surface.
+
+    In the frame of such a body the tip rests, also while it is lifted, or moves away from the body. A pushed slider
+    stays where it is then.
     """
-
-    x: tuple[float, float]
-    y: tuple[float, float]
-    heading: float
-    mistake: str
-    advice: str
-
-
-def _sign(what: str) -> str:
-    return f"The sign of the slider's {what} is wrong."
-
-
-# The first of those that fit equally well is named.
-MIRRORS = {
-    "heading_clockwise": Mirror(
-        (1.0, 0.0), (0.0, 1.0), -1.0, _sign("heading"), "Negate the heading: counter-clockwise is positive."
-    ),
-    "frame_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), -1.0, _sign("y axis and heading"), RIGHT_HANDED),
-    "frame_mirrored_x": Mirror((-1.0, 0.0), (0.0, 1.0), -1.0, _sign("x axis and heading"), RIGHT_HANDED),
-    "axes_exchanged": Mirror(
-        (0.0, 1.0), (1.0, 0.0), -1.0, "The slider's x and y axes are exchanged, its heading too.", IN_ORDER
-    ),
-    "y_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), 1.0, _sign("y axis"), RIGHT_HANDED),
-    "x_mirrored": Mirror((-1.0, 0.0), (0.0, 1.0), 1.0, _sign("x axis"), RIGHT_HANDED),
-    "xy_exchanged": Mirror(
-        (0.0, 1.0), (1.0, 0.0), 1.0, "The slider's x and y positions are exchanged, its heading is not.", IN_ORDER
-    ),
-}
-
-
-def frame_findings(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
-    """Findings about topics, frames, outline and clocks. Lengths in m, angles in rad, times in s.
-
-    motion: that of the recording.
-    """
-    if (contacts := contacts_of(motion)) is None:
-        return _without_contact(recording, rig, motion)
-    fit = fit_outline(contacts, rig)
-    if rig.outline.rotational_symmetry == 0 and _leads(motion) > AT_REST > 3.0 * _leads(
-        motion_of(swapped(recording), rig)
-    ):
-        return [_swapped(fit.gap)]
-    if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
-        return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
-    if fit.gap >= LARGE_GAP or _is_implausible(fit, rig):
-        return _findings_of_large_gap(recording, rig, motion, contacts, fit)
-    found = outline_findings(contacts, rig, fit)
-    return found and (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found)
-
-
-def _findings_of_large_gap(
-    recording: Recording, rig: Rig, motion: Motion | None, contacts: Contacts, fit: OutlineFit
-) -> list[Finding]:
-    """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
-    far = FAR * rig.outline.reach
-    explained = min(BETTER * fit.gap, far)
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < explained:
-        return [_swapped(fit.gap)]
-    mirrors = _mirror_gaps(contacts, rig)
-    best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
-    if found := _mirror_image_findings(contacts, rig, fit.gap, min(explained, mirrors[best])):
-        return found
-    if mirrors[best] < explained:
-        return [_mirrored(best, fit.gap, mirrors[best])]
-    another = fit.gap > far or _is_implausible(fit, rig)
-    if another and frames_apart(contacts, rig, fit) is None:
-        recorded = _gap_as_recorded(contacts, rig)
-        return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
-    found = outline_findings(contacts, rig, fit)
-    explained_otherwise = another or {"frames_apart", "outline_shape"} & {finding.name for finding in found}
-    return found if explained_otherwise else [*found, _unexplained(fit.gap)]
-
-
-def swapped(recording: Recording) -> Recording:
-    """The recording with slider and pusher exchanged."""
-    return replace(recording, slider=recording.pusher, pusher=recording.slider)
-
-
-def contacts_of(motion: Motion | None) -> Contacts | None:
-    """The samples in contact, None if there are too few."""
-    if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
-        return None
-    touch = motion.contact
-    tips = to_body(motion.tip, motion.slider)[touch]
-    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch])
-
-
-def _gap(recording: Recording, rig: Rig) -> float:
-    """The gap (m) that the best plausible correction leaves, infinity without one."""
-    contacts = contacts_of(motion_of(recording, rig))
-    return np.inf if contacts is None else _gap_of(contacts, rig)
-
-
-def _gap_of(contacts: Contacts, rig: Rig) -> float:
-    fit = fit_outline(contacts.drawn(FEW_SAMPLES), rig)
-    return np.inf if _is_implausible(fit, rig) else fit.gap
-
-
-def _mirror_gaps(contacts: Contacts, rig: Rig) -> dict[str, float]:
-    """Gaps (m) by the name of the mirror, up to the first that explains the contacts exactly."""
-    gaps = {}
-    for name, mirror in MIRRORS.items():
-        gaps[name] = _gap_of(_reflected(contacts, mirror), rig)
-        if gaps[name] < EXACT:
-            break
-    return gaps
-
-
-def _gap_as_recorded(contacts: Contacts, rig: Rig) -> float:
-    return float(np.median(np.abs(rig.outline.project(contacts.tips).distance - rig.pusher_radius)))
-
-
-def _leads(motion: Motion | None) -> float:
-    """Share of the slider's motion while the tip rests. A circle and its tip exchanged leave the same gap."""
     if motion is None or not motion.moving.any():
-        return 0.0
-    return float(np.mean(motion.tip_speed[motion.moving] < WindowOptions().least_speed))
-
-
-def tip_follows(motion: Motion | None, recording: Recording, rig: Rig) -> bool:
-    """Whether the tip rests more often while the slider moves than the other way round, as after an exchange.
-
-    Without this evidence, a circle in a world frame shifted by some millimetres fits better as its own tip.
-    """
-    return _leads(motion) > _leads(motion_of(swapped(recording), rig))
-
-
-def _is_implausible(fit: OutlineFit, rig: Rig) -> bool:
-    """Whether the correction is another slider rather than a mistake in this one's outline."""
-    return bool(np.hypot(*fit.estimate[[X, Y]]) > rig.outline.reach or abs(fit.estimate[SIZE]) > LARGEST_GROWTH)
-
-
-def _reflected(contacts: Contacts, mirror: Mirror) -> Contacts:
-    """The contacts with the slider's poses corrected; the same samples are in contact."""
-    world, velocities = to_world(contacts.tips, contacts.poses), rotate(contacts.velocities, contacts.poses[:, 2])
-    places = contacts.poses[:, :2] @ np.array([mirror.x, mirror.y]).T
-    poses = np.column_stack([places, mirror.heading * contacts.poses[:, 2]])
-    return replace(contacts, tips=to_body(world, poses), velocities=rotate(velocities, -poses[:, 2]), poses=poses)
-
-
-def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float) -> list[Finding]:
-    """Findings if the outline's mirror image leaves a gap of less than `most` m; none for a symmetric outline."""
-    if has_mirror_symmetry(rig.outline) or len(np.unique(contacts.push)) < FEWEST_PUSHES:
-        return []
-    image = replace(rig, outline=mirror_image(rig.outline))
-    fit = fit_outline(contacts, image)
-    if fit.gap >= most or _is_implausible(fit, rig):
-        return []
-    return [_outline_mirrored(gap, fit.gap), *outline_findings(contacts, image, fit)]
-
-
-def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
-        return [_swapped(np.inf)]
-    sentence = "The slider never moves while the lowered tip moves: no push was recorded."
-    return [Finding("no_contact", "refused", sentence, TOPICS)]
-
-
-def _swapped(gap: float) -> Finding:
-    values = {"gap": Value(gap, "m")} if np.isfinite(gap) else {}
-    sentence = "Slider and pusher are exchanged: the contacts fit the outline only the other way round."
-    return Finding("topics_swapped", "refused", sentence, "Exchange the topics of slider and pusher.", values)
-
-
-def _another_body(gap: float) -> Finding:
-    sentence = f"While the slider moves, the tip is {1e3 * gap:.0f} mm from the outline, in the median."
-    return Finding("another_body", "refused", sentence, TOPICS, {"gap": Value(gap, "m")})
-
-
-def _mirrored(name: str, gap: float, after: float) -> Finding:
-    mirror = MIRRORS[name]
+        return None
+    tips = to_body(motion.tip, motion.slider)
+    place, spread = np.median(tips, axis=0), _spread(tips)
+    if spread > HELD or _spread(motion.tip) < TRAVEL * spread:
+        return None
+    apart = abs(float(rig.outline.project(place[None]).distance[0]) - rig.pusher_radius) > HELD
+    if not apart and np.mean(_unpushed(motion, place)[motion.moving]) < LEAST_SHARE:
+        return None
     sentence = (
-        f"{mirror.mistake} With it corrected, the median gap in contact falls from {1e3 * gap:.1f} mm to "
-        f"{1e3 * after:.2f} mm."
+        f"The slider's pose moves with the tip, within {1e3 * spread:.1f} mm, also where no push can move it. It is "
+        "probably that of a body on the robot's hand."
     )
-    values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding(name, "warning", sentence, mirror.advice, values)
+    return Finding("another_body", "refused", sentence, "Check the slider's topic.", {"spread": Value(spread, "m")})
 
 
-def _outline_mirrored(gap: float, after: float) -> Finding:
-    sentence = (
-        f"The outline is the mirror image of the slider. Mirrored at the x axis, the median gap in contact falls from "
-        f"{1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
-    )
-    advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
-    values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding("outline_mirrored", "warning", sentence, advice, values)
+def _unpushed(motion: Motion, place: Array) -> BoolArray:
+    """Which samples (n,) have a tip that is lifted, or moves away from the body; place (2,) m: of the tip in it."""
+    lifted = motion.tip_height > WindowOptions().lift
+    away = body_velocity(motion) @ place > AWAY * motion.tip_speed * np.hypot(*place)
+    return np.asarray(lifted | away)
 
 
-def _unexplained(gap: float) -> Finding:
-    sentence = (
-        f"The tip is {1e3 * gap:.1f} mm from the outline in contact, in the median, and no correction explains it."
-    )
-    advice = "Check the outline's vertices, and the calibration between tracker and robot."
-    return Finding("outline_misfit", "warning", sentence, advice, {"gap": Value(gap, "m")})
+def _spread(points: Array) -> float:
+    """Distance (m) from the median that few of the points (n, 2) exceed."""
+    return float(np.percentile(np.linalg.norm(points - np.median(points, axis=0), axis=1), COVERED))

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
+from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.motion import Motion, body_velocity, sums_by_push
 from push_predictor.recordings.rig import Rig
@@ -40,6 +41,12 @@ ROUNDS, OUTLYING = 10, 0.05  # of the robust regression; rad
 SIGN = "Give the force of the slider on the pusher: change the sign."
 AXES = "Give the force along the world's axes, or state the sensor's: --wrench-frame tip or FRAME."
 TOPIC = "Check the wrench topic, its stamps and its zero."
+
+
+def force_stage(evidence: Evidence) -> Evidence:
+    """Whether the force belongs to the motion: its zero, sign, axes and unit."""
+    outlined = all(finding.severity == "note" for finding in evidence.findings)
+    return evidence.found(wrench_findings(evidence.motion, evidence.rig, outlined))
 
 
 def wrench_findings(motion: Motion | None, rig: Rig, outlined: bool = True) -> list[Finding]:

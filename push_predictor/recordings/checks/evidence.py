@@ -1,0 +1,46 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the stages of the check know of a recording so far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.motion import Motion, motion_of
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """A recording, as far as the stages so far accept its samples, its rig, and what they found.
+
+    A stage takes it and returns it with its own findings. It does not look for what an earlier finding explains.
+    """
+
+    recording: Recording
+    rig: Rig
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def refused(self) -> bool:
+        """Whether nothing can be learnt from these data: no further stage is asked."""
+        return any(finding.severity == "refused" for finding in self.findings)
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """The motion of the accepted samples, None if slider and tip have no common time."""
+        return motion_of(self.recording, self.rig)
+
+    def has(self, *names: str) -> bool:
+        """Whether one of these was found."""
+        return any(finding.name in names for finding in self.findings)
+
+    def found(self, more: Iterable[Finding | None], recording: Recording | None = None) -> Evidence:
+        """With further findings; recording: what is accepted from here on, as before if None."""
+        findings = (*self.findings, *(finding for finding in more if finding is not None))
+        return replace(self, findings=findings, recording=recording or self.recording)
