@@ -15,7 +15,7 @@ import numpy as np
 
 from push_predictor.errors import TableError
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.bag.reader import ENDINGS as RECORDINGS
+from push_predictor.recordings.bag.reader import is_bag_file
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table import COLUMNS, INPUTS, OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray, TextArray
@@ -70,7 +70,7 @@ def write_table(path: Path, table: PushTable) -> None:
 
 def is_recording(path: Path) -> bool:
     """Whether a path is a recording (a folder, .mcap, .db3 or .bag) and not a push table."""
-    return Path(path).is_dir() or Path(path).suffix in RECORDINGS
+    return Path(path).is_dir() or is_bag_file(Path(path))
 
 
 def rig_path(path: Path) -> Path:

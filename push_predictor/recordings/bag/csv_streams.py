@@ -18,6 +18,7 @@ from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.notes import Notes
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -47,7 +48,7 @@ class CsvStreams:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder
-        self.notes: list[str] = []
+        self.notes = Notes()
         self.schemas: dict[str, str] = {}
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, Mapping[str, str]] = {}
@@ -56,7 +57,7 @@ class CsvStreams:
             if file.suffix == ".csv" or file.stem in STREAMS or _parquet_is_read():
                 self._streams |= _streams(file)
             else:
-                self.notes.append(f"{file.name} is ignored; {PARQUET}")
+                self.notes.add(f"{file.name} is ignored; {PARQUET}")
 
     @property
     def topics(self) -> dict[str, str]:
