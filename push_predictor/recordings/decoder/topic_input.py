@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -33,11 +34,12 @@ class TopicInput:
     """received: number of messages. rejected: unusable ones by fault; foreign: those of another type, by type.
 
     named: the frames that headers have named; expected: the one that they must name, '' for any. dropped: messages of
-    a live topic that nobody took in time. `put` may be called in any thread, the others in one.
+    a live topic that nobody took in time. from_log: samples have the time of receipt, or of the log.
+    `put` may be called in any thread, the others in one.
     """
 
-    def __init__(self, source: Source, target: Target, expected: str = "") -> None:
-        self.source, self.target, self.expected = source, target, expected
+    def __init__(self, source: Source, target: Target, expected: str = "", from_log: bool = False) -> None:
+        self.source, self.target, self.expected, self._from_log = source, target, expected, from_log
         self.kind = ""
         self.received = self.dropped = 0
         self.rejected: Counter[str] = Counter()
@@ -68,7 +70,7 @@ class TopicInput:
     def declare(self, kind: str, schemas: Mapping[str, str], where: object = "") -> None:
         """State the type of the messages from now on, see `check`."""
         field = self.check(kind, schemas, where)
-        reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas))
+        reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas), self._from_log)
         with self._lock:  # messages of an earlier type cannot be read as those of the new one
             old, self._undecoded = self._undecoded, 0
             self.dropped, self._count = self.dropped + old, self._count - old
@@ -77,6 +79,8 @@ class TopicInput:
 
     def put(self, messages: Messages, arrived: IntArray | None = None) -> None:
         """Add messages. arrived (n,): when they were received, ns, of a live topic."""
+        if self._from_log and arrived is not None:
+            messages = replace(messages, times=arrived)
         if messages.type != self.kind:
             self.foreign[messages.type] += len(messages)
             return

@@ -138,10 +138,15 @@ class Columns:
 
 
 class FieldReader:
-    """Reads a field of messages of one type as what a stream needs. timed: whether a header is around the field."""
+    """Reads a field of messages of one type as what a stream needs. timed: whether a header is around the field.
 
-    def __init__(self, target: Target, type_name: str, field: str, definitions: Definitions) -> None:
-        self._target, self._field = target, field
+    from_log: the stamps are the times of the messages, whatever their headers state.
+    """
+
+    def __init__(
+        self, target: Target, type_name: str, field: str, definitions: Definitions, from_log: bool = False
+    ) -> None:
+        self._target, self._field, self._from_log = target, field, from_log
         self._header = header_path(field, type_name, definitions)
         self.timed = bool(self._header)
         self._blocks = BlockReader(type_name, definitions, (field, self._header))
@@ -158,7 +163,8 @@ class FieldReader:
             rows = block.rows
             values[rows], valid[rows] = block.numbers(paths), True
             if self._header:
-                stamp[rows], valid[rows] = header_stamps(block, self._header)
+                if not self._from_log:
+                    stamp[rows], valid[rows] = header_stamps(block, self._header)
                 names, number = block.text(f"{self._header}.frame_id")
                 frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
         return Columns(stamp, values, valid, frame, tuple(frames))
