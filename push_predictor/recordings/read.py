@@ -17,7 +17,14 @@ from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
-from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
+from push_predictor.recordings.decoder.rules import (
+    NO_ELEMENT,
+    NO_ORIENTATION,
+    NO_TRANSFORM,
+    NOT_FINITE,
+    OTHER_CLOCK,
+    UNREADABLE,
+)
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, SCALAR_TARGET, TF_TYPES, Source
@@ -31,6 +38,7 @@ __all__ = ["Topics", "read_recording", "recorded_rig", "require_rig"]
 
 SAMPLE = 20  # messages by which a type is told
 FAULTS = {
+    NO_ELEMENT: "messages lack the chosen element",
     UNREADABLE: "messages are not readable CDR",
     NOT_FINITE: "samples contain NaN or infinity",
     NO_ORIENTATION: "samples have no orientation",
@@ -67,8 +75,10 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
         _note_rejected(notes, _spelling(bag, name), each.rejected, each.foreign)
     for name, stream in (("slider", samples.slider), ("pusher", samples.pusher)):
         if not len(stream):
-            label = _label(bag, decoder.poses[name])
-            raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)})")
+            label, pose = _label(bag, decoder.poses[name]), decoder.poses[name]
+            names = pose.messages.names if isinstance(pose, PoseTopic) else []
+            there = f". The elements are named {', '.join(map(repr, names))}" if names else ""
+            raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)}){there}")
     scalars = {_spelling(bag, name): stream for name, stream in samples.scalars.items() if len(stream)}
     every = bag.notes
     every.add_all(notes)

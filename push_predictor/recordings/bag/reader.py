@@ -155,8 +155,8 @@ def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> 
             refused.append(error)
     if not opened:
         raise refused[0]
-    for error in refused:
-        described.notes.add(f"{error}; the other files are used", lost=True)
+    for reason in refused:
+        described.notes.add(f"{reason}; the other files are used", lost=True)
     return opened
 
 

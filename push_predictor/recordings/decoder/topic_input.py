@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.decoder.rules import OTHER_FRAME, UNREADABLE, Rules, broken, usable
+from push_predictor.recordings.decoder.rules import NO_ELEMENT, OTHER_FRAME, UNREADABLE, Rules, broken, usable
 from push_predictor.recordings.fields.sources import (
     Columns,
     FieldReader,
@@ -54,6 +54,11 @@ class TopicInput:
 
     def __len__(self) -> int:
         return self._count
+
+    @property
+    def names(self) -> list[str]:
+        """By what elements could be chosen in messages that lack the chosen one."""
+        return sorted(self._reader.names) if self._reader is not None else []
 
     @property
     def timed(self) -> bool:
@@ -105,7 +110,7 @@ class TopicInput:
     def usable(self, rules: Rules) -> Columns:
         """Of `take` those that are readable, in the expected frame and break no rule; the others are rejected."""
         columns = self.take()
-        faults = {UNREADABLE: ~columns.valid}
+        faults = {NO_ELEMENT: columns.absent, UNREADABLE: ~columns.valid}
         if self.expected and self.timed:
             faults[OTHER_FRAME] = columns.frame_names() != self.expected
         return columns.rows(usable(faults | broken(columns.values, rules), self.rejected))
@@ -160,4 +165,5 @@ def _joined(parts: Sequence[Columns], count: int) -> Columns:
         np.concatenate([np.empty(0, np.bool_), *(part.valid for part in parts)]),
         np.concatenate([np.empty(0, np.int64), *(of[part.frame] for of, part in zip(number, parts, strict=True))]),
         tuple(frames),
+        np.concatenate([np.empty(0, np.bool_), *(part.absent for part in parts)]),
     )

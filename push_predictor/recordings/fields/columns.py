@@ -9,6 +9,7 @@ messages that have the same lengths at the same bytes are then read at once, and
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from push_predictor.recordings.bag.message_types import Field, short_name
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 _PREFIX = 4  # bytes of encapsulation, from which numbers are aligned
 _PADDING = 4  # bytes to a multiple of which a message may be filled up
@@ -69,6 +70,10 @@ class Block:
         with np.errstate(invalid="ignore"):  # widening a signalling NaN
             return np.asarray(column.view(f"{self.order}{code}").astype(np.float64))
 
+    def where(self, which: BoolArray) -> Block:
+        """Some of the messages."""
+        return self if which.all() else Block(self.rows[which], self.order, self.data[which], self.layout)
+
     def raw_text(self, path: str) -> bytes:
         """The bytes of a text of the first message, with its closing zero."""
         at, length = self.layout.texts[path]
@@ -89,7 +94,7 @@ class BlockReader:
 
     def __init__(self, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]) -> None:
         self._type, self._definitions = short_name(type_name), definitions
-        self._wanted = [path.partition(".")[0].partition("[")[0] for path in wanted]
+        self._wanted = [re.split(r"[.\[]", path, maxsplit=1)[0] for path in wanted]
         self._known: dict[int, tuple[str, _Layout]] = {}  # the last layout of messages of a length
 
     def blocks(self, messages: Messages) -> Iterator[Block]:

@@ -16,7 +16,7 @@ import numpy as np
 from push_predictor.recordings.bag.message_types import STANDARD, type_at
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.columns import Block, whole_block
-from push_predictor.recordings.fields.sources import TF_TYPES, Source, Target
+from push_predictor.recordings.fields.sources import TF_TYPES, Source, Target, fields_in
 
 LEAST_FITTING = 0.9  # share of the messages: a lost body may have any quaternion
 UNIT = 1e-3  # deviation of a quaternion's length from one; 32-bit numbers have 1e-7
@@ -31,7 +31,8 @@ def candidates(source: Source, target: Target) -> list[str]:
     if not source.field:
         return list(target.known)
     names = [f"{package}/msg/{name}" for package, name in (each.split("/") for each in STANDARD)]
-    return [name for name in names if type_at(STANDARD, name, source.field) in target.parts]
+    fields = fields_in(source.field)
+    return [name for name in names if target.fits([type_at(STANDARD, name, each) for each in fields])]
 
 
 def told_type(messages: Sequence[bytes], kinds: Sequence[str]) -> str:

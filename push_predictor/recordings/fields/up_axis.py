@@ -61,7 +61,7 @@ def bodies_z_up(poses: Array, up: str) -> Array:
 def _steepness(poses: Array) -> Array:
     """How far (n,) the z axes of bodies point up or down, times the square of the quaternions' length."""
     x, y, z, w = poses[:, 3:].T
-    return np.abs(w**2 + z**2 - x**2 - y**2)
+    return np.asarray(np.abs(w**2 + z**2 - x**2 - y**2))
 
 
 def _turns(up: str, count: int) -> Array:
