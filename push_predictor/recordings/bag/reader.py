@@ -130,9 +130,8 @@ def open_bag(path: Path) -> Bag:
     if not (files := _files(path, described) if path.is_dir() else [path]):
         if is_csv_recording(path):
             return Bag(path, [CsvStreams(path)], described)
-        raise RecordingError(
-            f"{path}: contains no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
-        )
+        files_needed = "no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
+        raise RecordingError(f"{path}: contains {files_needed}{_sheets(path)}")
     packed = any(map(_packed, files))
     scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if packed else None
     folder = None if scratch is None else Path(scratch.name)
@@ -142,6 +141,12 @@ def open_bag(path: Path) -> Bag:
 def is_bag_file(path: Path) -> bool:
     """Whether a file is a recording, by its name or by its first bytes."""
     return _ending(path) in ENDINGS or _begins_as_bag(path)
+
+
+def _sheets(folder: Path) -> str:
+    """What to do with spreadsheets in a folder, '' without any."""
+    found = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in (".xlsx", ".xls", ".ods"))
+    return f"; save the sheets of {found[0]} as these CSV files" if found else ""
 
 
 def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[BagFile]:
