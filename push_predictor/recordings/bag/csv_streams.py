@@ -189,8 +189,9 @@ def _numbers(
             try:
                 values[place, column] = float(cell or "nan")
             except ValueError:
+                accepted = f"a number{_with_point(cell)}, or leave it empty"
                 raise RecordingError(
-                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give a number, or leave it empty"
+                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give {accepted}"
                 ) from None
     return stamp, values
 
@@ -202,5 +203,11 @@ def _stamp(file: Path, line: int, cell: str, seconds: Decimal) -> int:
     except InvalidOperation:
         found = Decimal("nan")
     if not found.is_finite() or not 0 <= found < _LATEST:
-        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give s from 0 to {_LATEST // 10**9}")
+        accepted = f"s from 0 to {_LATEST // 10**9}{_with_point(cell)}"
+        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give {accepted}")
     return round(found)
+
+
+def _with_point(cell: str) -> str:
+    """What a number with a comma lacks, in a file that has decimal points as well."""
+    return " with a decimal point" if "," in cell else ""

@@ -100,7 +100,7 @@ def _can_choose(definitions: Mapping[str, tuple[Field, ...]], element: str, choi
     """Whether elements of a type contain what a choice names: KEY=VALUE, or any text."""
     key, given, _ = choice.partition("=")
     if given:
-        return "/" not in (type_at(definitions, element, key) or "/")
+        return not {"/", "["} & {*(type_at(definitions, element, key) or "/")}
     return bool(choice) and has_text(definitions, element)
 
 

@@ -54,8 +54,8 @@ def _arrays(length: int | str) -> tuple[str, str]:
 class Target:
     """What a stream needs: the type of its messages in a recording, and types (package/Name) of fields that fit.
 
-    count: of its numbers. known: {message type: field that is read without being named}. pieces: types of two fields
-    that fit together, as A+B.
+    count: of its numbers. known: {message type: field that is read without being named}. pieces: the types of two
+    fields that fit together in any order, as A+B.
     """
 
     type: str
@@ -63,11 +63,14 @@ class Target:
     parts: frozenset[str]
     known: Mapping[str, str]
     what: str
-    pieces: frozenset[str] = frozenset()
+    pieces: tuple[frozenset[str], frozenset[str]] = (frozenset(), frozenset())
 
     def fits(self, types: Sequence[str | None]) -> bool:
         """Whether fields of these types contain what the stream needs."""
-        return types[0] in self.parts if len(types) == 1 else len(types) == 2 and {*types} <= self.pieces
+        if len(types) == 1:
+            return types[0] in self.parts
+        orders = (types, types[::-1]) if len(types) == 2 else ()
+        return any(one in self.pieces[0] and other in self.pieces[1] for one, other in orders)
 
 
 POSE_TARGET = Target(
@@ -83,7 +86,10 @@ POSE_TARGET = Target(
         "geometry_msgs/msg/Transform": "translation+rotation",
     },
     "pose",
-    frozenset({"geometry_msgs/Point", "geometry_msgs/Vector3", "geometry_msgs/Quaternion", *_arrays(3), *_arrays(9)}),
+    (
+        frozenset({"geometry_msgs/Point", "geometry_msgs/Vector3", *_arrays(3)}),
+        frozenset({"geometry_msgs/Quaternion", *_arrays(9)}),
+    ),
 )
 WRENCH_TARGET = Target(
     WRENCH.name,
@@ -91,7 +97,7 @@ WRENCH_TARGET = Target(
     frozenset({"geometry_msgs/Wrench"}),
     {WRENCH.name: "wrench", "geometry_msgs/msg/Wrench": "force+torque"},
     "wrench",
-    frozenset({"geometry_msgs/Vector3"}),
+    (frozenset({"geometry_msgs/Vector3"}), frozenset({"geometry_msgs/Vector3"})),
 )
 SCALAR_TARGET = Target("", 1, NUMBERS, SCALAR_FIELDS, "number")
 
