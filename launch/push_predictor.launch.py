@@ -22,7 +22,7 @@ from launch import LaunchContext, LaunchDescription
 from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
-FRAMES = ("wrench_frame", "world_frame")
+FRAMES = ("wrench_frame", "world_frame", "stamp", "up")
 TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
 CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
     "reliability": ("", "reliable", "best_effort")
@@ -47,6 +47,8 @@ ARGUMENTS = (
     ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
     ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
     ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
+    ("stamp", "", "Time of a sample: header, or log for that of its receipt. Empty: header."),
+    ("up", "", "Axis of the poses' world that points up: x, y, z, -x, -y or -z; of one stream slider=y. Empty: z."),
     ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
