@@ -43,7 +43,7 @@ class ClockSession:
         self.evaluated = int(np.iinfo(np.int64).min)
         self._rig = rig
         self._segmenter = PushSegmenter(options)
-        self._cutter = WindowCutter(rig)
+        self._cutter = WindowCutter(rig, options.least_speed)
         self._dropouts: Counter[str] = Counter()
         self._origin: int | None = None
         self._first: int | None = None
@@ -64,7 +64,7 @@ class ClockSession:
     @property
     def stamp_jitter(self) -> dict[str, float]:
         """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
-        found = {name: track.regular for name, track in self.tracks.items()}
+        found = {name: track.repairs.regular for name, track in self.tracks.items()}
         return {name: each.noise.jitter for name, each in found.items() if each.noise is not None and each.corrected}
 
     @property
@@ -89,7 +89,7 @@ class ClockSession:
         ordered = track.order.take(stamp, values, final)
         if self._origin is None and len(ordered.stamp):
             self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(track.regular.take(ordered, final or ordered.clock_set), self._origin or 0)
+        track.extend(ordered, self._origin or 0, final or ordered.clock_set)
         if ordered.clock_set:
             self.clocks_set.add(name)
         return ordered.clock_set
