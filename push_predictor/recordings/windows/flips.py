@@ -8,11 +8,11 @@ A body that stays in its place cannot turn by a fixed angle between two samples:
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
 
-from push_predictor.geometry.frames import wrap_angle
 from push_predictor.types import Array, BoolArray, IntArray
 
 FIXED = np.unique([np.round(2.0 * np.pi * turn / parts, 12) for parts in (2, 3, 4, 5, 6) for turn in range(1, parts)])
@@ -51,7 +51,7 @@ class HeadingFlips:
 
     def _change(self, stamp: int, turn: float, elsewhere: bool) -> None:
         total = 0.0 if elsewhere else self._turned + turn
-        total = 0.0 if abs(wrap_angle(total)) < NEAR else total
+        total = 0.0 if abs(math.remainder(total, 2.0 * math.pi)) < NEAR else total
         if self._turned == 0.0:
             self._since = stamp
         self._turned = total

@@ -94,7 +94,7 @@ class HeldPoses:
         return run + 1 < len(begins) and int(stamp[-1] - stamp[begins[run + 1]]) > LONGEST_HOLD
 
     def _is_stale(self, stamp: IntArray, pose: Array, begins: IntArray, run: int, quantum: float) -> bool:
-        """Whether the body moved on during a run: the change after it is too large for one interval, not for the run."""
+        """Whether the body moved on during a run: the change after it is too large for one interval."""
         if run + 2 >= len(begins):
             return False
         begin, now, later = (int(at) for at in begins[run : run + 3])

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The resolution of a stream: the step in which its numbers are written, as decimals of a text or counts of a sensor."""
+"""The resolution of a stream: the step in which its numbers are written, by decimals or by counts of a sensor."""
 
 from __future__ import annotations
 
@@ -49,8 +49,3 @@ def lengths(values: Array, angle: int | None) -> Array:
     angle: index of the column with an unwrapped heading (rad), None without one.
     """
     return values[:, :2] if angle is None else np.column_stack([values[:, :2], LEVER * values[:, angle]])
-
-
-def quantum(values: Array) -> Array:
-    """The resolution (k,) of the columns of samples (n, k), 0 where it is unknown."""
-    return Resolution(values.shape[1]).take(values)[-1] if len(values) else np.zeros(values.shape[1])

@@ -67,7 +67,7 @@ class SmoothedPoses:
         rows = np.arange(self._returned, end)
         values = samples.values[rows]
         if (coarse := self._half[rows] > 0.0).any():
-            values[np.ix_(coarse, self._columns)] = self._lines(samples, rows[coarse])
+            values[np.flatnonzero(coarse)[:, None], self._columns] = self._lines(samples, rows[coarse])
         found = with_values(taken(samples, rows), values)
         begin = (
             int(np.searchsorted(stamp, (stamp[end] if end < len(stamp) else stamp[-1]) - 1e9 * LONGEST)) if end else 0
@@ -129,11 +129,10 @@ def _lines_at(stamp: IntArray, values: Array, rows: IntArray, first: IntArray, l
     for at in range(0, len(rows), AT_ONCE):
         part = slice(at, at + AT_ONCE)
         count, inside = (last - first)[part], part_rows(first[part], last[part])
-        time = ((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
+        time: Array = ((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
         mean_time, mean = part_means(time, count), part_means(values[inside], count)
-        late, off = (
-            of - np.repeat(of_mean, count, axis=0) for of, of_mean in ((time, mean_time), (values[inside], mean))
-        )
+        late: Array = time - np.repeat(mean_time, count, axis=0)
+        off: Array = values[inside] - np.repeat(mean, count, axis=0)
         spread = part_means(late**2, count)
         slope = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
         found.append(mean - slope * mean_time)

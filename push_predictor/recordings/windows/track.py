@@ -53,9 +53,8 @@ class Track:
         """Whether no sample has arrived, not even an undecided one."""
         return not len(self) and not len(self.order.waiting[0]) and not self.repairs.waiting
 
-    def extend(self, new: OrderedSamples, origin: int, final: bool = False) -> None:
-        """Append samples that `order` accepted, once they are repaired; with `final` all are."""
-        new = self.repairs.take(new, final)
+    def extend(self, new: OrderedSamples, origin: int) -> None:
+        """Append samples that `order` accepted, as `repairs` returned them."""
         values, first = new.values, min(len(self), 1)
         times = (np.concatenate([self.stamp[-1:], new.stamp]) - origin) * NANOSECOND
         jumps = np.zeros(len(values), dtype=np.bool_)
