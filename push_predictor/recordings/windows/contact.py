@@ -58,7 +58,9 @@ def contact_samples(
     after_break, in_break = _breaks([t for t in (slider, pusher, wrench) if t is not None], before, time)
     gap, closing_speed = _gaps(rig, slider, pusher, first, last)
     around, after = (_speed(pusher, time, tips, *span) for span in ((-NEAR, NEAR), (0.0, FORWARD_SPAN)))
-    speed, at_speed, forces = np.minimum(around, after), _at_speed(pusher, time, tips), _forces(wrench, time)
+    # A step of the resolution is no motion.
+    speed = np.maximum(np.minimum(around, after) - pusher.resolution / (2.0 * NEAR), 0.0)
+    at_speed, forces = _at_speed(pusher, time, tips), _forces(wrench, time)
     repositioned = _repositioned(slider, pusher, first, last)
     known = ~np.isnan(forces[:, 0])
     forces_or_none = ((x, y) if there else None for x, y, there in zip(*forces.T.tolist(), known.tolist(), strict=True))
