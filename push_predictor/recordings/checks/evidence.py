@@ -20,11 +20,13 @@ class Evidence:
     """A recording, as far as the stages so far accept its samples, its rig, and what they found.
 
     A stage takes it and returns it with its own findings. It does not look for what an earlier finding explains.
+    synchronous: whether single pushes show that the accepted stamps of slider and tip are on one clock.
     """
 
     recording: Recording
     rig: Rig
     findings: tuple[Finding, ...] = ()
+    synchronous: bool = False
 
     @property
     def refused(self) -> bool:
