@@ -21,6 +21,7 @@ FORWARD_SPAN = 0.03  # s after a sample in which the pusher must already move
 FIT_SPAN = 0.020  # s of a window that determine its velocity and angle (docs/explanation/windows.md)
 NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is accelerating
 MISSING_PERIODS = 2.5  # periods between samples of the force from which some are missing
+SLOWEST = 0.05  # s between samples of the force: a slower one shows neither begin nor end of a contact
 LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push, and a force is unknown in one
 SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
 
@@ -118,8 +119,8 @@ def _breaks(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray,
 
 
 def _absent(wrench: Track | None, time: Array) -> BoolArray:
-    """Whether the force is unknown at times (n,): its stream begins later, has ended, or has a long gap there."""
-    if wrench is None:
+    """Whether no force shows contacts at times (n,): its stream is slow, begins later, has ended, or has a long gap."""
+    if wrench is None or wrench.period > SLOWEST:
         return np.ones(len(time), dtype=np.bool_)
     known = np.concatenate([[-np.inf], wrench.time, [np.inf]])
     after = np.searchsorted(known, time)

@@ -19,6 +19,7 @@ from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOption
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0  # standard deviations of the force in free motion
+CLEAR = 3.0  # times the least force in contact: a smaller force shows a contact late
 CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
 LEAST_CLOSING_SPEED = 0.001  # m/s, below the noise of a tracker
 INSIDE = 0.005  # m; a tip this deep inside the outline shows unsynchronised clocks or a wrong frame
@@ -43,7 +44,7 @@ class PushSegmenter:
         self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
         self.samples = self.touching = 0
-        self.timing = ForceTiming(options.least_force)
+        self.timing = ForceTiming()
         self._start: int | None = None  # of the incomplete window
         self._last_good = -np.inf
         self._last_time = -np.inf
@@ -104,7 +105,8 @@ class PushSegmenter:
 
     def _touches(self, sample: ContactSample) -> bool:
         self._shown = shown = self._shows_contact(sample)
-        self.timing.add(sample, shown and sample.speed >= self.options.least_speed, self._free_force)
+        moving = shown and sample.speed >= self.options.least_speed
+        self.timing.add(sample, moving, self._free_force, max(CLEAR * self.options.least_force, self._least_force()))
         if sample.height > self.options.lift:
             return False
         pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
@@ -124,10 +126,14 @@ class PushSegmenter:
         return not separates and (self._shown or sample.closing_speed <= limit)
 
     def _presses(self, force: tuple[float, float] | None) -> bool:
-        zero, noise = self._tare()
+        zero, _ = self._tare()
         if force is None or zero is None:
             return False
-        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > max(self.options.least_force, NOISE_FACTOR * noise)
+        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > self._least_force()
+
+    def _least_force(self) -> float:
+        """The force (N) above which there is contact."""
+        return max(self.options.least_force, NOISE_FACTOR * self._tare()[1])
 
     def _tare(self) -> tuple[tuple[float, float] | None, float]:
         """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""
