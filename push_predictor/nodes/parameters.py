@@ -75,7 +75,7 @@ def declare(node: Node, params: Sequence[Param]) -> None:
         given = given_value(node, param.name)
         if given is not None and not param.allows(given):
             raise RequestError(param.name, given, param.accepted)
-        value = param.default if given is None else _native(param, given)
+        value = param.default if given is None else native(param, given)
         node.declare_parameter(param.name, value, _descriptor(param), ignore_override=True)
     node.add_on_set_parameters_callback(lambda changed: _checked(table, changed))
 
@@ -93,7 +93,7 @@ def values_of(node: Node, params: Iterable[Param]) -> dict[str, Any]:
     return {name: [text for text in v if text] if isinstance(v, list) else v for name, v in values.items()}
 
 
-def _native(param: Param, value: Any) -> Any:
+def native(param: Param, value: Any) -> Any:
     """The value in the type of the default: `rate:=10` means `rate:=10.0`."""
     if isinstance(param.default, list):
         return list(value)

@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
-from push_predictor.recordings.decoder.decoder import StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.decoder import StreamDecoder, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.rules import (
     NO_ELEMENT,
@@ -27,16 +26,16 @@ from push_predictor.recordings.decoder.rules import (
 )
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
-from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, SCALAR_TARGET, TF_TYPES, Source
+from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
 from push_predictor.recordings.fields.transforms import WORLD
-from push_predictor.recordings.fields.untyped import candidates, told_type
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, rig_from_record
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import NO_BIAS, NO_WRENCH, TIP_AXES, WORLD_AXES, Topics, load_topics
+from push_predictor.recordings.untyped_topics import tell_types
 
 __all__ = ["Topics", "read_recording", "recorded_rig", "require_rig"]
 
-SAMPLE = 20  # messages by which a type is told
+STATED = 3  # losses that an error states
 FAULTS = {
     NO_ELEMENT: "messages lack the chosen element",
     UNREADABLE: "messages are not readable CDR",
@@ -59,6 +58,14 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
     """
     bag, chosen = open_bag(Path(path)), topics.over(load_topics(Path(path)))
     rig = rig if rig is not None else recorded_rig(bag)
+    try:
+        return _read(bag, rig, chosen)
+    except RecordingError as error:  # what is lost may be the cause
+        losses = [loss for loss in bag.notes.losses if loss not in str(error)]
+        raise RecordingError("; ".join([str(error), *losses[:STATED]])) from None
+
+
+def _read(bag: Bag, rig: Rig | None, chosen: Topics) -> Recording:
     notes = Notes()
     if rig is None and chosen.wrench_bias not in ("", NO_BIAS):
         notes.add("the bias of the wrench is not subtracted: free motion is found with a rig, and there is none")
@@ -118,52 +125,22 @@ def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder, notes: Notes) ->
     given = {name for name in named if getattr(topics, name)} - ({"wrench"} if topics.wrench == NO_WRENCH else set())
     further = [source for name, source in every if name == COVARIATE]
     _check_present(bag, named, given, further)
-    _tell_types(bag, every, given, decoder.tf, notes)
-    read = {_named(bag, source.topic) for source in further}
+    tell_types(bag, topics, decoder.tf, notes)
+    read = {bag.spelled(source.topic) for source in further}
     for name, source in named.items():
         if (name, source.text) == ("wrench", NO_WRENCH) or not (kind := _kind(bag, name, source, name in given)):
             continue
-        read.add(_named(bag, source.topic))
+        read.add(bag.spelled(source.topic))
         if not source.frame:
             decoder.inputs()[name].declare(kind, bag.schemas, bag.path)
     for source in further:
-        decoder.scalars[name_of(source)].declare(bag.topics[_named(bag, source.topic)], bag.schemas, bag.path)
+        decoder.scalars[name_of(source)].declare(bag.topics[bag.spelled(source.topic)], bag.schemas, bag.path)
     for topic, kind in bag.topics.items():  # the others that contain one number
         if kind in SCALAR_FIELDS and name_of(_scalar_source(topic)) not in decoder.scalars:
             decoder.add_scalar(_scalar_source(topic)).declare(kind, bag.schemas, bag.path)
             read.add(topic)
-    both = {name for topic in decoder.tf for name in (_named(bag, topic), _named(bag, topic) + STATIC)}
+    both = {name for topic in decoder.tf for name in (bag.spelled(topic), bag.spelled(topic) + STATIC)}
     return read | {name for name in both if bag.topics.get(name) in TF_TYPES}
-
-
-def _tell_types(
-    bag: Bag, every: Sequence[tuple[str, Source]], given: Collection[str], tf: Iterable[str], notes: Notes
-) -> None:
-    """Tell the types of topics that were recorded without a schema; tf: topics of transforms that are needed.
-
-    Raises RecordingError if a pose, or another stream that was given, fits no type.
-    """
-    for topic in (name for of in tf for name in (_named(bag, of), _named(bag, of) + STATIC)):
-        _tell_type(bag, topic, TF_TYPES[:1], notes)
-    for name, source in every:
-        topic, kinds = _named(bag, source.topic), candidates(source, STREAMS.get(name, SCALAR_TARGET))
-        told = source.frame or _tell_type(bag, topic, kinds, notes)
-        if not told and (name != "wrench" or name in given):
-            problem = f"{topic} was recorded without a schema, and its messages fit none of {', '.join(kinds)}"
-            raise source.error(bag.path, problem)
-    for topic in (topic for topic, kind in bag.topics.items() if not kind):
-        lost = any(_named(bag, source.topic) == topic for _, source in every)
-        notes.add(f"{topic} was recorded without a schema and is not read", lost=lost)
-
-
-def _tell_type(bag: Bag, topic: str, kinds: Sequence[str], notes: Notes) -> bool:
-    """Whether a topic has a type, if necessary that of these which its messages fit."""
-    if bag.topics.get(topic) == "":
-        sample = [message.data for message in islice(bag.messages({topic}), SAMPLE)]
-        if kind := told_type(sample, kinds):
-            bag.set_type(topic, kind)
-            notes.add(f"{topic} was recorded without a schema; its messages are read as {kind}")
-    return bag.topics.get(topic) != ""
 
 
 def _scalar_source(topic: str) -> Source:
@@ -172,7 +149,7 @@ def _scalar_source(topic: str) -> Source:
 
 def _kind(bag: Bag, name: str, source: Source, given: bool) -> str:
     """The type to read from a source's topic, '' without the topic."""
-    kind, target = bag.topics.get(_named(bag, source.topic), ""), STREAMS[name]
+    kind, target = bag.topics.get(bag.spelled(source.topic), ""), STREAMS[name]
     source.check_type(kind, bag.path)
     return kind if given or kind in target.known or not kind else target.type
 
@@ -181,30 +158,25 @@ def _check_present(bag: Bag, named: Mapping[str, Source], given: Collection[str]
     """Raise RecordingError for a missing topic, with the topics of the bag and their types."""
     present = ", ".join(f"{topic} ({kind})" for topic, kind in bag.topics.items()) or "no topic"
     for source in [*(named[name] for name in named if name in given), *further]:
-        if _named(bag, source.topic) not in bag.topics:
+        if bag.spelled(source.topic) not in bag.topics:
             raise source.error(bag.path, f"no such topic; the bag contains {present}")
     poses = [source for name, source in named.items() if name not in given and STREAMS[name] is POSE_TARGET]
-    missing = [(_named(bag, source.topic), source.option) for source in poses]
+    missing = [(bag.spelled(source.topic), source.option) for source in poses]
     if missing := [(topic, option) for topic, option in missing if topic not in bag.topics]:
         names, options = (" and ".join(each) for each in zip(*missing, strict=True))
         raise RecordingError(f"{bag.path}: no topic {names} of {POSE.name}; it contains {present}; give {options}")
 
 
-def _named(bag: Bag, name: str) -> str:
-    """The bag's own spelling of a topic's name."""
-    return next((topic for topic in bag.topics if key_of(topic) == key_of(name)), f"/{key_of(name)}")
-
-
 def _spelling(bag: Bag, name: str) -> str:
     """The name of a scalar with the bag's own spelling of its topic."""
     topic, dot, field = name.partition(".")
-    return _named(bag, topic) + dot + field
+    return bag.spelled(topic) + dot + field
 
 
 def _label(bag: Bag, pose: PoseTopic | PoseFrame) -> str:
     """The name of a pose's source in notes."""
     source = pose.source if isinstance(pose, PoseFrame) else pose.messages.source
-    return _named(bag, source.topic) + source.text[len(source.topic) :]
+    return bag.spelled(source.topic) + source.text[len(source.topic) :]
 
 
 # --- notes -----------------------------------------------------------------------------------------------------------
@@ -215,7 +187,7 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
     world = decoder.world or WORLD
     for buffer_topic, buffer in decoder.tf.items():
         if buffer.unreadable:
-            _note_rejected(notes, _named(bag, buffer_topic), {UNREADABLE: buffer.unreadable}, {})
+            _note_rejected(notes, bag.spelled(buffer_topic), {UNREADABLE: buffer.unreadable}, {})
     for name in POSES:
         pose = decoder.poses[name]
         label = _label(bag, pose)
@@ -263,7 +235,7 @@ def _note_rejected(notes: Notes, label: str, rejected: Mapping[str, int], foreig
 def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: Notes) -> WrenchStream | None:
     """The stream, None without any message; notes state what was assumed. Raises RecordingError."""
     wrench, topics = decoder.wrench, decoder.topics
-    label = _named(bag, wrench.messages.source.topic)
+    label = bag.spelled(wrench.messages.source.topic)
     _note_rejected(notes, label, wrench.messages.rejected, wrench.messages.foreign)
     if not wrench.messages.received:
         if bag.topics.get(label) and topics.wrench != NO_WRENCH and not wrench.messages.foreign:

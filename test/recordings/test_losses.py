@@ -22,6 +22,7 @@ from push_predictor.recordings.checks.losses import LISTED
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table_file import is_recording
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.write import write_recording
 
 PARTS = 4
@@ -79,6 +80,14 @@ def test_without_metadata_a_gap_in_the_numbers_is_a_loss(split: Path, number: in
     assert lost(split) == ()
     (split / f"bag_{number}.mcap").unlink()
     assert lost(split) == (f"{split}: bag_{number} is missing between the numbered files",)
+
+
+def test_a_refusal_states_what_is_lost_since_that_may_be_the_cause(split: Path) -> None:
+    (split / "bag_0.mcap").unlink()
+    with pytest.raises(
+        RecordingError, match=r"no such topic; .*; .*bag_0\.mcap is listed in metadata\.yaml but missing$"
+    ):
+        read_recording(split, topics=Topics("/tf:block"))
 
 
 def test_files_that_were_named_otherwise_have_no_gap(split: Path) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from lab_bags import Lab, laboratory, short_recording, write_db3
+from lab_bags import LABORATORY, Lab, laboratory, short_recording, write_db3
 from mcap.writer import CompressionType, Writer
 from square_session import ANALYTICAL, RIG, pushes
 
@@ -43,7 +43,23 @@ WORDS = (
     *("", " ", "/", ".", ":", "[", "]", "=", ",", "0", "-1", "1e400", "nan", "inf", "\udcff", "none", "tip", "world"),
     *("/tf:", "/tf:tip", "/tf.transforms[0].transform", "/slider/pose.pose", "/slider/pose.all[b].pose", "a[name=]"),
     *("/slider/pose.all[name=block].pose", "/slider/pose.matrix", "/n", "/n.data", "/n.data[0]", "free_motion"),
-    *("x=1", "a=b=c", "y", "-z", "log", "1" * 400, "[" * 50, "é", "\n", "{}", "--rig"),
+    *(
+        "x=1",
+        "a=b=c",
+        "y",
+        "-z",
+        "slider=-y",
+        "wrench=x,z",
+        "log",
+        "/slider/pose.a+b",
+        "/slider/pose.position+turn",
+        "1" * 400,
+        "[" * 50,
+        "é",
+        "\n",
+        "{}",
+        "--rig",
+    ),
 )
 OPTIONS = {
     "of data": (
@@ -54,12 +70,23 @@ OPTIONS = {
     "trace": ("--covariates", "--alpha", "--seed"),
     "validate": ("--false-alarm-rate",),
     "predict": ("--duration", "--covariate", "--json"),
-    "suggest": ("--count", "--speed-range", "--travel", "--covariate"),
-    "rig": ("--square", "--rectangle", "--circle", "--polygon", "--tip-radius", "--mass", "--support-point"),
+    "suggest": ("--count", "--travel", "--covariate"),
+    "rig": ("--tip-radius", "--mass", "--keep-origin"),
     "simulate": ("--speed", "--travel", "--seed"),
 }
+NUMBERS = ("0", "1", "0.01", "-0.02", "3", "1e-9", "1e400", "nan")
+USUAL = {  # mostly taken from these, or the parser refuses nearly all calls
+    "--json": ("-",),
+    "--stamp": ("log", "header"),
+    "--wrench-bias": ("free_motion", "none"),
+    "--up": ("y", "-z", "slider=x", "y,wrench=y", "y,,x"),
+    "--mean": ("zero", "mechanics"),
+    **dict.fromkeys(("--seed", "--n-train", "--count", "--inducing"), ("0", "1", "-1", "3")),
+    **dict.fromkeys(("--stride", "--alpha", "--false-alarm-rate", "--duration", "--speed", "--travel"), NUMBERS),
+    **dict.fromkeys(("--velocity", "--angle", "--tip-radius", "--mass"), NUMBERS),
+}
 READING = ("train", "evaluate", "validate", "trace", "info", "check", "suggest", "rig")
-FLAGS = ("--strict", "--fit")
+FLAGS = ("--strict", "--fit", "--keep-origin")
 SECONDS = 3.0  # of the recording that is damaged
 
 
@@ -96,6 +123,9 @@ class Thrower:
         command = str(rng.choice([*READING, *READING, "predict", "import", "simulate"]))
         of_data = OPTIONS["of data"] if command in READING else ()
         words = self._positional(rng, command)
+        if of_data and rng.random() < 0.6:
+            (self._folder / "sound.yaml").write_bytes(self._sound.files["r.yaml"])
+            words += ["--rig", str(self._folder / "sound.yaml"), *_topics(rng)]
         for option in rng.permutation([*of_data, *OPTIONS.get(command, ())])[: rng.integers(4)].tolist():
             words += [option] if option in FLAGS else [option, self._value(rng, option)]
         if command in ("train", "suggest", "rig", "import", "simulate"):
@@ -105,21 +135,26 @@ class Thrower:
     def _positional(self, rng: np.random.Generator, command: str) -> list[str]:
         model, data = self._file(rng, "m.pushmodel"), self._data(rng)
         of = {
-            "train": [data, "--kind", str(rng.choice(["prior", "analytical"]))],
+            "train": [data, "--kind", "analytical"],
             "info": [model if rng.random() < 0.3 else data],
             "check": [data],
             "suggest": [model, *(["--matter", data] if rng.random() < 0.5 else [])],
             "rig": ["--from", data] if rng.random() < 0.7 else [],
-            "predict": [model, "--velocity", _word(rng), "--contact", "0.1", "--angle", _word(rng)],
+            "predict": [model, *self._valued(rng, "--velocity", "--angle"), "--contact", "0.1"],
             "import": [str(rng.choice(["mit", "mit-square", "mlab", "mcube", "rosbag1"])), data],
-            "simulate": ["--shape", "rect1", "--surface", _word(rng), "--pushes", "0", "--speed", _word(rng)],
+            "simulate": ["--shape", "rect1", "--surface", "abs", "--pushes", "0", *self._valued(rng, "--speed")],
         }
         return of.get(command, [model, data])
+
+    def _valued(self, rng: np.random.Generator, *options: str) -> list[str]:
+        return [word for option in options for word in (option, self._value(rng, option))]
 
     def _value(self, rng: np.random.Generator, option: str) -> str:
         if option == "--rig":
             return self._file(rng, "r.yaml")
-        return "-" if option == "--json" and rng.random() < 0.8 else _word(rng)
+        if option in USUAL and rng.random() < 0.8:
+            return str(rng.choice(USUAL[option]))
+        return _word(rng)
 
     def _data(self, rng: np.random.Generator) -> str:
         kind = rng.integers(5)
@@ -127,7 +162,7 @@ class Thrower:
             return self._folder_of(rng)
         if kind == 1:
             return self._written(rng, "x.mcap", foreign(rng))
-        return self._file(rng, str(rng.choice(["a.mcap", "b.mcap", "c.db3", "t.csv", "m.pushmodel", "s.csv"])))
+        return self._file(rng, str(rng.choice(["a.mcap", "b.mcap", "c.db3", "c.db3", "c.db3", "t.csv", "s.csv"])))
 
     def _folder_of(self, rng: np.random.Generator) -> str:
         folder = self._folder / f"folder{rng.integers(1_000_000)}"
@@ -155,6 +190,14 @@ def _word(rng: np.random.Generator) -> str:
     return WORDS[rng.integers(len(WORDS))]
 
 
+def _topics(rng: np.random.Generator) -> list[str]:
+    """Options that name topics, mostly those that are there."""
+    given = {f"--{name}-topic": getattr(LABORATORY, name) for name in ("slider", "pusher", "wrench")}
+    for option in rng.permutation([*given])[: rng.integers(3)].tolist():
+        given[option] = str(rng.choice([*TOPICS, *TOPICS, *WORDS]))
+    return [word for option in given.items() for word in option]
+
+
 def damaged(rng: np.random.Generator, content: bytes) -> bytes:
     """The content with a few bytes changed, a part removed, or nothing but random bytes."""
     data, kind = bytearray(content), rng.integers(5)
@@ -176,7 +219,7 @@ def foreign(rng: np.random.Generator) -> bytes:
     buffer = io.BytesIO()
     writer = Writer(buffer, compression=CompressionType.NONE)
     writer.start(profile="ros2", library="")
-    for topic in TOPICS:
+    for topic in (*TOPICS, LABORATORY.slider):
         kind, text = TYPES[rng.integers(len(TYPES))], SCHEMAS[rng.integers(len(SCHEMAS))]
         schema = writer.register_schema(kind, "ros2msg", text) if kind else 0
         channel = writer.register_channel(topic, str(rng.choice(["cdr", "cdr", "cdr", "json"])), schema)

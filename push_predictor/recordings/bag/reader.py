@@ -99,6 +99,10 @@ class Bag:
                 )
         return found
 
+    def spelled(self, name: str) -> str:
+        """The bag's own spelling of a topic's name, with a slash before it if there is no such topic."""
+        return next((topic for topic in self.topics if topic.strip("/") == name.strip("/")), f"/{name.strip('/')}")
+
     def set_type(self, topic: str, kind: str) -> None:
         """State the type of a topic where its schema is missing."""
         for file in self.files:

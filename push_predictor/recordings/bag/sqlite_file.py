@@ -20,6 +20,7 @@ from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.bag.notes import Notes
 
 MAGIC = b"SQLite format 3\0"
+_DAMAGE = (sqlite3.Error, UnicodeDecodeError)  # the latter: of names in a damaged schema
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
 
 
@@ -39,7 +40,7 @@ class SqliteFile:
                 self._read_topics(database)
                 self.schemas = self._read_definitions(database)
                 self.metadata = self._read_metadata(database)
-        except (sqlite3.Error, OSError) as error:
+        except (*_DAMAGE, OSError) as error:
             raise RecordingError(f"{self._name}: is not a readable sqlite3 bag of rosbag2 ({error})") from None
 
     @property
@@ -66,7 +67,7 @@ class SqliteFile:
                         undone += 1
                     else:
                         yield RawMessage(*wanted[number], time, message)
-        except sqlite3.Error as error:
+        except _DAMAGE as error:
             self._lost(f"damaged after {read} messages ({error}); the rest is not read")
         if undone:
             self._lost(f"{undone} messages cannot be read or decompressed and were skipped")

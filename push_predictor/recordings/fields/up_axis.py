@@ -17,7 +17,7 @@ from push_predictor.recordings.fields.pose_rows import composed, turned
 from push_predictor.types import Array
 
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
-Z_UP = "z"
+Z_UP, Z_DOWN = "z", "-z"
 _HALF = np.sqrt(0.5)
 # The quaternion that turns each axis into z.
 _TURNS = MappingProxyType(
@@ -54,14 +54,16 @@ def bodies_z_up(poses: Array, up: str) -> Array:
     back = _turns(up, len(poses))
     back[:, 3:] *= _CONJUGATE
     own = composed(poses, back)
-    nearer = _steepness(own) > _steepness(poses)
-    return np.where(nearer[:, None], own, poses)
+    one, other = _upward(poses), _upward(own)
+    # Half a turn keeps the z axis vertical: which of the two points up decides. Else the one that is vertical.
+    is_own = other > one if up == Z_DOWN else np.abs(other) > np.abs(one)
+    return np.where(is_own[:, None], own, poses)
 
 
-def _steepness(poses: Array) -> Array:
-    """How far (n,) the z axes of bodies point up or down, times the square of the quaternions' length."""
+def _upward(poses: Array) -> Array:
+    """How far (n,) the z axes of bodies point up, times the square of the quaternions' length."""
     x, y, z, w = poses[:, 3:].T
-    return np.asarray(np.abs(w**2 + z**2 - x**2 - y**2))
+    return np.asarray(w**2 + z**2 - x**2 - y**2)
 
 
 def _turns(up: str, count: int) -> Array:
