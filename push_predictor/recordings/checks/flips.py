@@ -12,9 +12,12 @@ import numpy as np
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.windows.flips import HeadingFlips
+from push_predictor.recordings.windows.flips import HeadingFlips, flip_steps
+from push_predictor.types import Array, IntArray
 
 FEWEST = 3
+LARGE = np.radians(50.0)  # below the smallest fixed angle
+FIXED_SHARE = 0.7  # of the large steps; of random ones, as of headings in degrees, a quarter are near a fixed angle
 COMMON = 0.1  # share of the flips by an angle that is listed
 ADVICE = "The windows undo them. Place the markers so that no turn of the body maps them onto each other."
 
@@ -22,7 +25,10 @@ ADVICE = "The windows undo them. Place the markers so that no turn of the body m
 def without_flips(recording: Recording) -> tuple[Finding | None, Recording]:
     """A warning if the heading flips by fixed angles, and the recording with the headings that the windows use."""
     slider = recording.slider
-    turned = HeadingFlips().take(slider.stamp, np.column_stack([slider.x, slider.y, slider.heading]))
+    pose = np.column_stack([slider.x, slider.y, slider.heading])
+    if not len(pose) or _share_of_fixed(slider.stamp, pose) < FIXED_SHARE:
+        return None, recording
+    turned = HeadingFlips().take(slider.stamp, pose)
     changes = np.diff(turned, prepend=0.0)
     flips = np.round(np.degrees(np.abs(wrap_angle(changes[np.abs(changes) > 1e-6]))))
     if len(flips) < FEWEST:
@@ -37,3 +43,10 @@ def without_flips(recording: Recording) -> tuple[Finding | None, Recording]:
     values = {"flips": Value(float(len(flips)), "1"), "share": Value(share, "1")}
     found = Finding("heading_flips", "warning", sentence, ADVICE, values)
     return found, replace(recording, slider=replace(slider, heading=wrap_angle(slider.heading - turned)))
+
+
+def _share_of_fixed(stamp: IntArray, pose: Array) -> float:
+    """Share of the steps by a large angle, of a slider that stays, that are fixed angles; 0 without any."""
+    turn, elsewhere = flip_steps(stamp, pose)
+    large = ~elsewhere & (np.abs(wrap_angle(np.diff(pose[:, 2]))) > LARGE)
+    return float(np.mean(turn[large] != 0.0)) if large.any() else 0.0

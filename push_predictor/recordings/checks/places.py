@@ -74,8 +74,8 @@ def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:
         return None
     sentence = (
         f"The {name}'s poses jump {places.returns} times to and fro between places "
-        f"{1e3 * places.distance:.0f} mm apart ({100.0 * places.share:.0f} % of the samples are elsewhere): two "
-        "bodies, or two nodes, publish on its topic."
+        f"{1e3 * places.distance:.0f} mm apart ({100.0 * places.share:.0f} % of the samples are elsewhere): "
+        "two bodies, or two nodes, publish on its topic."
     )
     often = places.share > HALF
     advice = (

@@ -35,14 +35,14 @@ def unset_stamps(stamps: Stamps) -> Finding | None:
     return Finding("stamps_unset", "refused", f"The header stamps do not tell the time: {listed}.", LOG)
 
 
-def clocks_never_meet(stamps: Stamps) -> Finding | None:
+def clocks_never_meet(stamps: Stamps) -> list[Finding]:
     """A refusal if a stream has no time in common with the slider's."""
     if "slider" not in stamps:
-        return None
+        return []
     first, last = int(stamps["slider"].min()), int(stamps["slider"].max())
     apart = {name: stamp for name, stamp in stamps.items() if stamp.max() < first or stamp.min() > last}
     if not apart:
-        return None
+        return []
     told = ", ".join(f"{name} {1e-9 * int(of.min()):.9g} to {1e-9 * int(of.max()):.9g} s" for name, of in apart.items())
     early = [name for name, of in {**apart, "slider": stamps["slider"]}.items() if of.max() < EPOCH]
     cause = (
@@ -53,7 +53,7 @@ def clocks_never_meet(stamps: Stamps) -> Finding | None:
     sentence = f"The streams have no time in common: {told}, slider {1e-9 * first:.9g} to {1e-9 * last:.9g} s.{cause}"
     values = {f"{name}_first": Value(1e-9 * int(of.min()), "s") for name, of in apart.items()}
     advice = f"Stamp all streams by one clock (`use_sim_time` for all nodes or for none). {LOG}"
-    return Finding("clocks_never_meet", "refused", sentence, advice, values)
+    return [Finding("clocks_never_meet", "refused", sentence, advice, values)]
 
 
 def _wrong(stamp: IntArray) -> str:

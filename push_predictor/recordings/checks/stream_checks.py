@@ -31,10 +31,10 @@ def stream_stage(evidence: Evidence) -> Evidence:
     """What each stream shows by itself. Wrong stamps and units hide all that follows."""
     recording, rig = evidence.recording, evidence.rig
     stamps = stamps_of(recording)
-    unset = unset_stamps(stamps)
-    wrong_stamps = [unset] if unset else [*stream_rates(recording)] or [clocks_never_meet(stamps)]
-    if any(wrong_stamps):
-        return evidence.found(wrong_stamps)
+    if unset := unset_stamps(stamps):
+        return evidence.found([unset])
+    if wrong_times := stream_rates(recording) or clocks_never_meet(stamps):
+        return evidence.found(wrong_times)
     found, sound = _jumps(recording)
     if any(finding.severity == "refused" for finding in found):
         return evidence.found(found)

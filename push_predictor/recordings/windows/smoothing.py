@@ -129,10 +129,10 @@ def _lines_at(stamp: IntArray, values: Array, rows: IntArray, first: IntArray, l
     for at in range(0, len(rows), AT_ONCE):
         part = slice(at, at + AT_ONCE)
         count, inside = (last - first)[part], part_rows(first[part], last[part])
-        time: Array = ((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
+        time = np.asarray((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
         mean_time, mean = part_means(time, count), part_means(values[inside], count)
-        late: Array = time - np.repeat(mean_time, count, axis=0)
-        off: Array = values[inside] - np.repeat(mean, count, axis=0)
+        late = time - np.repeat(mean_time, count, axis=0)
+        off = values[inside] - np.repeat(mean, count, axis=0)
         spread = part_means(late**2, count)
         slope = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
         found.append(mean - slope * mean_time)
