@@ -69,6 +69,17 @@ def joined(streams: Sequence[Stream]) -> Stream:
     return replace(streams[0], **whole)
 
 
+def repeated(stream: PoseStream | WrenchStream) -> BoolArray:
+    """Which samples (n,) of a stream are in it before, with the same stamp and values."""
+    again = np.zeros(len(stream), dtype=np.bool_)
+    if np.all(np.diff(stream.stamp) > 0):
+        return again
+    order = np.argsort(stream.stamp, kind="stable")
+    columns = [of[order] for of in vars(stream).values() if of is not None]
+    again[order[1:]] = np.all([of[1:] == of[:-1] for of in columns], axis=0)
+    return again
+
+
 def set_back(before: PoseStream, after: PoseStream) -> bool:
     """Whether the clock was set back between two portions of a stream."""
     return len(before) > 0 and len(after) > 0 and int(before.stamp[-1]) - int(after.stamp[0]) > CLOCK_SET
