@@ -231,7 +231,9 @@ class FieldReader:
         if found is None or found.shape[1] != self._target.count:
             return None
         unfit = np.isnan(found).all(axis=1)
-        return found, unfit & np.isfinite(np.hstack(parts)).all(axis=1) if unfit.any() else unfit
+        if unfit.any():
+            unfit &= np.isfinite(np.hstack(parts)).all(axis=1)
+        return found, np.asarray(unfit)
 
     def _found(self, steps: Sequence[Step], first: Sequence[str]) -> list[str]:
         """The steps of a field, with the elements that were chosen for the first field."""
