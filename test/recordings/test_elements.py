@@ -84,6 +84,16 @@ def test_a_body_is_chosen_by_any_text_or_by_one_field_in_whatever_order(shuffled
     assert any(each.startswith(note) for each in found.notes) and not found.losses
 
 
+def test_of_two_bodies_of_one_name_the_first_is_taken(tmp_path: Path) -> None:
+    def chosen(number: int, block: Any, other: Any) -> list[Any]:
+        other.name = "block"
+        return [block, other]
+
+    path = bodies_lab(chosen).mcap(tmp_path / "a.mcap")
+    found = read_recording(path, topics=Topics("/bodies.bodies[name=block].pose"))
+    assert found.slider.x.tolist() == original().slider.x.tolist()
+
+
 def test_two_fields_of_a_chosen_body_are_of_the_same_body(shuffled: Path) -> None:
     text = "/bodies.bodies[block].pose.orientation+bodies[block].pose.position"
     one, other = (read_recording(shuffled, topics=Topics(t)).slider for t in (text, "/bodies.bodies[block].pose"))

@@ -70,7 +70,7 @@ OPTIONS = {
     "trace": ("--covariates", "--alpha", "--seed"),
     "validate": ("--false-alarm-rate",),
     "predict": ("--duration", "--covariate", "--json"),
-    "suggest": ("--count", "--travel", "--covariate"),
+    "suggest": ("--travel", "--covariate"),
     "rig": ("--tip-radius", "--mass", "--keep-origin"),
     "simulate": ("--speed", "--travel", "--seed"),
 }
@@ -138,7 +138,7 @@ class Thrower:
             "train": [data, "--kind", "analytical"],
             "info": [model if rng.random() < 0.3 else data],
             "check": [data],
-            "suggest": [model, *(["--matter", data] if rng.random() < 0.5 else [])],
+            "suggest": [model, "--count", "1", *(["--matter", data] if rng.random() < 0.5 else [])],
             "rig": ["--from", data] if rng.random() < 0.7 else [],
             "predict": [model, *self._valued(rng, "--velocity", "--angle"), "--contact", "0.1"],
             "import": [str(rng.choice(["mit", "mit-square", "mlab", "mcube", "rosbag1"])), data],
