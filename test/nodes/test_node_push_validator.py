@@ -595,7 +595,7 @@ def test_the_log_names_a_report_that_the_end_interrupts():
     logged: list[str] = []
     writer = ResultWriter("", SimpleNamespace(warning=logged.append))
     stopped: list[bool] = []
-    writer.report = SimpleNamespace(busy=True, stop=lambda: stopped.append(True))
+    writer.report = SimpleNamespace(alive=True, stop=lambda: stopped.append(True))
     writer.close()
     assert stopped == [True] and "The report was interrupted" in logged[0]
 

@@ -71,7 +71,7 @@ class TraceAction:
             save_model(model, deployed)  # the model in use; its original file may have changed since
             self._log.info(f"tracing {model.name} on {', '.join(map(str, evidence))}")
             task = TraceTask(evidence, deployed, tuple(request.covariates), self._alpha(), folder)
-            ended = _watched(goal, check, Child("trace", run_trace, task))
+            ended = _watched(goal, check, task)
             if isinstance(ended, Failed):
                 return TraceResidual.Result(success=False, message=ended.reason, error_code=int(ended.code))
             for name in RESULTS:
@@ -91,15 +91,17 @@ def _evidence(field: str, given: str) -> tuple[Path, ...]:
     return found
 
 
-def _watched(goal: Any, check: Callable[[], None], child: Child) -> Traced | Failed:
+def _watched(goal: Any, check: Callable[[], None], task: TraceTask) -> Traced | Failed:
     """The last message of the process; its stages become feedback. Raises what `check` raises, after its end."""
+    child = Child("trace", run_trace)
+    child.start(task)
     try:
         while True:
             check()
             try:
                 received: Stage | Traced | Failed | None = child.received(POLL_PERIOD)
             except (EOFError, OSError):
-                return Failed(_exit_reason(child), ErrorCode.INTERNAL_ERROR)
+                return Failed(_exit_reason(child.status(5.0)), ErrorCode.INTERNAL_ERROR)
             if isinstance(received, Stage):
                 _publish(goal, received)
             elif received is not None:
@@ -121,9 +123,7 @@ def _result(traced: Traced, extended: Path) -> TraceResidual.Result:
     return result
 
 
-def _exit_reason(child: Child) -> str:
+def _exit_reason(status: int) -> str:
     """In words, how a process ended that sent no result."""
-    child.process.join(5.0)
-    code = child.process.exitcode
-    how = f"signal {-code}" if code is not None and code < 0 else f"status {code}"
+    how = f"signal {-status}" if status < 0 else f"status {status}"
     return f"the process of the trace ended with {how} and no result, see the log of the node"

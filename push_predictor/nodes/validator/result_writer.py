@@ -11,7 +11,8 @@ from typing import Any
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.runtime import one_line
 from push_predictor.nodes.validator.validation_run import ValidationRun
-from push_predictor.online.report_process import ReportWriter
+from push_predictor.online.child_process import Child
+from push_predictor.online.live_validation import write_report
 
 
 class ResultWriter:
@@ -19,7 +20,7 @@ class ResultWriter:
 
     def __init__(self, output: str, log: Any) -> None:
         self.folder = _folder(output)
-        self.report = ReportWriter()
+        self.report = Child("report", write_report)
         self._log = log
         self._has_result = False
 
@@ -40,13 +41,14 @@ class ResultWriter:
         if not len(run.validation.predicted()):
             self._log.warning(f"The result has no score: {windows} windows were found, and none was predicted.")
         if with_report and len(run.validation.predicted()):
-            self.report.start(run.validation, self.folder, None if run.alarm is None else run.alarm.json)
+            alarm = None if run.alarm is None else run.alarm.json
+            self.report.start(*run.validation.reported(), self.folder, alarm)
             self._log.info(f"Writing the report {self.folder / 'report.html'}, which takes some seconds.")
         return ""
 
     def close(self) -> None:
         """End a report that is being written."""
-        if self.report.busy:
+        if self.report.alive:
             self._log.warning("The report was interrupted. `push_predictor report validation` writes one.")
         self.report.stop()
 

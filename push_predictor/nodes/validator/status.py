@@ -99,7 +99,7 @@ class StatusPublisher:
     def _activity(self) -> str:
         if self._session.state is State.DRAINING:
             return "waiting for the last answers"
-        if self._writer.report.busy:
+        if self._writer.report.alive:
             return "writing the report"
         return "validating" if self._session.active else "waiting for samples"
 
