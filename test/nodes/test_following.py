@@ -25,12 +25,12 @@ class Topic:
         self._waiting: list[Taken] = []
         node: Any = SimpleNamespace(
             resolve_topic_name=str,
-            get_publishers_info_by_topic=lambda _: [None] * self.publishers,
+            get_publishers_info_by_topic=lambda _: [SimpleNamespace(topic_type="of another type")] * self.publishers,
             count_publishers=lambda _: self.publishers,
         )
         monkeypatch.setattr(polling, "take_all", self._take_all)
         monkeypatch.setattr(polling, "time_ns", lambda: self._now)
-        self.subscription = FollowingSubscription(node, "/slider/pose")
+        self.subscription = FollowingSubscription(node, "/slider/pose", str)
         self.subscription._subscription = node
 
     def _take_all(self, _: object) -> list[Taken]:
@@ -47,7 +47,7 @@ class Topic:
         """The node looks at the publishers, of which there are this many."""
         self._now += 1
         self.publishers = publishers
-        self.subscription.publishers()
+        self.subscription.look()
 
     def lost(self) -> int:
         list(self.subscription.taken())
@@ -121,11 +121,13 @@ def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hi
             raise outcome
         return outcome
 
-    node: Any = SimpleNamespace(resolve_topic_name=str, create_subscription=create)
-    subscription = FollowingSubscription(node, "/slider/pose")
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    node: Any = SimpleNamespace(
+        resolve_topic_name=str, create_subscription=create, get_publishers_info_by_topic=lambda _: []
+    )
+    subscription = FollowingSubscription(node, "/slider/pose", str, first="geometry_msgs/msg/PoseStamped")
+    subscription.look()
     with pytest.raises(RuntimeError, match="a bug"):
-        subscription.follow("geometry_msgs/msg/PoseStamped", [])
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+        subscription.look()
+    subscription.look()
+    subscription.look()
     assert not outcomes, "once it exists, it is kept"

@@ -162,7 +162,7 @@ class SensorSubscriber:
             return report
         tf = next(iter(self._tf.values()))
         if tf.problem:
-            return replace(report, problem=f"tf: {tf.problem}", refused=tf.refused)
+            return replace(report, problem=f"tf: {tf.problem}", refused=bool(tf.refusal))
         if problem:
             accepted = f"{problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
             return replace(report, problem=f"wrench_frame {frame!r}: {accepted}.")
