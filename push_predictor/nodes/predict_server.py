@@ -41,7 +41,7 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameter_tables import PREDICT_SERVER
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import run
-from push_predictor.nodes.server.guarded_action import GuardedAction
+from push_predictor.nodes.server.actions import GuardedAction, TraceAction
 from push_predictor.nodes.server.services import (
     RequestFrames,
     handle_list_models,
@@ -54,7 +54,6 @@ from push_predictor.nodes.server.services import (
 )
 from push_predictor.nodes.server.status import NO_MODEL, RequestStatistics, server_status
 from push_predictor.nodes.server.threaded_service import ThreadedService
-from push_predictor.nodes.server.trace_action import TraceAction
 from push_predictor.resources import SHIPPED
 from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.srv import (
@@ -100,7 +99,7 @@ class PredictServer(LifecycleNode):
         self._introspect(self.value("introspection"))
         check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))
         self._actions = [
-            TraceAction(self, self._deployed, alpha, check, self._check_loaded).action,
+            TraceAction(self, self._deployed, alpha, check, self._check_loaded),
             GuardedAction(self, SuggestPushes, "suggest_pushes", self._suggest, check, check),
         ]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)

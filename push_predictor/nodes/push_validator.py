@@ -26,11 +26,10 @@ from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
-from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.publishers import ResultPublishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess

@@ -68,7 +68,7 @@ from push_predictor.nodes.validator import publishers
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online import session
-from push_predictor.online.stream_sync import Samples
+from push_predictor.online.stream_health import Samples
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording

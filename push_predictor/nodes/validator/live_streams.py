@@ -15,7 +15,7 @@ from rclpy.qos import ReliabilityPolicy
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.polling import FollowingSubscription, Taken
 from push_predictor.nodes.qos import DEEPEST, message_class
-from push_predictor.online.topic_report import TopicReport, stamp_figures
+from push_predictor.online.stream_health import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.sources import STATIC

@@ -17,7 +17,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from push_predictor.errors import RequestError
 from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream, TransformTopics
 from push_predictor.nodes.validator.scalar_topics import ScalarTopics
-from push_predictor.online.topic_report import ReportLog, TopicReport
+from push_predictor.online.stream_health import ReportLog, TopicReport
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.sources import COVARIATE, sources_of

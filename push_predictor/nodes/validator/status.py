@@ -15,10 +15,9 @@ from msg_adapters.diagnostics import diagnostic_array, diagnostic_status, level_
 from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.rig_source import RigSource
-from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
@@ -126,8 +125,8 @@ def _run_problems(run: ValidationRun) -> list[str]:
     found += [*run.sync.problems(), *describe_faults(run.counts)]
     if run.refused:
         found.append(f"predict_push refused {run.refused} requests. The last, of model {run.last_refusal}")
-    if run.table_failure:
-        found.append(run.table_failure)
+    if run.table is not None and run.table.failure:
+        found.append(run.table.failure)
     if run.alarm is not None:
         found += _alarm_problems(run.alarm)
     return found

@@ -20,11 +20,11 @@ from push_predictor.evaluation.alarm.evidence import with_alarm
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.server_client import PredictionClient
 from push_predictor.online.alarm_process import AlarmProcess, CompletedPushes
 from push_predictor.online.check_process import SampleCheck
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
-from push_predictor.online.stream_sync import StreamSync
+from push_predictor.online.stream_health import StreamSync
 from push_predictor.online.window_table import JOURNAL, ResidualJournal, WindowTable
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.message_types import definition_text
@@ -66,7 +66,6 @@ class ValidationRun:
         self.rig = rig
         self.alarm = alarm
         self.table = WindowTable(output, rig) if output else None
-        self.table_failure = ""
         self.journal = ResidualJournal(output) if output else None
         self.validation = LiveValidation(models)
         self.sync = StreamSync(scalars)  # how far each stream has come
@@ -134,7 +133,8 @@ class ValidationRun:
                 self._first.setdefault(f"topic:{name}", float(stream.value[0]))
 
     def _request(self, windows: Sequence[PushWindow]) -> None:
-        self._save(windows)
+        if self.table is not None:
+            self.table.add(windows, self.validation.windows, self._first)
         for window in windows:
             number = self.validation.add(window)
             self._pushes.found(number, window)
@@ -147,15 +147,6 @@ class ValidationRun:
         """The finite covariates of a window, with those that only grow counted as the model counts them."""
         columns = self.validation.models[model].continued(windows_to_table([window])).covariates
         return {name: float(column[0]) for name, column in columns.items() if isfinite(column[0])}
-
-    def _save(self, windows: Sequence[PushWindow]) -> None:
-        """Append the windows to the table. A full disk does not end the measurement."""
-        if self.table is None or self.table_failure:
-            return
-        try:
-            self.table.add(windows, self.validation.windows, self._first)
-        except OSError as error:
-            self.table_failure = f"Windows are no longer saved: {error}"
 
     def _on_response(self, model: int, number: int) -> Callable[[PredictPush.Response], None]:
         return lambda response: self._take(model, number, response)
