@@ -33,14 +33,11 @@ from rclpy.qos import QoSProfile, qos_profile_system_default
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
-from msg_adapters.predictions import refuse
-from push_predictor.error_codes import ErrorCode, error_code
-from push_predictor.errors import InactiveError, PushPredictorError, RequestError
-from push_predictor.models.push_model import PushModel
+from push_predictor.errors import InactiveError, RequestError
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameter_tables import PREDICT_SERVER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.runtime import run
+from push_predictor.nodes.runtime import refusal, run
 from push_predictor.nodes.server.actions import GuardedAction, TraceAction
 from push_predictor.nodes.server.services import (
     RequestFrames,
@@ -99,7 +96,7 @@ class PredictServer(LifecycleNode):
         self._introspect(self.value("introspection"))
         check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))
         self._actions = [
-            TraceAction(self, self._deployed, alpha, check, self._check_loaded),
+            TraceAction(self, lambda name: self._registry.get(name).model, alpha, check, self._check_loaded),
             GuardedAction(self, SuggestPushes, "suggest_pushes", self._suggest, check, check),
         ]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -315,39 +312,30 @@ class PredictServer(LifecycleNode):
 
     def _check_active(self) -> None:
         """Raise InactiveError when the node ends or is not active; long requests call it between their parts."""
-        if self._closing.is_set():
-            raise InactiveError("the node ends")
-        if self._state != "active":
-            raise InactiveError(f"the node is {self._state}")
+        self._check_state("active")
 
     def _check_loaded(self) -> None:
         """Raise InactiveError when the node ends or its models are unloaded."""
+        self._check_state("active", "inactive")
+
+    def _check_state(self, *accepted: str) -> None:
         if self._closing.is_set():
             raise InactiveError("the node ends")
-        if self._state in ("unconfigured", "finalized"):
-            raise InactiveError(f"the node is {self._state} now")
+        if self._state not in accepted:
+            raise InactiveError(f"the node is {self._state}")
 
     def _refuse_inactive(self, registry: ModelRegistry, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
 
-    def _deployed(self, name: str) -> PushModel:
-        """The model to be traced. Raises RequestError."""
-        return self._registry.get(name).model
-
     def _guarded(self, handler: Handler) -> Callable[[Any, Any], Any]:
-        """The callback of a service; every exception becomes a refusal: one that left it would end the node."""
+        """The callback of a service; every exception becomes a refusal."""
 
         def callback(request: Any, response: Any) -> Any:
             try:
                 handler(self._registry, request, response)
                 return response
-            except PushPredictorError as error:
-                reason, code = str(error), error_code(error)
-                self.get_logger().warning(f"refused: {reason}", throttle_duration_sec=1.0)
             except Exception as error:
-                reason, code = f"internal error, see the log of the node: {error!r}", ErrorCode.INTERNAL_ERROR
-                self.get_logger().error(traceback.format_exc())
-            return refuse(response, reason, code)
+                return refusal(error, response, self.get_logger())
 
         return callback
 

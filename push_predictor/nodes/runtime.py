@@ -9,6 +9,7 @@ import argparse
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeAlias
@@ -20,7 +21,9 @@ from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedEx
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from msg_adapters.predictions import refuse
 from push_predictor import __version__
+from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.network_security import LIMITED, limit_discovery, require_security, security_hint
 from push_predictor.online.child_process import kill_children
@@ -193,6 +196,20 @@ def _own_arguments(words: Sequence[str]) -> list[str]:
 def one_line(error: BaseException) -> str:
     """The message of an error without line breaks."""
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def refusal(error: Exception, response: Any, log: Any) -> Any:
+    """The response to a request that failed: its reason and error code. One that left its callback would end the node.
+
+    Logs an expected failure as a warning, once a second at most, any other with its traceback.
+    """
+    code, reason = error_code(error), one_line(error)
+    if code == ErrorCode.INTERNAL_ERROR:
+        log.error("".join(traceback.format_exception(error)))
+        reason = f"internal error, see the log of the node: {error!r}"
+    else:
+        log.warning(reason, throttle_duration_sec=1.0)
+    return refuse(response, reason, code)
 
 
 def _handle_signals(stop: Stop, life: Life) -> None:

@@ -41,7 +41,7 @@ class FakeNode:
         self.services[name] = (kind, callback)
 
     def get_logger(self) -> Any:
-        return SimpleNamespace(warning=self.logged.append, error=self.logged.append)
+        return SimpleNamespace(warning=lambda text, **_: self.logged.append(text), error=self.logged.append)
 
 
 class FakePlayer:

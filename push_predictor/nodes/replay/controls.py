@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import traceback
 from collections.abc import Callable
 from functools import partial
 from types import ModuleType
@@ -17,9 +16,8 @@ from builtin_interfaces.msg import Duration, Time
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from msg_adapters.predictions import refuse
-from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
+from push_predictor.nodes.runtime import refusal
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.player import PlayRange, ReplayPlayer
 from push_predictor_interfaces import srv as own_types
@@ -56,19 +54,13 @@ class ReplayControls:
             node.create_service(getattr(types, kind), f"~/{name}", callback, callback_group=group)
 
     def _guarded(self, handler: Callable[[Any, Any], object], request: Any, response: Any) -> Any:
-        """Turn every exception into a refusal: one that left a callback would end the node."""
         try:
             handler(request, response)
-            if hasattr(response, "success"):
-                response.success = True
-            return response
-        except PushPredictorError as error:
-            self._node.get_logger().warning(str(error))
-            return refuse(response, str(error), error_code(error))
         except Exception as error:
-            self._node.get_logger().error(traceback.format_exc())
-            reason = f"internal error, see the log of the node: {error!r}"
-            return refuse(response, reason, ErrorCode.INTERNAL_ERROR)
+            return refusal(error, response, self._node.get_logger())
+        if hasattr(response, "success"):
+            response.success = True
+        return response
 
     def _set_rate(self, request: Any, response: Any) -> None:
         if not self._player.set_rate(request.rate):

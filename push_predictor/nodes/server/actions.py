@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import tempfile
 import threading
-import traceback
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -22,10 +21,11 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
 from msg_adapters.predictions import refuse
-from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import BusyError, InactiveError, PushPredictorError, RecordingError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
+from push_predictor.nodes.runtime import refusal
 from push_predictor.online.child_process import Child
 from push_predictor.online.trace_process import (
     EXTENDED,
@@ -117,10 +117,7 @@ class GuardedAction:
         except CancelledError as error:
             goal.canceled()
             return refuse(self._kind.Result(), str(error), ErrorCode.CANCELLED)
-        except (PushPredictorError, OSError) as error:
-            return self._abort(goal, error)
         except Exception as error:
-            self._log.error(traceback.format_exc())
             return self._abort(goal, error)
         finally:
             self.doing = ""
@@ -132,12 +129,8 @@ class GuardedAction:
         self._may_continue()
 
     def _abort(self, goal: Any, error: Exception) -> Any:
-        code, reason = error_code(error), " ".join(str(error).split())
-        if code == ErrorCode.INTERNAL_ERROR:
-            reason = f"internal error, see the log of the node: {error!r}"
-        self._log.warning(f"{self._name}: {reason}")
         goal.abort()
-        return refuse(self._kind.Result(), reason, code)
+        return refusal(error, self._kind.Result(), self._log)
 
 
 class TraceAction(GuardedAction):
