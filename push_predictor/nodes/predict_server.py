@@ -25,11 +25,12 @@ from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, qos_profile_system_default
+from rclpy.service import Service
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
@@ -218,9 +219,7 @@ class PredictServer(LifecycleNode):
         self._on_load, self._on_list = self._guarded(self._load), self._guarded(handle_list_models)
         self._push_service = ThreadedService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
         self._long_services = [
-            self.create_service(
-                kind, name, callback, qos_profile=SERVICE_QOS, callback_group=MutuallyExclusiveCallbackGroup()
-            )
+            self._offer(kind, name, callback, MutuallyExclusiveCallbackGroup())
             for kind, name, callback in (
                 (PredictPushBatch, "predict_push_batch", self._prediction(batch)),
                 (RolloutPushes, "rollout_pushes", self._prediction(rollout)),
@@ -228,14 +227,14 @@ class PredictServer(LifecycleNode):
             )
         ]
         self._short_services = [
-            self.create_service(kind, name, callback, qos_profile=SERVICE_QOS)
-            for kind, name, callback in (
-                (PredictSliderPose, "predict_slider_pose", self._prediction(pose)),
-                (ListModels, "list_models", self._on_list),
-            )
+            self._offer(PredictSliderPose, "predict_slider_pose", self._prediction(pose)),
+            self._offer(ListModels, "list_models", self._on_list),
         ]
         self._loaded: Callable[[], None] = lambda: None
         self._use_loaded = self.create_guard_condition(lambda: self._loaded())
+
+    def _offer(self, kind: Any, name: str, callback: Any, group: CallbackGroup | None = None) -> Service:
+        return self.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 
     def _load(self, registry: ModelRegistry, request: Any, response: Any) -> None:
         """Load a model and take it into use. Raises PushPredictorError."""

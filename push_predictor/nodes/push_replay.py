@@ -33,8 +33,8 @@ from push_predictor.errors import RecordingError, RequestError, RigError
 from push_predictor.nodes.parameter_tables import PUSH_REPLAY
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
-from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.topics import ReplayTopics, check_filter, is_played, listed
+from push_predictor.nodes.replay_controls import ReplayControls
+from push_predictor.nodes.replay_topics import ReplayTopics, check_filter, is_played, listed
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.messages import RawMessage

@@ -26,8 +26,7 @@ from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
-from push_predictor.nodes.validator.publishers import ResultPublishers
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.results import ResultPublishers, ResultWriter
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.status import StatusPublisher

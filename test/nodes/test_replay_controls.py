@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from push_predictor.nodes.replay.controls import ReplayControls
+from push_predictor.nodes.replay_controls import ReplayControls
 from push_predictor_interfaces import srv
 
 NAMES = {

@@ -15,7 +15,7 @@ from replay_bags import push_messages, write_bag
 
 from push_predictor.nodes import runtime
 from push_predictor.nodes.push_replay import PushReplay
-from push_predictor.nodes.replay.topics import is_played
+from push_predictor.nodes.replay_topics import is_played
 
 
 @pytest.fixture(scope="module")

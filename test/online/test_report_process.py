@@ -38,7 +38,7 @@ def test_report_has_the_alarm_of_the_live_validation(tmp_path: Path, monkeypatch
 @pytest.mark.ros
 @pytest.mark.parametrize(("alarm", "expected"), [(SimpleNamespace(json=FIRED), FIRED), (None, None)])
 def test_validator_passes_its_alarm_to_the_report(tmp_path: Path, alarm: Any, expected: object) -> None:
-    from push_predictor.nodes.validator.result_writer import ResultWriter
+    from push_predictor.nodes.validator.results import ResultWriter
 
     started: list[object] = []
     live = SimpleNamespace(names=[], windows=[1], predicted=lambda: [1], reported=lambda: ("reported",))

@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 from push_predictor.nodes.polling import NoExecutor, not_called, take_request
 from push_predictor.nodes.rig_source import RigSource
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.results import ResultWriter
 from push_predictor.nodes.validator.server_client import ModelSource
 from push_predictor.online.session import Session, State
 

@@ -55,6 +55,8 @@ class SensorSubscriber:
         }
         self._streams["wrench"] = TopicStream(node, decoder.wrench.messages)
         self._scalars = ScalarTopics(node, decoder.scalars)
+        sensors = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
+        self._subscribed = (self._scalars, *sensors, *self._tf.values())
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
         self._empty = monotonic()  # when nothing waited last
@@ -102,22 +104,15 @@ class SensorSubscriber:
             return
         self._looked = monotonic()
         with self._draining:
-            self._scalars.move()
-            self._scalars.look()
-            for stream in self._subscribed():
-                stream.move()
-                stream.look()
+            for subscribed in self._subscribed:
+                subscribed.move()
+                subscribed.look()
 
     def drain(self) -> None:
         """Move arrived messages from the middleware into the decoder."""
         with self._draining:  # one at a time, so that messages stay in order
-            self._scalars.move()
-            for stream in self._subscribed():
-                stream.move()
-
-    def _subscribed(self) -> list[TopicStream | TransformTopics]:
-        streams = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
-        return [*streams, *self._tf.values()]
+            for subscribed in self._subscribed:
+                subscribed.move()
 
     def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -48,7 +49,8 @@ class ValidationRun:
     models: by the name to request, the main one first. publish: called for every prediction, with rig and number of
     the model. world: returns the frame in which the poses are. alarm: of the main model. output: folder in which
     windows and residuals are saved as they arrive; None: they are not saved. scalars: the topics that may be published
-    in addition to the sensors. strict: a warning about the samples is an error.
+    in addition to the sensors. strict: a warning about the samples is an error. finder: has met the faults of the
+    streams.
     """
 
     def __init__(
@@ -74,38 +76,28 @@ class ValidationRun:
         self.refused = 0
         self.last_refusal = ""
         self._pushes = CompletedPushes()
-        self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
+        self.finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
         self._publish, self._world = publish, world
         self._first: dict[str, float] = {}  # value of each scalar, by the name of its covariate
         if alarm is not None:
             alarm.begin()
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Faults of the streams that the window finder has met, by kind."""
-        return self._finder.counts
-
-    @property
-    def stamp_jitter(self) -> dict[str, float]:
-        """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
-        return self._finder.stamp_jitter
-
     def feed(self, samples: Samples) -> None:
         """Take a portion of the streams."""
         self._add_scalars(samples.scalars)
-        self._finder.add_wrench(samples.wrench)
-        self._finder.add_pusher(samples.pusher)
-        self._finder.add_slider(samples.slider)
+        self.finder.add_wrench(samples.wrench)
+        self.finder.add_pusher(samples.pusher)
+        self.finder.add_slider(samples.slider)
         self.sync.note(samples)
         self.checks.add(samples)
         if self.sync.in_step():
-            self._request(self._finder.take_ready())
+            self._request(self.finder.take_ready())
 
     def finish(self, scalars: Mapping[str, ScalarStream] = MappingProxyType({})) -> None:
         """Take the last scalars and find the last windows: no more samples will arrive."""
         self._add_scalars(scalars)
-        self._request(self._finder.finish())
+        self._request(self.finder.finish())
         if len(self.validation.windows):
             self.coverage = pushed_part(windows_to_table(self.validation.windows), self.rig)
 
@@ -128,7 +120,7 @@ class ValidationRun:
 
     def _add_scalars(self, scalars: Mapping[str, ScalarStream]) -> None:
         for name, stream in scalars.items():
-            self._finder.add_scalar(name, stream)
+            self.finder.add_scalar(name, stream)
             if len(stream):
                 self._first.setdefault(f"topic:{name}", float(stream.value[0]))
 
@@ -141,15 +133,12 @@ class ValidationRun:
             push = np.array([window.velocity, window.contact, window.angle])
             for model, name in enumerate(self.validation.names):
                 request = query_to_request(name, push, window.duration, self._known(model, window))
-                self._client.ask(request, self._on_response(model, number))
+                self._client.ask(request, partial(self._take, model, number))
 
     def _known(self, model: int, window: PushWindow) -> dict[str, float]:
         """The finite covariates of a window, with those that only grow counted as the model counts them."""
         columns = self.validation.models[model].continued(windows_to_table([window])).covariates
         return {name: float(column[0]) for name, column in columns.items() if isfinite(column[0])}
-
-    def _on_response(self, model: int, number: int) -> Callable[[PredictPush.Response], None]:
-        return lambda response: self._take(model, number, response)
 
     def _take(self, model: int, number: int, response: PredictPush.Response) -> None:
         window, name = self.validation.windows[number], self.validation.names[model]
