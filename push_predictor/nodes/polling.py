@@ -132,14 +132,13 @@ class FollowingSubscription:
         self.offered = self._node.get_publishers_info_by_topic(self._topic)
         if (alone := len(self.offered) <= 1) != self._alone:
             self._alone, self._last, self._since = alone, None, time_ns()
-        unfit = {kind: self._unfit(kind) for kind in self.kinds}
+        kinds = self.kinds or ([self._first] if self._first and not self.kind else [])
+        unfit = {kind: self._unfit(kind) for kind in kinds}
         fitting = [kind for kind, why in unfit.items() if not why]
         if len(fitting) == 1:
             self.problem = self._follow(fitting[0], [each for each in self.offered if each.topic_type == fitting[0]])
-        elif self.offered:
-            self.problem = next(filter(None, unfit.values()), ONE_TYPE)
         else:
-            self.problem = self._follow(self._first, []) if self._first and not self.kind else ""
+            self.problem = next(filter(None, unfit.values()), ONE_TYPE if unfit else "")
 
     def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> str:
         """Subscribe to a type as these publishers offer it, reliable without any; returns why it is not possible."""

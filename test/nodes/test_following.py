@@ -124,7 +124,7 @@ def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hi
     node: Any = SimpleNamespace(
         resolve_topic_name=str, create_subscription=create, get_publishers_info_by_topic=lambda _: []
     )
-    subscription = FollowingSubscription(node, "/slider/pose", str, first="geometry_msgs/msg/PoseStamped")
+    subscription = FollowingSubscription(node, "/slider/pose", lambda kind: "", first="geometry_msgs/msg/PoseStamped")
     subscription.look()
     with pytest.raises(RuntimeError, match="a bug"):
         subscription.look()

@@ -14,9 +14,9 @@ from types import MappingProxyType
 import numpy as np
 from rclpy.serialization import serialize_message
 
-from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
 from msg_adapters.residuals import residual_to_message
+from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import with_alarm
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.prediction import Prediction
@@ -146,7 +146,7 @@ class ValidationRun:
             prediction = _finite(prediction_from_response(response))
             mean, covariance, in_domain = prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
             residual = residual_to_message(name, window, mean, covariance, in_domain, self._world())
-        except (RefusedError, MessageError) as error:
+        except (RefusedError, RequestError) as error:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
             self.validation.refuse(model, number, str(error))
@@ -180,8 +180,8 @@ def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> 
 
 
 def _finite(prediction: Prediction) -> Prediction:
-    """The prediction. Raises MessageError for a number that is not finite."""
+    """The prediction. Raises RequestError for a number that is not finite."""
     for name, values in (("mean", prediction.mean), ("covariance", prediction.covariance)):
         if not np.all(np.isfinite(values)):
-            raise MessageError(f"response {name}", values.ravel().tolist(), "finite numbers")
+            raise RequestError(f"response {name}", values.ravel().tolist(), "finite numbers")
     return prediction
