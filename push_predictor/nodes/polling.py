@@ -10,7 +10,6 @@ from time import monotonic, time_ns
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -21,6 +20,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.parameters import given_value
 from push_predictor.nodes.qos import DEPTH, common_profile, message_class
+from push_predictor.nodes.runtime import of_rcl
 
 ONE_TYPE = "One type of publishers is accepted."
 
@@ -164,7 +164,9 @@ class FollowingSubscription:
                 qos_overriding_options=self._overriding,
                 raw=True,
             )
-        except rclpy_implementation.RCLError:
+        except RuntimeError as error:
+            if not of_rcl(error):
+                raise
             return ""  # another stream still has one of another type. Try again at the next look
         self._profile = wanted
         return ""

@@ -177,7 +177,7 @@ class PushReplay(Node):
                 break
             if timeout and time.perf_counter_ns() - begin > timeout:
                 break
-            time.sleep(0.002)
+            self._ending.wait(0.01)
         self._acknowledged = self._topics.acknowledged()
 
     def _announce(self, state: str) -> None:

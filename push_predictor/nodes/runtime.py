@@ -31,7 +31,7 @@ from push_predictor.online.child_process import kill_children
 TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
 LONGEST = 3.0  # s in which a callback of an executor with one thread may: less than a launch waits for
-_GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
+_NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException)
 MakeNode: TypeAlias = Callable[["Stop"], Any]
 
 
@@ -157,16 +157,20 @@ class Life:
         if error is None:
             return 0
         refused = isinstance(error, PushPredictorError)
-        if not refused and not (self._executor is None and _of_the_graph(error)):
+        of_the_graph = of_rcl(error) or isinstance(error, _NAME_ERRORS)
+        if not refused and not (self._executor is None and of_the_graph):
             raise error
         hint = "" if refused else security_hint()
         print(f"{self._name}: {one_line(error)}{hint}", file=sys.stderr)
         return 1
 
 
-def _of_the_graph(error: BaseException) -> bool:
-    """Whether rclpy or rcl refuses to start a node; any other RuntimeError is a bug, which needs its traceback."""
-    return isinstance(error, _GRAPH_ERRORS) and type(error).__module__.partition(".")[0] == rclpy.__name__
+def of_rcl(error: BaseException) -> bool:
+    """Whether rcl or the middleware refuses something; rclpy does not export the RuntimeError for it.
+
+    Any other RuntimeError is a bug, which needs its traceback.
+    """
+    return isinstance(error, RuntimeError) and type(error).__module__.partition(".")[0] == rclpy.__name__
 
 
 def _parse(name: str, args: Sequence[str] | None) -> None:
