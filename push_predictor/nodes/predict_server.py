@@ -297,7 +297,9 @@ class PredictServer(LifecycleNode):
         """The callback of a service that predicts while the node is active, and is counted."""
 
         def active(registry: ModelRegistry, request: Any, response: Any) -> None:
-            (handler if self._state == "active" else self._refuse_inactive)(registry, request, response)
+            if self._state != "active":
+                raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
+            handler(registry, request, response)
 
         answer = self._guarded(active)
 
@@ -322,9 +324,6 @@ class PredictServer(LifecycleNode):
             raise InactiveError("the node ends")
         if self._state not in accepted:
             raise InactiveError(f"the node is {self._state}")
-
-    def _refuse_inactive(self, registry: ModelRegistry, request: Any, response: Any) -> None:
-        raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
 
     def _guarded(self, handler: Handler) -> Callable[[Any, Any], Any]:
         """The callback of a service; every exception becomes a refusal."""

@@ -84,7 +84,9 @@ class PushReplay(Node):
         self._streams = self._stream_topics()
         self._player = self._make_player()
         self._check(bag)
-        self._start_reporting()
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
+        self.create_timer(1.0, self._report_regularly, clock=steady)
         ReplayControls(self, self._player)
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
@@ -227,11 +229,6 @@ class PushReplay(Node):
             work()
         except BaseException as error:  # a dead thread must not look like a recording without messages
             self._stop.fail(error)
-
-    def _start_reporting(self) -> None:
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
-        self.create_timer(1.0, self._report_regularly, clock=steady)
 
     def _report(self) -> ReplayReport:
         return ReplayReport(

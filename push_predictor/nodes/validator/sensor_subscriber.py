@@ -24,7 +24,6 @@ from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.transforms import WORLD
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
 
@@ -56,6 +55,7 @@ class SensorSubscriber:
         self._streams["wrench"] = TopicStream(node, decoder.wrench.messages)
         self._scalars = ScalarTopics(node, decoder.scalars)
         sensors = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
+        self._subscribed: tuple[ScalarTopics | TopicStream | TransformTopics, ...]
         self._subscribed = (self._scalars, *sensors, *self._tf.values())
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
@@ -93,11 +93,6 @@ class SensorSubscriber:
         """The frame in which the poses are."""
         return self.decoder.world or WORLD
 
-    @property
-    def scalar_names(self) -> list[str]:
-        """The requested scalar topics, published or not, by their names in a recording."""
-        return list(self.decoder.scalars)
-
     def look(self) -> None:
         """Subscribe as the present publishers offer their topics; call often, in the executor's thread."""
         if monotonic() - self._looked < LOOK:
@@ -120,10 +115,6 @@ class SensorSubscriber:
                 self.drain()
             except Exception as error:  # without this thread the queues would overflow
                 self._error(f"messages could not be taken: {error!r}", throttle_duration_sec=10.0)
-
-    def begin(self, rig: Rig) -> None:
-        """Begin a run: the samples that are taken from now on are of this rig."""
-        self.decoder.begin(rig)
 
     @property
     def waits_for_bias(self) -> bool:

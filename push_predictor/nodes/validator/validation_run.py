@@ -101,10 +101,6 @@ class ValidationRun:
         if len(self.validation.windows):
             self.coverage = pushed_part(windows_to_table(self.validation.windows), self.rig)
 
-    def no_more_answers(self) -> None:
-        """Hand the last pushes to the alarm, without the windows that were not answered."""
-        self._pass_to_alarm(last=True)
-
     def write(self, folder: Path) -> list[Path]:
         """Write the JSON, the main model's with the alarm, and the residuals. Raises OSError or RecordingError."""
         written = [*self.validation.write(folder), write_residuals(self.validation, folder, self._world())]
@@ -113,7 +109,8 @@ class ValidationRun:
             write_whole(path, with_alarm(path.read_text(), self.alarm.json).encode())
         return written
 
-    def _pass_to_alarm(self, last: bool = False) -> None:
+    def pass_to_alarm(self, last: bool = False) -> None:
+        """Hand the complete pushes to the alarm; last: also those with windows that will not be answered."""
         for push in self._pushes.take(last):
             if self.alarm is not None:
                 self.alarm.add(push)
@@ -161,7 +158,7 @@ class ValidationRun:
     def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
         if model == 0:
             self._pushes.answered(number, window, prediction)
-            self._pass_to_alarm()
+            self.pass_to_alarm()
 
 
 def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> Path:
