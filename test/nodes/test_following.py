@@ -112,6 +112,19 @@ def test_no_message_is_lost_when_another_publisher_comes_between_two_looks(topic
     assert topic.lost() == 0
 
 
+def test_a_topic_was_heard_with_its_last_message_or_publisher(topic: Topic, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [10.0]
+    monkeypatch.setattr(polling, "monotonic", lambda: now[0])
+    topic.look(0)
+    now[0] = 20.0
+    topic.look(1)
+    now[0] = 30.0
+    topic.look(1)
+    assert topic.subscription.heard == 20.0, "when its publisher came"
+    topic.send(1)
+    assert topic.lost() == 0 and topic.subscription.heard == 30.0
+
+
 def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hidden() -> None:
     """As while another stream of the node still has a subscription of another type."""
     outcomes: list[Any] = [rclpy_implementation.RCLError("incompatible type"), RuntimeError("a bug"), SimpleNamespace()]
