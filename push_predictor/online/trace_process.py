@@ -17,11 +17,8 @@ from typing import TYPE_CHECKING
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
-from push_predictor.online.window_table import TABLE
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.bag.metadata import METADATA_FILE
 from push_predictor.recordings.rig import HOW_TO_GIVE
-from push_predictor.recordings.table_file import ENDINGS, rig_path
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -85,6 +82,9 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
     A validator's table comes first, then the folder itself as a recording, then all push tables and recordings in it.
     """
+    from push_predictor.online.window_table import TABLE
+    from push_predictor.recordings.table_file import ENDINGS
+
     if (folder / TABLE).is_file():
         return (folder / TABLE,)
     if folder.is_file() or _is_bag(folder):
@@ -94,6 +94,8 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
 
 def _is_bag(path: Path) -> bool:
+    from push_predictor.recordings.bag.metadata import METADATA_FILE
+
     return (path / METADATA_FILE).is_file() and path.name not in NOT_TRACED
 
 
@@ -142,6 +144,9 @@ def _report(path: Path, trace: Trace) -> Sequence[str]:
 
 def _settled(path: Path, folder: Path) -> Path:
     """A copy of a table that a validator may be appending to, without an incomplete last line; else the path itself."""
+    from push_predictor.online.window_table import TABLE
+    from push_predictor.recordings.table_file import rig_path
+
     if path.name != TABLE:
         return path
     copy = folder / COPIES / TABLE

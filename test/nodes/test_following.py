@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which messages a subscription that follows its publishers counts as lost."""
+"""A subscription that follows its publishers: which messages it counts as lost, and which types it refuses."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ import pytest
 pytest.importorskip("rclpy")
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.nodes import polling
 from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.nodes.validator import live_streams
+from push_predictor.nodes.validator.live_streams import TransformTopics
+from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 
 
 class Topic:
@@ -144,3 +148,15 @@ def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hi
     subscription.look()
     subscription.look()
     assert not outcomes, "once it exists, it is kept"
+
+
+def test_tf_without_its_message_package_is_refused_with_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_installed(kind: str) -> type:
+        raise PushPredictorError(f"type {kind} is not installed (No module named 'tf2_msgs')")
+
+    monkeypatch.setattr(live_streams, "message_class", not_installed)
+    monkeypatch.setattr(polling, "_overriding", lambda *_: None)
+    node: Any = SimpleNamespace(resolve_topic_name=str, get_publishers_info_by_topic=lambda _: [])
+    topics = TransformTopics(node, "/tf", TransformBuffer([]))
+    topics.look()
+    assert topics.problem == topics.refusal and "install ros-jazzy-tf2-msgs" in topics.problem
