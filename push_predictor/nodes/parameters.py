@@ -46,10 +46,9 @@ class Param:
     def allows(self, value: Any) -> bool:
         """Whether a value has the default's type (or is an integer for a float) and is within the limits."""
         if isinstance(self.default, list):
-            return isinstance(value, (list, tuple)) and all(isinstance(text, str) for text in value)
+            return _is_texts(value)
         if isinstance(self.default, float):
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            return number and math.isfinite(value) and self._within(value)
+            return _is_number(value) and math.isfinite(value) and self._within(value)
         if type(value) is not type(self.default):
             return False
         if isinstance(self.default, str):
@@ -120,3 +119,11 @@ def _checked(table: Mapping[str, Param], changed: Sequence[Parameter]) -> SetPar
             reason = f"{parameter.name}: {parameter.value!r} is not accepted, give {row.accepted}"
             return SetParametersResult(successful=False, reason=reason)
     return SetParametersResult(successful=True)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(isinstance(text, str) for text in value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
