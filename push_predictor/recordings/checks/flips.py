@@ -16,7 +16,7 @@ from push_predictor.recordings.windows.flips import HeadingFlips, flip_steps
 from push_predictor.types import Array, IntArray
 
 FEWEST = 3
-LARGE = np.radians(50.0)  # below the smallest fixed angle
+LARGE = np.radians(42.0)  # below the smallest fixed angle
 FIXED_SHARE = 0.7  # of the large steps; of random ones, as of headings in degrees, a quarter are near a fixed angle
 COMMON = 0.1  # share of the flips by an angle that is listed
 ADVICE = "The windows undo them. Place the markers so that no turn of the body maps them onto each other."

@@ -25,6 +25,7 @@ FROZEN = 0.2  # rad; w read as x leaves a heading of about twice the true tilt
 COVERED = 95.0  # percentile: few samples may be tracked wrongly
 TRAVEL = 0.02  # m of a slider that also turns
 OUTRUN = 5.0  # path lengths of the tip; a slider does not move farther in a window, nor turn by more path lengths
+SPEED_SPAN = 0.1  # s between the poses whose speed is judged
 TURN_SPAN = 0.05  # s between the poses whose turns are summed
 PUSHER_MM = "Give positions in metres: divide by 1000."
 
@@ -126,8 +127,12 @@ def _rate(name: str, stream: PoseStream) -> Finding | None:
 
 
 def _speed(name: str, stream: PoseStream) -> Finding | None:
-    """Of the steps that contain half of the path: a few tracking errors, or long rests, do not matter."""
-    step, time = np.hypot(np.diff(stream.x), np.diff(stream.y)), 1e-9 * np.diff(stream.stamp)
+    """Of the steps that contain half of the path: a few tracking errors, or long rests, do not matter.
+
+    Steps of SPEED_SPAN: between two samples, stamps of receipt and poses of a slower source show no speed.
+    """
+    rows = _every(stream, SPEED_SPAN)
+    step, time = np.hypot(np.diff(stream.x[rows]), np.diff(stream.y[rows])), 1e-9 * np.diff(stream.stamp[rows])
     known = np.isfinite(step) & (time > 0.0)
     if not known.any():
         return None
@@ -140,17 +145,21 @@ def _speed(name: str, stream: PoseStream) -> Finding | None:
 
 def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
     """A pushed slider turns about as far as it moves, in terms of its size."""
-    usable = np.isfinite(slider.x + slider.y + slider.heading)
-    period = 1e-9 * float(np.median(np.diff(slider.stamp))) if len(slider) > 1 else TURN_SPAN
-    pose = np.column_stack([slider.x, slider.y, slider.heading])[usable][
-        :: max(1, round(TURN_SPAN / max(period, 1e-6)))
-    ]
+    pose = np.column_stack([slider.x, slider.y, slider.heading])[_every(slider, TURN_SPAN)]
+    pose = pose[np.isfinite(pose).all(axis=1)]
     step = np.diff(pose, axis=0)
     turn, path = float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
     if turn * rig.outline.reach <= OUTRUN * max(path, TRAVEL):
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
     return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})
+
+
+def _every(stream: PoseStream, span: float) -> slice:
+    """Samples about `span` s apart."""
+    step = np.diff(stream.stamp)
+    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
+    return slice(None, None, max(1, round(span / max(period, 1e-6))))
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
