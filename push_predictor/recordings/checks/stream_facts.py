@@ -91,7 +91,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
         held=held.stale,
         holds=tuple(held.dropouts),
     )
-    return facts, stream if not (held.stale or facts.coarse) else _with(stream, smoothed)
+    return facts, _with(stream, smoothed) if held.stale or facts.coarse else stream
 
 
 def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
