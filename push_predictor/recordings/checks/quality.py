@@ -17,7 +17,8 @@ from push_predictor.recordings.windows.push_window import WindowOptions
 
 WINDOW = WindowOptions().duration  # s
 TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
-ENOUGH = 5.5  # samples in a window, from which nothing is lost
+FEWEST_SAMPLES = 3  # in a window: with two, one push in thirty loses a window
+ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
 SPEED_NOISE, TOO_NOISY = 0.003, 0.01  # m/s of the tip: twice the least speed; a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
 FEWEST_HOLDS = 2
@@ -78,12 +79,12 @@ def _rate(name: str, facts: StreamFacts) -> Finding | None:
     count = WINDOW / facts.source_period
     if count > ENOUGH:
         return None
-    rate, least = 1.0 / facts.source_period, FIT_SAMPLES / WINDOW
+    rate, least = 1.0 / facts.source_period, FEWEST_SAMPLES / WINDOW
     sentence = f"The {name} has {rate:.3g} poses a second: {count:.1f} in a window of {WINDOW:g} s"
     values = {"rate": Value(rate, "Hz")}
     advice = f"At least {least:.0f} Hz are needed; 100 Hz are usual."
-    if count < FIT_SAMPLES - 0.5:
-        sentence += f", fewer than the {FIT_SAMPLES} that a speed and the begin and end of a push need."
+    if count < FEWEST_SAMPLES - 0.5:
+        sentence += f", fewer than the {FEWEST_SAMPLES} that a speed and the begin and end of a push need."
         return Finding(f"rate_{name}", "refused", sentence, advice, values)
     sentence += f". Begin and end of a push are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
     return Finding(f"rate_{name}", "warning", sentence, advice, values)
