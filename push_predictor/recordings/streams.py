@@ -105,7 +105,7 @@ class Recording:
 
     name: stem of its file or folder. wrench: None without a force sensor. scalars: by topic name, the possible
     covariates. notes: sentences about what the reader discarded, repaired or assumed. wrench_bias: what was subtracted
-    from the wrench, None if nothing was.
+    from the wrench, None if nothing was. losses: the notes about data that are missing or cannot be read.
     """
 
     name: str
@@ -116,6 +116,7 @@ class Recording:
     scalars: dict[str, ScalarStream] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     wrench_bias: WrenchBias | None = None
+    losses: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         seconds = 1e-9 * float(self.slider.stamp[-1] - self.slider.stamp[0]) if len(self.slider) else 0.0

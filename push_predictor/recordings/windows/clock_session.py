@@ -9,7 +9,7 @@ from collections import Counter
 
 import numpy as np
 
-from push_predictor.recordings.dropouts import CLOCK_SET
+from push_predictor.recordings.dropouts import CLOCK_SET, NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
@@ -73,6 +73,12 @@ class ClockSession:
     def contact(self) -> tuple[int, int]:
         """Number of slider samples in contact, and of all that were evaluated."""
         return self._segmenter.touching, self._segmenter.samples
+
+    @property
+    def force_touches(self) -> list[tuple[float, float]]:
+        """Stamp (s) of each touch that the geometry showed, and the delay of the force there; see ForceTiming."""
+        origin = (self._origin or 0) * NANOSECOND
+        return [(origin + time, delay) for time, delay in self._segmenter.timing.touches]
 
     @property
     def newest(self) -> int:
