@@ -22,8 +22,10 @@ from push_predictor.recordings.checks.orientation import orientation_finding
 from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
     LAG_ALLOWANCE,
+    TIP_POSE,
     frames_apart,
     outline_findings,
+    tip_offset,
     unchecked,
 )
 from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
@@ -133,11 +135,13 @@ def _findings_of_large_gap(
     if mirrors[best] < explained:
         return [_mirrored(best, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
-    if another and frames_apart(contacts, rig, fit) is None:
+    if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
-    explained_otherwise = another or {"frames_apart", "outline_shape"} & {finding.name for finding in found}
+    explained_otherwise = another or {"frames_apart", "tip_offset", "outline_shape"} & {
+        finding.name for finding in found
+    }
     return found if explained_otherwise else [*found, _unexplained(fit.gap)]
 
 
@@ -155,7 +159,9 @@ def contacts_of(motion: Motion | None) -> Contacts | None:
     if vague and steady >= FEWEST_CONTACTS:
         touch = motion.steady
     tips = to_body(motion.tip, motion.slider)[touch]
-    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch], motion.noise)
+    tool = None if motion.tool is None else motion.tool[touch]
+    velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]
+    return Contacts(tips, velocities, push, poses, motion.noise, tool=tool)
 
 
 def _too_brief(motion: Motion, rig: Rig) -> int | None:
@@ -252,8 +258,35 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
     if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
         return [_swapped(np.inf)]
+    if motion is not None and (height := _pushing_height(recording, motion)) is not None:
+        lowered = replace(recording.pusher, z=recording.pusher.z - height)
+        altered = replace(recording, pusher=lowered)
+        found = geometry_findings(altered, rig, motion_of(altered, rig))
+        if all(finding.severity != "refused" for finding in found):
+            return [_tip_height(height), *found]
     sentence = "The slider never moves while the lowered tip moves: no push was recorded."
     return [Finding("no_contact", "refused", sentence, TOPICS)]
+
+
+def _pushing_height(recording: Recording, motion: Motion) -> float | None:
+    """The height (m) of the tracked point above the slider's frame while both move, None if it is that of a tip."""
+    pushing = motion.moving & (motion.tip_speed > WindowOptions().least_speed)
+    if np.sum(pushing) < FEWEST_CONTACTS:
+        return None
+    above = float(np.nanmin(recording.pusher.z) - np.nanmedian(recording.slider.z))
+    height = above + float(np.median(motion.tip_height[pushing]))
+    return height if height > WindowOptions().lift else None
+
+
+def _tip_height(height: float) -> Finding:
+    lift = WindowOptions().lift
+    sentence = (
+        f"In pushes, the tracked point of the pusher is {1e3 * height:.0f} mm above the slider's frame, where a tip is "
+        f"lifted (over {1e3 * lift:.0f} mm). It is probably about that far from the tip, along the tool, such as the "
+        "flange; or the heights (z) of the two frames differ."
+    )
+    advice = f"{TIP_POSE[0].upper()}{TIP_POSE[1:]} Or correct z in one of the frames."
+    return Finding("tip_height", "refused", sentence, advice, {"height": Value(height, "m")})
 
 
 def _swapped(gap: float) -> Finding:

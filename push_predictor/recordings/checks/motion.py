@@ -44,7 +44,7 @@ class Motion:
     unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip; steady (n,): in
     contact and neither begins nor ends to move, so that the tip is at the outline. push (n,): number of the contact.
     noise: standard deviation (m) of the outline's place in one sample, by the tracker's noise. span: s around a
-    sample, on both sides, that determine the slider's speed.
+    sample, on both sides, that determine the slider's speed. tool (n,): heading of the tip's frame, rad, unwrapped.
     """
 
     time: Array
@@ -60,6 +60,7 @@ class Motion:
     push: IntArray
     noise: float = 0.0
     span: float = SPANS[0]
+    tool: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     time = time[order]
     pose = np.column_stack([slider.x, slider.y, np.unwrap(slider.heading)])[order]
     tip = values_at(time, tip_time[tip_order], np.column_stack([pusher.x, pusher.y, pusher.z])[tip_order])
+    tool = np.interp(time, tip_time[tip_order], np.unwrap(pusher.heading[tip_order]))
     tip_velocity, options = _velocity(time, tip[:, :2], SPANS[0]), WindowOptions()
     tip_speed = np.hypot(*tip_velocity.T)
     lowered = tip[:, 2] - slider.z[order] < options.lift
@@ -126,9 +128,9 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    return Motion(
-        time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, moving, contact, steady, number, noise
-    )
+    kinds = {"moving": moving, "contact": contact, "steady": steady, "push": number}
+    measured = {"noise": noise, "span": slider_speed.span, "tool": tool}
+    return Motion(time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, **kinds, **measured)
 
 
 def body_velocity(motion: Motion) -> Array:
