@@ -174,10 +174,27 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     assert first.displacement[0] > 0.9 * 0.004
 
 
+AT_REST = ContactSample(
+    stamp=0,
+    time=0.0,
+    place=(0.0, 0.0),
+    gap=0.0,
+    height=0.0,
+    closing_speed=0.0,
+    opening_speed=0.0,
+    force=(0.0, 0.0),
+    speed=0.0,
+    at_speed=False,
+    in_break=False,
+    after_break=False,
+    repositioned=False,
+)
+
+
 @pytest.mark.parametrize("gap", [0.0005, 0.1])  # at rest in contact, moving freely
 def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> None:
     segmenter = PushSegmenter(WindowOptions())
-    rest = ContactSample(0, 0.0, gap, 0.0, 0.0, (0.0, 0.0), 0.0, False, False, False, False)
+    rest = AT_REST._replace(gap=gap)
     for k, force in enumerate([*np.full(20, 1.0), *np.linspace(1.0, 2.0, TARE_SAMPLES)]):
         segmenter.step(rest._replace(stamp=4_000_000 * k, time=0.004 * k, force=(force, 0.0)))
     pushing = rest._replace(gap=0.0005, force=(5.0, 0.0), speed=0.02, at_speed=True)
@@ -188,7 +205,7 @@ def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> No
 
 def test_a_window_may_end_with_the_last_sample_of_a_push() -> None:
     segmenter, period, found = PushSegmenter(WindowOptions(duration=0.2)), 10_000_000, []
-    free = ContactSample(0, 0.0, 0.1, 0.0, 0.0, (0.0, 0.0), 0.0, False, False, False, False)
+    free = AT_REST._replace(gap=0.1)
     for k in range(26):  # five in free motion, then a window of 20 periods from the sixth to the last
         sample = free if k < 5 else free._replace(gap=0.0, force=(5.0, 0.0), speed=0.02, at_speed=True)
         found += segmenter.step(sample._replace(stamp=k * period, time=1e-9 * k * period))

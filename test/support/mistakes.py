@@ -178,7 +178,7 @@ MISTAKES: Mapping[str, tuple[Mistake, str, str]] = {
     "wrench along other axes": (lambda r: force_turned(r, np.pi / 2.0), "wrench_frame", "warning"),
     "no wrench": (lambda r: force_scaled(r, 0.0), "wrench_absent", "warning"),
     "wrench in mN": (lambda r: force_scaled(r, 1e3), "wrench_units", "warning"),
-    "constant wrench": (lambda r: force_constant(r, 1.0), "wrench_unrelated", "warning"),
+    "constant wrench": (lambda r: force_constant(r, 1.0), "wrench_constant", "warning"),
     "wrench of another time": (force_of_another_time, "wrench_unrelated", "warning"),
     "wrench of random direction": (force_of_random_direction, "wrench_unrelated", "warning"),
 }

@@ -15,6 +15,7 @@ from push_predictor.recordings.dropouts import longest_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.contact import LONGEST_BREAK
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
@@ -233,10 +234,20 @@ def _speed_noise(values: Array, span: float) -> float:
 
 
 def _force(recording: Recording, origin: int, time: Array) -> Array:
+    """The force (n, 2) at times (n,) s, NaN where its samples are missing for longer than LONGEST_BREAK."""
     wrench = recording.wrench
     if wrench is None or len(wrench) < FEWEST:
         return np.full((len(time), 2), np.nan)
-    return values_at(time, _seconds(wrench.stamp, origin), np.column_stack([wrench.fx, wrench.fy]))
+    stamp, rows = np.unique(wrench.stamp, return_index=True)
+    known = _seconds(stamp, origin)
+    force = values_at(time, known, np.column_stack([wrench.fx, wrench.fy])[rows])
+    around = np.concatenate([[-np.inf], known, [np.inf]])
+    after = np.searchsorted(around, time)
+    missing = around[after] - around[after - 1] > LONGEST_BREAK
+    near = np.minimum(np.abs(time - known[0]), np.abs(time - known[-1])) < longest_interval(
+        float(np.median(np.diff(known)))
+    )
+    return np.asarray(np.where((missing & ~near)[:, None], np.nan, force))
 
 
 def _contact_time(motion: Motion) -> float:

@@ -22,12 +22,21 @@ LONGEST = 30.0  # s of a table's row
 PUSHER_MM = "Give positions in metres: divide by 1000."
 
 
+def stream_rates(recording: Recording) -> list[Finding]:
+    """Findings about the unit of the stamps."""
+    streams = (("slider", recording.slider), ("pusher", recording.pusher))
+    found = [_rate(name, stream) for name, stream in streams if len(stream) > 2]
+    return [finding for finding in found if finding is not None]
+
+
 def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
-    """Findings about the units of a recording's streams and rig."""
+    """Findings about the units of lengths and angles of a recording's streams and rig."""
     found = [_rig_length(rig)]
-    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        if len(stream) > 2:
-            found += [_rate(name, stream) or _speed(name, stream)]
+    found += [
+        _speed(name, stream)
+        for name, stream in (("slider", recording.slider), ("pusher", recording.pusher))
+        if len(stream) > 2
+    ]
     if not any(found) and tilt_of(recording.slider) <= STEEP:  # of a steep z axis, headings may be anything
         found.append(_turning(recording.slider, rig))
     return [finding for finding in found if finding is not None]
@@ -68,7 +77,10 @@ def _rig_length(rig: Rig) -> Finding | None:
 
 
 def _rate(name: str, stream: PoseStream) -> Finding | None:
-    rate = 1.0 / max(1e-9 * float(np.median(np.diff(stream.stamp))), 1e-9)
+    step = np.diff(stream.stamp)
+    if not np.any(step > 0):
+        return None
+    rate = 1.0 / (1e-9 * float(np.median(step[step > 0])))  # a sample that was sent twice adds none
     if LOWEST_RATE <= rate <= HIGHEST_RATE:
         return None
     sentence = f"The {name}'s stamps give {rate:.3g} samples a second: the unit of the stamps is probably ms or us."

@@ -21,14 +21,18 @@ FORWARD_SPAN = 0.03  # s after a sample in which the pusher must already move
 FIT_SPAN = 0.020  # s of a window that determine its velocity and angle (docs/explanation/windows.md)
 NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is accelerating
 MISSING_PERIODS = 2.5  # periods between samples of the force from which some are missing
+SLOWEST = 0.05  # s between samples of the force: a slower one shows neither begin nor end of a contact
+LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push, and a force is unknown in one
 SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
 
 
 class ContactSample(NamedTuple):
     """One slider sample. A recording has hundreds of thousands: a tuple takes a third of a dataclass's time.
 
-    stamp ns, time s, gap m between pusher and outline, height m of the tip above the slider. closing_speed: rate at
-    which the gap shrinks after the sample, m/s. force: measured (fx, fy) N, None if unknown. speed: of the pusher, m/s,
+    stamp ns, time s; place (x, y) m of the slider; gap m between pusher and outline, height m of the tip above the
+    slider. closing_speed: rate at
+    which the gap shrinks after the sample, m/s; opening_speed: at which it grew before it, m/s. force: measured
+    (fx, fy) N, None if unknown. speed: of the pusher, m/s,
     the smaller of the means around and after the sample. at_speed: the pusher is not accelerating. in_break: a stream
     has a break here; after_break: one had a break since the previous sample; repositioned: the slider was placed
     elsewhere since the previous sample.
@@ -36,9 +40,11 @@ class ContactSample(NamedTuple):
 
     stamp: int
     time: float
+    place: tuple[float, float]
     gap: float
     height: float
     closing_speed: float
+    opening_speed: float
     force: tuple[float, float] | None
     speed: float
     at_speed: bool
@@ -55,14 +61,26 @@ def contact_samples(
     tips = {span: pusher.at(time + span) for span in (0.0, -NEAR, FIT_SPAN, FORWARD_SPAN, NEAR, REACH)}
     height = tips[0.0][:, 2] - slider.values[first:last, 2]
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
-    after_break, in_break = _breaks([t for t in (slider, pusher, wrench) if t is not None], before, time)
-    gap, closing_speed = _gaps(rig, slider, pusher, first, last)
+    absent = _absent(wrench, time)
+    after_break, in_break = _breaks([slider, pusher], before, time)
+    if wrench is not None:
+        overlap, beyond = wrench.breaks_in(before, time)
+        after_break, in_break = after_break | overlap & ~absent, in_break | beyond & ~absent
+    gap, closing_speed, opening_speed = _gaps(rig, slider, pusher, first, last)
     around, after = (_speed(pusher, time, tips, *span) for span in ((-NEAR, NEAR), (0.0, FORWARD_SPAN)))
-    speed, at_speed, forces = np.minimum(around, after), _at_speed(pusher, time, tips), _forces(wrench, time)
+    # A step of the resolution is no motion.
+    speed = np.maximum(np.minimum(around, after) - pusher.resolution / (2.0 * NEAR), 0.0)
+    at_speed, forces = _at_speed(pusher, time, tips), _forces(wrench, time, absent)
     repositioned = _repositioned(slider, pusher, first, last)
     known = ~np.isnan(forces[:, 0])
     forces_or_none = ((x, y) if there else None for x, y, there in zip(*forces.T.tolist(), known.tolist(), strict=True))
-    columns = [of.tolist() for of in (stamp, time, gap, height, closing_speed)]
+    places = map(tuple, slider.values[first:last, :2].tolist())
+    columns = [
+        stamp.tolist(),
+        time.tolist(),
+        places,
+        *(of.tolist() for of in (gap, height, closing_speed, opening_speed)),
+    ]
     later = [of.tolist() for of in (speed, at_speed, in_break, after_break, repositioned)]
     yield from map(ContactSample._make, zip(*columns, forces_or_none, *later, strict=True))
 
@@ -76,15 +94,19 @@ def _at_speed(pusher: Track, time: Array, tips: dict[float, Array]) -> BoolArray
     return np.asarray((first >= NEAR_SHARE * near) & (first >= REACH_SHARE * later))
 
 
-def _gaps(rig: Rig, slider: Track, pusher: Track, first: int, last: int) -> tuple[Array, Array]:
-    """Gap (n,) m at the samples, and the rate (n,) m/s at which it shrinks in the NEAR after each."""
+def _gaps(rig: Rig, slider: Track, pusher: Track, first: int, last: int) -> tuple[Array, Array, Array]:
+    """Gap (n,) m at the samples, and rates (n,) m/s: it shrinks in the NEAR after each, and grew in that before."""
+    begin = int(np.searchsorted(slider.time, slider.time[first] - NEAR))
     ahead = int(np.searchsorted(slider.time, slider.time[last - 1] + NEAR, side="right"))
-    time, pose = slider.time[first:ahead], slider.values[first:ahead][:, [0, 1, 3]]
+    time, pose = slider.time[begin:ahead], slider.values[begin:ahead][:, [0, 1, 3]]
     gap = rig.outline.project(to_body(pusher.at(time)[:, :2], pose)).distance - rig.pusher_radius
-    # The last sample within NEAR, not an interpolated value: the sample after it may not have arrived yet.
+    # Samples within NEAR, not interpolated values: the sample after it may not have arrived yet.
     later = np.searchsorted(time, time + NEAR, side="right") - 1
     closing_speed = (gap - gap[later]) / np.maximum(time[later] - time, SHORTEST_SPAN)
-    return gap[: last - first], closing_speed[: last - first]
+    earlier = np.searchsorted(time, time - NEAR)
+    opening_speed = (gap - gap[earlier]) / np.maximum(time - time[earlier], SHORTEST_SPAN)
+    rows = slice(first - begin, last - begin)
+    return gap[rows], closing_speed[rows], opening_speed[rows]
 
 
 def _breaks(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray, BoolArray]:
@@ -96,7 +118,17 @@ def _breaks(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray,
     return after_break, in_break
 
 
-def _forces(wrench: Track | None, time: Array) -> Array:
+def _absent(wrench: Track | None, time: Array) -> BoolArray:
+    """Whether no force shows contacts at times (n,): its stream is slow, begins later, has ended, or has a long gap."""
+    if wrench is None or wrench.period > SLOWEST:
+        return np.ones(len(time), dtype=np.bool_)
+    known = np.concatenate([[-np.inf], wrench.time, [np.inf]])
+    after = np.searchsorted(known, time)
+    ended = (after == len(known) - 1) & (time <= known[-2] + wrench.longest_gap)
+    return np.asarray((known[after] - known[after - 1] > LONGEST_BREAK) & ~ended)
+
+
+def _forces(wrench: Track | None, time: Array, absent: BoolArray) -> Array:
     """Forces (n, 2) N; where samples are missing the last one before, as the touch may lie between it and the next."""
     if wrench is None:
         return np.full((len(time), 2), np.nan)
@@ -104,7 +136,8 @@ def _forces(wrench: Track | None, time: Array) -> Array:
     before = np.clip(np.searchsorted(wrench.time, time, side="right") - 1, 0, last)
     after = np.minimum(before + 1, last)
     missing = wrench.time[after] - wrench.time[before] > MISSING_PERIODS * wrench.period
-    return np.asarray(np.where(missing[:, None], wrench.values[before], wrench.at(time)))
+    forces = np.where(missing[:, None], wrench.values[before], wrench.at(time))
+    return np.asarray(np.where(absent[:, None], np.nan, forces))
 
 
 def _speed(pusher: Track, time: Array, tips: dict[float, Array], begin: float, end: float) -> Array:

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
@@ -44,6 +44,7 @@ class WindowFinder:
         self.rig, self.options = rig, options or WindowOptions()
         self._counts: Counter[str] = Counter()  # without those of the present session
         self._earlier_contact = (0, 0)  # of earlier sessions
+        self._earlier_touches: list[tuple[float, float]] = []
         self._session = ClockSession(rig, self.options)
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
         self._scalars: dict[str, ScalarTrack] = {}  # by topic
@@ -68,14 +69,19 @@ class WindowFinder:
         touching, samples = self._contact()
         return touching / samples if samples else None
 
+    @property
+    def force_touches(self) -> list[tuple[float, float]]:
+        """Stamp (s) of each touch so far, and how late the force rises there, s; NaN where it does not show it."""
+        return self._earlier_touches + self._session.force_touches
+
     def find(self, recording: Recording) -> list[PushWindow]:
-        """All windows of a recording; see find_windows."""
+        """All windows of a recording; see find_windows. A sample that it has twice, as in a loop, counts once."""
         for name, stream in recording.scalars.items():
             self.add_scalar(name, stream)
         if recording.wrench is not None:
-            self.add_wrench(recording.wrench)
-        self.add_pusher(recording.pusher)
-        self.add_slider(recording.slider)
+            self.add_wrench(taken(recording.wrench, ~repeated(recording.wrench)))
+        self.add_pusher(taken(recording.pusher, ~repeated(recording.pusher)))
+        self.add_slider(taken(recording.slider, ~repeated(recording.slider)))
         return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:
@@ -159,7 +165,7 @@ class WindowFinder:
         self._advance(final=True)
         self._release(final=True)
         self._counts += self._session.counts
-        self._earlier_contact = self._contact()
+        self._earlier_contact, self._earlier_touches = self._contact(), self.force_touches
         self._session = ClockSession(self.rig, self.options)
 
     def _add_postponed(self) -> None:

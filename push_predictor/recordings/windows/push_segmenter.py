@@ -11,17 +11,18 @@ from collections import deque
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.windows.contact import ContactSample
+from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSample
 from push_predictor.recordings.windows.cut import PushContext
+from push_predictor.recordings.windows.force_timing import ForceTiming
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0  # standard deviations of the force in free motion
+CLEAR = 3.0  # times the least force in contact: a smaller force shows a contact late
 CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
 LEAST_CLOSING_SPEED = 0.001  # m/s, below the noise of a tracker
 INSIDE = 0.005  # m; a tip this deep inside the outline shows unsynchronised clocks or a wrong frame
-LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push
 
 
 def touches_nothing(sample: ContactSample, options: WindowOptions) -> bool:
@@ -43,6 +44,7 @@ class PushSegmenter:
         self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
         self.samples = self.touching = 0
+        self.timing = ForceTiming()
         self._start: int | None = None  # of the incomplete window
         self._last_good = -np.inf
         self._last_time = -np.inf
@@ -53,7 +55,7 @@ class PushSegmenter:
             maxlen=TARE_SAMPLES
         )  # at rest near the slider, before a push
         self._zero: tuple[tuple[float, float] | None, float] | None = None  # of these forces; None after a new one
-        self._touching = False
+        self._touching = self._shown = False
         self._inside = False
         self._first_touch: int | None = None
         self._last_contact: int | None = None
@@ -102,26 +104,36 @@ class PushSegmenter:
             self._zero = None
 
     def _touches(self, sample: ContactSample) -> bool:
+        self._shown = shown = self._shows_contact(sample)
+        moving = shown and sample.speed >= self.options.least_speed
+        self.timing.add(sample, moving, self._free_force, max(CLEAR * self.options.least_force, self._least_force()))
         if sample.height > self.options.lift:
             return False
         pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
+        if self.timing.apart:
+            return shown
         if sample.force is not None and self._free_force:
             return pressed
         # The force on a resting tip may be a preload: it can continue a contact but not show its begin or end.
-        near = sample.gap <= self.options.touch_gap_alone
-        return (near and self._stays(sample)) or (self._touching and pressed)
+        return shown or (self._touching and pressed)
 
-    def _stays(self, sample: ContactSample) -> bool:
-        """Whether the gap does not shrink, as before a touch; without a force also not grow, as after one."""
+    def _shows_contact(self, sample: ContactSample) -> bool:
+        """Whether the geometry shows a contact: the gap is small and does not shrink before it, nor grow after it."""
+        if sample.height > self.options.lift or sample.gap > self.options.touch_gap_alone:
+            return False
         limit = max(LEAST_CLOSING_SPEED, CLOSING_SHARE * sample.speed)
-        separates = sample.force is None and sample.closing_speed < -limit
-        return not separates and (self._touching or sample.closing_speed <= limit)
+        separates = sample.opening_speed > limit and (sample.force is None or bool(self._free_force))
+        return not separates and (self._shown or sample.closing_speed <= limit)
 
     def _presses(self, force: tuple[float, float] | None) -> bool:
-        zero, noise = self._tare()
+        zero, _ = self._tare()
         if force is None or zero is None:
             return False
-        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > max(self.options.least_force, NOISE_FACTOR * noise)
+        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > self._least_force()
+
+    def _least_force(self) -> float:
+        """The force (N) above which there is contact."""
+        return max(self.options.least_force, NOISE_FACTOR * self._tare()[1])
 
     def _tare(self) -> tuple[tuple[float, float] | None, float]:
         """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""

@@ -1,0 +1,139 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Contact by the geometry where the force cannot show it: late, early, rare, faint, constant or missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checked_bags import bag
+from synthetic import windows_of
+
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
+from push_predictor.recordings.windows.finder import WindowFinder
+from push_predictor.recordings.windows.force_timing import FEWEST, force_delay
+
+NAME = "ellipse_plywood"  # 15 pushes
+
+
+def wrench_of(recording: Recording) -> WrenchStream:
+    assert recording.wrench is not None
+    return recording.wrench
+
+
+def delayed(recording: Recording, seconds: float) -> Recording:
+    wrench = wrench_of(recording)
+    return replace(recording, wrench=replace(wrench, stamp=wrench.stamp + round(1e9 * seconds)))
+
+
+def scaled(recording: Recording, factor: float) -> Recording:
+    wrench = wrench_of(recording)
+    return replace(recording, wrench=replace(wrench, fx=factor * wrench.fx, fy=factor * wrench.fy))
+
+
+def at_rate(recording: Recording, rate: float) -> Recording:
+    wrench = wrench_of(recording)
+    step = round(1e9 / rate / float(np.median(np.diff(wrench.stamp))))
+    return replace(recording, wrench=taken(wrench, slice(None, None, step)))
+
+
+def later_pushes(recording: Recording) -> tuple[np.ndarray, int]:
+    """First starts (n,) s of the pushes after the seventh of the sound recording, and the number of their windows.
+
+    The pushes before show that the force is wrong.
+    """
+    windows = windows_of(bag(NAME))
+    until = sorted(window.start for window in windows if window.index == 0)[FEWEST + 2] - 100_000_000
+    later = [window for window in windows_of(recording) if window.start > until]
+    return np.array([1e-9 * window.start for window in later if window.index == 0]), len(later)
+
+
+@pytest.mark.parametrize(
+    "alter",
+    [
+        lambda recording: delayed(recording, 0.12),
+        lambda recording: delayed(recording, -0.12),
+        lambda recording: scaled(recording, 0.02),
+        lambda recording: scaled(recording, 0.0),
+        lambda recording: replace(recording, wrench=taken(wrench_of(recording), slice(3))),
+    ],
+    ids=["late", "early", "faint", "silent", "ended"],
+)
+def test_windows_are_those_of_the_geometry_where_the_force_does_not_show_contacts(
+    alter: Callable[[Recording], Recording],
+) -> None:
+    (expected, windows), (found, count) = later_pushes(bag(NAME)), later_pushes(alter(bag(NAME)))
+    assert len(expected) == len(found) == 8
+    assert np.median(np.abs(found - expected)) < 0.015 and np.max(np.abs(found - expected)) < 0.06
+    assert count == pytest.approx(windows, abs=2)
+
+
+def test_the_force_decides_where_it_rises_at_the_touch() -> None:
+    """A force that rises 10 ms later, at most half the span that determines a window's velocity, is no fault."""
+    sound, late = later_pushes(bag(NAME))[0], later_pushes(delayed(bag(NAME), 0.01))[0]
+    assert not np.array_equal(sound, later_pushes(replace(bag(NAME), wrench=None))[0])
+    assert np.median(late - sound) == pytest.approx(0.01, abs=0.005)
+
+
+def test_a_force_that_ended_does_not_end_the_windows() -> None:
+    sound = bag(NAME)
+    wrench = wrench_of(sound)
+    third = replace(sound, wrench=taken(wrench, slice(len(wrench) // 3)))
+    known = ["normal_force" in window.covariates for window in windows_of(third)]
+    assert len(known) == pytest.approx(len(windows_of(sound)), abs=3)
+    assert 0.2 < np.mean(known) < 0.5 and known == sorted(known, reverse=True)
+
+
+def test_windows_without_a_force_reach_the_end_of_the_contact() -> None:
+    """Within a window of 0.2 s and two samples, of each push."""
+    last = [
+        {window.push_id.split("-")[1][:-2]: window.end for window in windows_of(recording)}
+        for recording in (bag(NAME), replace(bag(NAME), wrench=None))
+    ]
+    sound, blind = (sorted(each.values()) for each in last)
+    assert len(sound) == len(blind)
+    assert abs(np.median(np.array(blind) - np.array(sound))) <= 20_000_000
+
+
+def test_a_coarse_tracker_does_not_depose_the_force() -> None:
+    """Gaps with noise of 1 mm show no touch, so they do not show that the force is late either."""
+    rng = np.random.default_rng(0)
+
+    def noisy(recording: Recording) -> Recording:
+        slider: PoseStream = recording.slider
+        off = rng.normal(0.0, 0.001, len(slider))
+        return replace(recording, slider=replace(slider, x=slider.x + off, y=slider.y + off[::-1]))
+
+    finder = WindowFinder(bag(NAME).rig)  # type: ignore[arg-type]
+    finder.find(noisy(delayed(bag(NAME), 0.12)))
+    assert finder.force_touches == []
+
+
+def test_the_delay_of_the_force_is_measured() -> None:
+    for seconds in (0.0, 0.08, -0.08):
+        finder = WindowFinder(bag(NAME).rig)  # type: ignore[arg-type]
+        finder.find(delayed(bag(NAME), seconds))
+        found = force_delay([delay for _, delay in finder.force_touches])
+        assert found.value == pytest.approx(seconds, abs=0.015) and found.sd < 0.01
+        assert found.shifted == found.apart == (seconds != 0.0)
+
+
+@pytest.mark.parametrize(
+    ("delays", "apart"),
+    [
+        ([0.02] * 4, False),  # too few
+        ([0.02] * 5, True),
+        ([0.009] * 5, False),
+        ([-0.03] * 5, False),
+        ([-0.05] * 5, True),
+        ([0.0, 0.04, -0.04, 0.03, 0.02], False),  # not clearly late
+        ([0.0] * 6 + [np.nan] * 2, False),
+        ([0.0] * 4 + [np.nan] * 4, True),
+    ],
+)
+def test_a_force_is_apart_only_if_that_is_clear(delays: list[float], apart: bool) -> None:
+    assert force_delay(delays).apart == apart
