@@ -17,7 +17,7 @@ from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import SPANS, Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
 from push_predictor.recordings.checks.orientation import orientation_finding
 from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
@@ -34,7 +34,6 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
 FEWEST_CONTACTS = 20  # samples
-LEAST_STEADY = 0.7  # share of the contact without its begin and end, up to which those do not distort a robust fit
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
@@ -44,7 +43,7 @@ FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wro
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
 RIGHT_HANDED = "Use right-handed frames, seen from above."
-FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up slider=-z` does that."
+FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up=slider=-z` does that."
 IN_ORDER = "Give x before y, in right-handed frames seen from above."
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
 
@@ -154,10 +153,7 @@ def contacts_of(motion: Motion | None) -> Contacts | None:
     """The samples in contact, None if there are too few."""
     if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
         return None
-    steady, touch = int(np.sum(motion.steady)), motion.contact
-    vague = motion.span > SPANS[0] or steady < LEAST_STEADY * np.sum(touch)  # where a contact begins and ends
-    if vague and steady >= FEWEST_CONTACTS:
-        touch = motion.steady
+    touch = motion.touching
     tips = to_body(motion.tip, motion.slider)[touch]
     tool = None if motion.tool is None else motion.tool[touch]
     velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]

@@ -33,6 +33,7 @@ MOVING_SHARE, MOVING = 0.4, 0.01  # of the lowered tip's speed; m/s: the noise o
 NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
 STEADY, STEADY_TIP = 0.5, 0.3  # change of velocity, as a share of it, of a slider and a tip that neither hit nor part
 FEWEST = 5  # samples of each stream
+LEAST_STEADY = 0.7  # share of the contact without its begin and end, from which on those distort no robust fit
 OFF = 0.001  # m from the outline
 
 
@@ -62,6 +63,13 @@ class Motion:
     noise: float = 0.0
     span: float = SPANS[0]
     tool: Array | None = None
+
+    @property
+    def touching(self) -> BoolArray:
+        """Which samples (n,) are in contact: without begin and end where fast pushes, or noise, leave those vague."""
+        steady, contact = int(np.sum(self.steady)), int(np.sum(self.contact))
+        vague = self.span > SPANS[0] or steady < LEAST_STEADY * contact
+        return self.steady if vague and steady >= FEWEST else self.contact
 
 
 @dataclass(frozen=True)
