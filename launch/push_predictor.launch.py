@@ -22,7 +22,7 @@ from launch import LaunchContext, LaunchDescription
 from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
-FRAMES = ("wrench_frame", "world_frame")
+FRAMES = ("wrench_frame", "world_frame", "stamp", "up")
 TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
 CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
     "reliability": ("", "reliable", "best_effort")
@@ -47,6 +47,8 @@ ARGUMENTS = (
     ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
     ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
     ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
+    ("stamp", "", "Time of a sample: header, or log for that of its receipt. Empty: header."),
+    ("up", "", "Axis of the poses' world that points up: x, y, z, -x, -y or -z; of one stream slider=y. Empty: z."),
     ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
@@ -79,7 +81,9 @@ def _nodes(context: LaunchContext) -> list[Node]:
     ]
     if recording:
         finished = end_launch(also_if_done=False)  # the validator goes on: it may be writing the results
-        nodes.append(_node("push_replay", "push_replay", given, _replay(given, recording), finished))
+        nodes.append(
+            _node("push_replay", "push_replay", given, _replay(given, recording), finished, _replay_defaults(given))
+        )
     if is_true(given["rviz"]):
         nodes.append(_rviz(given))
     return nodes
@@ -122,23 +126,35 @@ def _full_name(namespace: str, topic: str) -> str:
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
+    return {**rig, **rate, **_streams(given), "recording": _path(recording)}
+
+
+def _replay_defaults(given: dict[str, str]) -> dict[str, float]:
+    """What differs from the node's own defaults, unless params_file says otherwise."""
     clock = {"play.clock_publish_frequency": 40.0} if is_true(given["use_sim_time"]) else {}
-    # Without this wait the validator would miss the first pushes.
-    return {**rig, **rate, **clock, **_streams(given), "recording": _path(recording), "wait_for_subscribers": 30.0}
+    return {**clock, "wait_for_subscribers": 30.0}  # without this wait the validator would miss the first pushes
 
 
 def _node(
-    executable: str, name: str, given: dict[str, str], parameters: dict[str, Any], on_exit: Callable[[Any, Any], Any]
+    executable: str,
+    name: str,
+    given: dict[str, str],
+    parameters: dict[str, Any],
+    on_exit: Callable[[Any, Any], Any],
+    defaults: dict[str, float] | None = None,
 ) -> Node:
+    """A node. Its parameters override those of params_file, and these the defaults."""
     files = [given["params_file"]] if given["params_file"] else []
     enclave = ["--enclave", f"{given['enclaves'].rstrip('/')}/{executable}"] if given["enclaves"] else []
+    # As a dictionary they would be merged with the parameters, and override a file that names all nodes.
+    first = [word for key, value in (defaults or {}).items() for word in ("-p", f"{key}:={value}")]
     return Node(
         package="push_predictor",
         executable=executable,
         name=name,
         namespace=given["namespace"],
         parameters=[*files, {**_switch(given, "use_sim_time", default=False), **parameters}],
-        arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
+        arguments=["--ros-args", "--log-level", given["log_level"], *first, *enclave],
         output="screen",
         on_exit=on_exit,
     )

@@ -19,7 +19,7 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
 
-TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame")
+TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame", "stamp", "up")
 PATHS = ("bag", "rig")
 SWITCHES = ("force", "use_sim_time")
 # --8<-- [start:documented]
@@ -42,6 +42,8 @@ ARGUMENTS = (
     ("wrench_frame", "", "Axes of the wrench, saved for its readers: world, tip or a frame of tf."),
     ("wrench_bias", "", "What readers do with the sensor's bias and weight: free_motion or none."),
     ("world_frame", "", "Frame of all poses, saved for their readers, which turn others into it by tf."),
+    ("stamp", "", "Time of a sample, saved for its readers: header, or log for that of its receipt."),
+    ("up", "", "Axis of the poses' world that points up, saved for its readers: x, y, z, -x, -y or -z; slider=y."),
     ("covariate_topics", "", "Further topics to record, separated by commas."),
     ("duration", "", "Seconds after the first message at which the node ends. Empty: at Ctrl-C."),
 )

@@ -4,7 +4,8 @@
 # PYTHON_ARGCOMPLETE_OK
 """The command line `push_predictor`. Each sub-command is a module in push_predictor.commands.
 
-Exit status 0: done; 1: the work failed, and one line on stderr states why; 2: the call was wrong.
+Exit status 0: done; 1: the work failed, and one line on stderr states why; 2: the call was wrong. A failure that nobody
+foresaw is one line as well; with PUSH_PREDICTOR_TRACEBACK=1 its traceback comes before it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -20,6 +22,8 @@ from push_predictor.blas_threads import limit_process
 from push_predictor.commands.common.output import check_json
 from push_predictor.errors import PushPredictorError
 
+LONGEST_FAULT = 500  # characters of an error's text
+TRACEBACK = "PUSH_PREDICTOR_TRACEBACK"  # environment variable: print where an unforeseen failure happened
 COMMANDS = (
     "import",
     "record",
@@ -60,6 +64,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"push_predictor {options.command}: interrupted", file=sys.stderr)
         return 130
+    except Exception as error:  # a user can do nothing with a traceback, the authors can
+        if os.environ.get(TRACEBACK):
+            traceback.print_exc()
+        print(f"push_predictor {options.command}: {_fault(error)}", file=sys.stderr)
+        return 1
     return 0
 
 
@@ -84,6 +93,16 @@ def _complete(parser: argparse.ArgumentParser) -> None:
     except ImportError:
         return
     argcomplete.autocomplete(parser)
+
+
+def _fault(error: Exception) -> str:
+    """What failed, where, and how to see more."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    what = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")[:LONGEST_FAULT]
+    return (
+        f"{what} ({os.path.basename(place.filename)} line {place.lineno}). This is a fault of the program, not of the "
+        f"call. {TRACEBACK}=1 shows the traceback; please report it."
+    )
 
 
 def _one_line(error: Exception) -> str:

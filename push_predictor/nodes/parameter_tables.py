@@ -13,6 +13,7 @@ LONGEST = 1.0e10  # s, 300 years: longer than any stamp
 RIG = Param("rig", "", "Rig file (YAML, a push_rig record). Empty: the record on topic rig.")
 STRICT = Param("strict", False, "Report a warning of the checks of the samples as an error in the diagnostics.")
 SAVED = "as in NAME.recording.yaml, or "
+UP = "Axis of the poses' world that points up: x, y, z, -x, -y or -z; of single streams as in slider=y,wrench=y."
 DIAGNOSTICS = Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0)
 
 
@@ -34,6 +35,8 @@ def _frames(empty: str, world: str) -> tuple[Param, ...]:
             f"Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: {empty}world.",
         ),
         Param("world_frame", "", f"Frame of all poses; tf turns others into it. Empty: {empty}{world}."),
+        Param("stamp", "", f"Time of a sample: header, or log for that of its receipt. Empty: {empty}header."),
+        Param("up", "", f"{UP} Empty: {empty}z.", true_text="y"),
     )
 
 
@@ -86,6 +89,8 @@ PUSH_RECORDER = (
         "",
         "Bias of the wrench, saved for the readers: free_motion to estimate and subtract it, or none.",
     ),
+    Param("stamp", "", "Time of a sample, saved for the readers: header, or log for that of its receipt."),
+    Param("up", "", f"{UP} Saved for the readers.", true_text="y"),
     Param("covariate_topics", [""], "Further topics to record: TOPIC or TOPIC.FIELD."),
     Param("duration", 0.0, "Seconds after the first message at which the node ends. 0: at SIGINT.", low=0.0, high=1e9),
     DIAGNOSTICS,

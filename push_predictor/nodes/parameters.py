@@ -21,7 +21,10 @@ Value: TypeAlias = "bool | int | float | str | list[str]"
 
 @dataclass(frozen=True)
 class Param:
-    """One parameter. low and high limit a number (inclusive); choices limit a text. An empty list is [""]."""
+    """One parameter. low and high limit a number (inclusive); choices limit a text. An empty list is [""].
+
+    true_text: a text that the parser of parameter files takes for `true`, as `y`.
+    """
 
     name: str
     default: Value
@@ -30,6 +33,7 @@ class Param:
     high: float | None = None
     choices: tuple[str, ...] = ()
     read_only: bool = True
+    true_text: str = ""
 
     @property
     def accepted(self) -> str:
@@ -49,6 +53,8 @@ class Param:
             return _is_texts(value)
         if isinstance(self.default, float):
             return _is_number(value) and math.isfinite(value) and self._within(value)
+        if self.true_text and value is True:
+            return True
         if type(value) is not type(self.default):
             return False
         if isinstance(self.default, str):
@@ -69,7 +75,7 @@ def declare(node: Node, params: Sequence[Param]) -> None:
         given = given_value(node, param.name)
         if given is not None and not param.allows(given):
             raise RequestError(param.name, given, param.accepted)
-        value = param.default if given is None else _native(param, given)
+        value = param.default if given is None else native(param, given)
         node.declare_parameter(param.name, value, _descriptor(param), ignore_override=True)
     node.add_on_set_parameters_callback(lambda changed: _checked(table, changed))
 
@@ -87,10 +93,12 @@ def values_of(node: Node, params: Iterable[Param]) -> dict[str, Any]:
     return {name: [text for text in v if text] if isinstance(v, list) else v for name, v in values.items()}
 
 
-def _native(param: Param, value: Any) -> Any:
+def native(param: Param, value: Any) -> Any:
     """The value in the type of the default: `rate:=10` means `rate:=10.0`."""
     if isinstance(param.default, list):
         return list(value)
+    if param.true_text and value is True:
+        return param.true_text
     return float(value) if isinstance(param.default, float) else value
 
 

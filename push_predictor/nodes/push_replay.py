@@ -38,9 +38,12 @@ from push_predictor.nodes.replay.topics import ReplayTopics, check_filter, is_pl
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
+from push_predictor.recordings.decoder.sources import TF
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.recordings.topics import Topics, load_topics, topics_of
+from push_predictor.recordings.untyped_topics import tell_types
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
 from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
 from push_predictor.replay.report import ReplayReport
@@ -73,6 +76,7 @@ class PushReplay(Node):
         self._recording, self._given_topics = Path(values["recording"]).expanduser(), topics_of(values)
         self._given_rig = load_rig(Path(values["rig"]).expanduser()) if values["rig"] else None
         bag = open_bag(self._recording)
+        self._streams = self._stream_topics()
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
         self._status = self.create_publisher(ReplayStatus, "replay_status", LATCHED)
@@ -81,7 +85,6 @@ class PushReplay(Node):
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
         self._checks = CheckProcess(values["strict"])
-        self._streams = self._stream_topics()
         self._player = self._make_player()
         self._check(bag)
         self._start_reporting()
@@ -103,7 +106,14 @@ class PushReplay(Node):
             self.get_logger().info(report.summary)
 
     def _open_topics(self, bag: Bag) -> ReplayTopics:
-        chosen = {topic: kind for topic, kind in bag.topics.items() if is_played(topic, self._values)}
+        notes = Notes()
+        try:
+            tell_types(bag, self._streams, (TF,), notes)
+        except RecordingError as error:  # of a pose, which is not played then
+            notes.add(str(error))
+        for note in notes:
+            self.get_logger().warning(note)
+        chosen = {topic: kind for topic, kind in bag.topics.items() if is_played(topic, self._values) and kind}
         topics = ReplayTopics(self, chosen, bag.qos, self._ending.is_set)
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")

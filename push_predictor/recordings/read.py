@@ -6,17 +6,24 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import POSE
+from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
-from push_predictor.recordings.decoder.decoder import StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.decoder import StreamDecoder, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
-from push_predictor.recordings.decoder.rules import NO_ORIENTATION, NO_TRANSFORM, NOT_FINITE, OTHER_CLOCK, UNREADABLE
+from push_predictor.recordings.decoder.rules import (
+    NO_ELEMENT,
+    NO_ORIENTATION,
+    NO_TRANSFORM,
+    NOT_FINITE,
+    OTHER_CLOCK,
+    UNREADABLE,
+)
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
@@ -24,10 +31,13 @@ from push_predictor.recordings.fields.transforms import WORLD
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, rig_from_record
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.topics import NO_BIAS, NO_WRENCH, TIP_AXES, WORLD_AXES, Topics, load_topics
+from push_predictor.recordings.untyped_topics import tell_types
 
 __all__ = ["Topics", "read_recording", "recorded_rig", "require_rig"]
 
+STATED = 3  # losses that an error states
 FAULTS = {
+    NO_ELEMENT: "messages lack the chosen element",
     UNREADABLE: "messages are not readable CDR",
     NOT_FINITE: "samples contain NaN or infinity",
     NO_ORIENTATION: "samples have no orientation",
@@ -48,28 +58,47 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
     """
     bag, chosen = open_bag(Path(path)), topics.over(load_topics(Path(path)))
     rig = rig if rig is not None else recorded_rig(bag)
-    notes: list[str] = []
+    try:
+        return _read(bag, rig, chosen)
+    except RecordingError as error:  # what is lost may be the cause
+        losses = [loss for loss in bag.notes.losses if loss not in str(error)]
+        raise RecordingError("; ".join([str(error), *losses[:STATED]])) from None
+
+
+def _read(bag: Bag, rig: Rig | None, chosen: Topics) -> Recording:
+    notes = Notes()
     if rig is None and chosen.wrench_bias not in ("", NO_BIAS):
-        notes.append("the bias of the wrench is not subtracted: free motion is found with a rig, and there is none")
+        notes.add("the bias of the wrench is not subtracted: free motion is found with a rig, and there is none")
         chosen = replace(chosen, wrench_bias="")
     decoder = StreamDecoder(chosen)
     if rig is not None:
         decoder.begin(rig)
-    for messages in bag.portions(_declared(bag, chosen, decoder)):
+    for messages in bag.portions(_declared(bag, chosen, decoder, notes)):
         decoder.put(messages)
     samples = decoder.take(last=True)
-    notes += _notes_on_poses(bag, decoder)
+    _note_poses(bag, decoder, notes)
     wrench = _wrench(bag, decoder, samples.wrench, notes)
     for name, each in decoder.scalars.items():
-        notes += _notes(_spelling(bag, name), each.rejected, each.foreign)
+        _note_rejected(notes, _spelling(bag, name), each.rejected, each.foreign)
     for name, stream in (("slider", samples.slider), ("pusher", samples.pusher)):
         if not len(stream):
-            label = _label(bag, decoder.poses[name])
-            raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)})")
+            label, pose = _label(bag, decoder.poses[name]), decoder.poses[name]
+            names = pose.messages.names if isinstance(pose, PoseTopic) else []
+            there = f". The elements are named {', '.join(map(repr, names))}" if names else ""
+            raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)}){there}")
     scalars = {_spelling(bag, name): stream for name, stream in samples.scalars.items() if len(stream)}
-    notes = [*bag.notes, *notes]
+    every = bag.notes
+    every.add_all(notes)
     return Recording(
-        bag.name, rig, samples.slider, samples.pusher, wrench, scalars, tuple(notes), decoder.wrench.estimate
+        bag.name,
+        rig,
+        samples.slider,
+        samples.pusher,
+        wrench,
+        scalars,
+        tuple(every),
+        decoder.wrench.estimate,
+        tuple(every.losses),
     )
 
 
@@ -89,27 +118,28 @@ def require_rig(recording: Recording) -> Rig:
 # --- topics ----------------------------------------------------------------------------------------------------------
 
 
-def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder) -> set[str]:
+def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder, notes: Notes) -> set[str]:
     """Declare the types of all topics to the decoder; returns the topics to read. Raises RecordingError."""
     every = sources_of(topics)
     named = {name: source for name, source in every if name in STREAMS}
     given = {name for name in named if getattr(topics, name)} - ({"wrench"} if topics.wrench == NO_WRENCH else set())
     further = [source for name, source in every if name == COVARIATE]
     _check_present(bag, named, given, further)
-    read = {_named(bag, source.topic) for source in further}
+    tell_types(bag, topics, decoder.tf, notes)
+    read = {bag.spelled(source.topic) for source in further}
     for name, source in named.items():
         if (name, source.text) == ("wrench", NO_WRENCH) or not (kind := _kind(bag, name, source, name in given)):
             continue
-        read.add(_named(bag, source.topic))
+        read.add(bag.spelled(source.topic))
         if not source.frame:
             decoder.inputs()[name].declare(kind, bag.schemas, bag.path)
     for source in further:
-        decoder.scalars[name_of(source)].declare(bag.topics[_named(bag, source.topic)], bag.schemas, bag.path)
+        decoder.scalars[name_of(source)].declare(bag.topics[bag.spelled(source.topic)], bag.schemas, bag.path)
     for topic, kind in bag.topics.items():  # the others that contain one number
         if kind in SCALAR_FIELDS and name_of(_scalar_source(topic)) not in decoder.scalars:
             decoder.add_scalar(_scalar_source(topic)).declare(kind, bag.schemas, bag.path)
             read.add(topic)
-    both = {name for topic in decoder.tf for name in (_named(bag, topic), _named(bag, topic) + STATIC)}
+    both = {name for topic in decoder.tf for name in (bag.spelled(topic), bag.spelled(topic) + STATIC)}
     return read | {name for name in both if bag.topics.get(name) in TF_TYPES}
 
 
@@ -119,7 +149,7 @@ def _scalar_source(topic: str) -> Source:
 
 def _kind(bag: Bag, name: str, source: Source, given: bool) -> str:
     """The type to read from a source's topic, '' without the topic."""
-    kind, target = bag.topics.get(_named(bag, source.topic), ""), STREAMS[name]
+    kind, target = bag.topics.get(bag.spelled(source.topic), ""), STREAMS[name]
     source.check_type(kind, bag.path)
     return kind if given or kind in target.known or not kind else target.type
 
@@ -128,41 +158,36 @@ def _check_present(bag: Bag, named: Mapping[str, Source], given: Collection[str]
     """Raise RecordingError for a missing topic, with the topics of the bag and their types."""
     present = ", ".join(f"{topic} ({kind})" for topic, kind in bag.topics.items()) or "no topic"
     for source in [*(named[name] for name in named if name in given), *further]:
-        if _named(bag, source.topic) not in bag.topics:
+        if bag.spelled(source.topic) not in bag.topics:
             raise source.error(bag.path, f"no such topic; the bag contains {present}")
     poses = [source for name, source in named.items() if name not in given and STREAMS[name] is POSE_TARGET]
-    missing = [(_named(bag, source.topic), source.option) for source in poses]
+    missing = [(bag.spelled(source.topic), source.option) for source in poses]
     if missing := [(topic, option) for topic, option in missing if topic not in bag.topics]:
         names, options = (" and ".join(each) for each in zip(*missing, strict=True))
         raise RecordingError(f"{bag.path}: no topic {names} of {POSE.name}; it contains {present}; give {options}")
 
 
-def _named(bag: Bag, name: str) -> str:
-    """The bag's own spelling of a topic's name."""
-    return next((topic for topic in bag.topics if key_of(topic) == key_of(name)), f"/{key_of(name)}")
-
-
 def _spelling(bag: Bag, name: str) -> str:
     """The name of a scalar with the bag's own spelling of its topic."""
     topic, dot, field = name.partition(".")
-    return _named(bag, topic) + dot + field
+    return bag.spelled(topic) + dot + field
 
 
 def _label(bag: Bag, pose: PoseTopic | PoseFrame) -> str:
     """The name of a pose's source in notes."""
     source = pose.source if isinstance(pose, PoseFrame) else pose.messages.source
-    return _named(bag, source.topic) + source.text[len(source.topic) :]
+    return bag.spelled(source.topic) + source.text[len(source.topic) :]
 
 
 # --- notes -----------------------------------------------------------------------------------------------------------
 
 
-def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
-    """What was discarded and assumed. Raises RecordingError for a stream without a readable message, or a frame."""
-    notes, world = [], decoder.world or WORLD
+def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
+    """Note what was discarded and assumed. Raises RecordingError for a stream without a readable message or a frame."""
+    world = decoder.world or WORLD
     for buffer_topic, buffer in decoder.tf.items():
         if buffer.unreadable:
-            notes.append(f"{_named(bag, buffer_topic)}: {buffer.unreadable} {FAULTS[UNREADABLE]}; discarded")
+            _note_rejected(notes, bag.spelled(buffer_topic), {UNREADABLE: buffer.unreadable}, {})
     for name in POSES:
         pose = decoder.poses[name]
         label = _label(bag, pose)
@@ -171,23 +196,22 @@ def _notes_on_poses(bag: Bag, decoder: StreamDecoder) -> list[str]:
                 raise _option_error(bag, "world_frame", world, pose.problem)
             if pose.problem:
                 raise pose.source.error(bag.path, pose.problem)
-            notes += _notes(label, pose.rejected, Counter())
+            _note_rejected(notes, label, pose.rejected, {})
             continue
         _check_read(bag, label, pose)
         if pose.problem:
             turned = f"; the frame of the poses is turned into world_frame {world!r} (option --world-frame)"
             raise pose.messages.source.error(bag.path, pose.problem + turned)
-        notes += _notes(label, pose.messages.rejected, pose.messages.foreign)
+        _note_rejected(notes, label, pose.messages.rejected, pose.messages.foreign)
         if frames := set() if decoder.topics.world else pose.messages.named - {world}:
-            notes.append(f"{label}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
+            notes.add(f"{label}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
     if decoder.headless:
         label = _label(bag, decoder.poses["pusher"])
-        notes.append(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
+        notes.add(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
     one, other = ({frame.strip("/") for frame in decoder.of(name).named} - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
         both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
-        notes.append(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
-    return notes
+        notes.add(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
 
 
 def _check_read(bag: Bag, label: str, pose: PoseTopic) -> None:
@@ -200,27 +224,31 @@ def _check_read(bag: Bag, label: str, pose: PoseTopic) -> None:
         raise RecordingError(f"{bag.path}: topic {label} contains no readable message{known}")
 
 
-def _notes(label: str, rejected: Mapping[str, int], foreign: Mapping[str, int]) -> list[str]:
-    found = [f"{label}: {count} messages have type {kind!r}; discarded" for kind, count in foreign.items()]
-    return found + [f"{label}: {count} {FAULTS[fault]}; discarded" for fault, count in rejected.items()]
+def _note_rejected(notes: Notes, label: str, rejected: Mapping[str, int], foreign: Mapping[str, int]) -> None:
+    """Note the messages that were discarded; those that a tracker has marked as invalid are no loss."""
+    for kind, count in foreign.items():
+        notes.add(f"{label}: {count} messages have type {kind!r}; discarded", lost=True)
+    for fault, count in rejected.items():
+        notes.add(f"{label}: {count} {FAULTS[fault]}; discarded", lost=fault in (UNREADABLE, OTHER_CLOCK))
 
 
-def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: list[str]) -> WrenchStream | None:
+def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: Notes) -> WrenchStream | None:
     """The stream, None without any message; notes state what was assumed. Raises RecordingError."""
     wrench, topics = decoder.wrench, decoder.topics
-    label = _named(bag, wrench.messages.source.topic)
+    label = bag.spelled(wrench.messages.source.topic)
+    _note_rejected(notes, label, wrench.messages.rejected, wrench.messages.foreign)
     if not wrench.messages.received:
+        if bag.topics.get(label) and topics.wrench != NO_WRENCH and not wrench.messages.foreign:
+            notes.add(f"{label} contains no readable message: contact is found from the geometry alone", lost=True)
         return None
-    notes += _notes(label, wrench.messages.rejected, wrench.messages.foreign)
-    if topics.wrench_axes == WORLD_AXES:
-        notes += _unexpected_frame(bag, decoder, label)
-    else:
-        notes += _turned(bag, wrench, label, decoder)
+    turned = topics.wrench_axes != WORLD_AXES
+    for text in _turned(bag, wrench, label, decoder) if turned else _unexpected_frame(bag, decoder, label):
+        notes.add(text)
     if wrench.bias is not None:
         if wrench.bias.estimate is None:
             problem = wrench.bias.problem or "there is no wrench"
             raise _option_error(bag, "wrench_bias", topics.wrench_bias, f"{problem}, or give {NO_BIAS}")
-        notes.append(f"{label}: subtracted {wrench.bias.estimate.to_text()}")
+        notes.add(f"{label}: subtracted {wrench.bias.estimate.to_text()}")
     return found
 
 

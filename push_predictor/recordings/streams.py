@@ -69,6 +69,17 @@ def joined(streams: Sequence[Stream]) -> Stream:
     return replace(streams[0], **whole)
 
 
+def repeated(stream: PoseStream | WrenchStream) -> BoolArray:
+    """Which samples (n,) of a stream are in it before, with the same stamp and values."""
+    again = np.zeros(len(stream), dtype=np.bool_)
+    if np.all(np.diff(stream.stamp) > 0):
+        return again
+    order = np.argsort(stream.stamp, kind="stable")
+    columns = [of[order] for of in vars(stream).values() if of is not None]
+    again[order[1:]] = np.all([of[1:] == of[:-1] for of in columns], axis=0)
+    return again
+
+
 def set_back(before: PoseStream, after: PoseStream) -> bool:
     """Whether the clock was set back between two portions of a stream."""
     return len(before) > 0 and len(after) > 0 and int(before.stamp[-1]) - int(after.stamp[0]) > CLOCK_SET
@@ -94,7 +105,7 @@ class Recording:
 
     name: stem of its file or folder. wrench: None without a force sensor. scalars: by topic name, the possible
     covariates. notes: sentences about what the reader discarded, repaired or assumed. wrench_bias: what was subtracted
-    from the wrench, None if nothing was.
+    from the wrench, None if nothing was. losses: the notes about data that are missing or cannot be read.
     """
 
     name: str
@@ -105,6 +116,7 @@ class Recording:
     scalars: dict[str, ScalarStream] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     wrench_bias: WrenchBias | None = None
+    losses: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         seconds = 1e-9 * float(self.slider.stamp[-1] - self.slider.stamp[0]) if len(self.slider) else 0.0

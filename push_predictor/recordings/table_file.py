@@ -15,7 +15,8 @@ import numpy as np
 
 from push_predictor.errors import TableError
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.bag.reader import ENDINGS as RECORDINGS
+from push_predictor.recordings.bag.reader import is_bag_file
+from push_predictor.recordings.bag.spreadsheet import ERRORS, cells_of
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table import COLUMNS, INPUTS, OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray, TextArray
@@ -70,7 +71,7 @@ def write_table(path: Path, table: PushTable) -> None:
 
 def is_recording(path: Path) -> bool:
     """Whether a path is a recording (a folder, .mcap, .db3 or .bag) and not a push table."""
-    return Path(path).is_dir() or Path(path).suffix in RECORDINGS
+    return Path(path).is_dir() or is_bag_file(Path(path))
 
 
 def rig_path(path: Path) -> Path:
@@ -89,14 +90,13 @@ def read_cells(path: Path, required: Sequence[str]) -> tuple[dict[str, tuple[str
     """The cells of each column of a CSV by its name, and the line number of each row. Raises TableError."""
     try:
         data = path.read_bytes()
-        text = (gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data).decode("utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        found = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
-    except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
+        found = cells_of(gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data)
+    except (*ERRORS, EOFError) as error:
         raise TableError(f"{path}: cannot be read as CSV ({error})") from None
     if len(found) < 2:
         raise TableError(f"{path}: contains no rows, give a header with {', '.join(required)} and one row per push")
-    header = found[0][1]
+    lower = {name.lower(): name for name in required}
+    header = [lower.get(name.lower(), name) for name in found[0][1]]
     if len(set(header)) != len(header):
         raise TableError(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")
     if missing := [name for name in required if name not in header]:

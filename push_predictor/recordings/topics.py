@@ -13,6 +13,7 @@ from typing import Any
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.fields.up_axis import UP_AXES, Z_UP
 
 ENDING = ".recording.yaml"
 STREAMS = ("slider", "pusher", "wrench")
@@ -20,12 +21,17 @@ WORLD_AXES, TIP_AXES = "world", "tip"
 FREE_MOTION, NO_BIAS = "free_motion", "none"
 NO_WRENCH = "none"  # in place of a topic: contact from geometry alone
 BIASES = (FREE_MOTION, NO_BIAS)
+HEADER_STAMPS, LOG_STAMPS = "header", "log"
+STAMPS = (HEADER_STAMPS, LOG_STAMPS)
+UP = f"{', '.join(UP_AXES[:-1])} or {UP_AXES[-1]}, of some streams STREAM=AXIS,STREAM=AXIS"
 _FIELDS = {  # of Topics, by their names in NAME.recording.yaml, as parameters and as options
     **{f"{name}_topic": name for name in STREAMS},
     "covariate_topics": "covariates",
     "wrench_frame": "wrench_frame",
     "wrench_bias": "wrench_bias",
     "world_frame": "world",
+    "stamp": "stamp",
+    "up": "up",
 }
 KEYS = tuple(_FIELDS)
 
@@ -38,7 +44,9 @@ class Topics:
     type, `/tf:FRAME` a frame; the wrench `none` leaves a recorded one out. covariates: further scalars, each a topic or
     TOPIC.FIELD. world: the frame in which poses from tf are given, and into which tf turns other poses. wrench_frame:
     the axes of the wrench, `world`, `tip`, or a frame in tf. wrench_bias: `free_motion` to estimate and subtract it,
-    `none` not to. Raises RequestError for another one.
+    `none` not to. stamp: `header`, or `log` for the time at which messages were recorded or received. up: the axis of
+    the world that points up, as in `y`, or of single streams, as in `slider=y,wrench=y`. Raises RequestError for other
+    values.
     """
 
     slider: str = ""
@@ -48,10 +56,16 @@ class Topics:
     world: str = ""
     wrench_frame: str = ""
     wrench_bias: str = ""
+    stamp: str = ""
+    up: str = ""
 
     def __post_init__(self) -> None:
         if self.wrench_bias not in ("", *BIASES):
             raise RequestError("wrench_bias", self.wrench_bias, " or ".join(BIASES))
+        if self.stamp not in ("", *STAMPS):
+            raise RequestError("stamp", self.stamp, " or ".join(STAMPS))
+        if self.up and not all(axis in UP_AXES and stream in ("", *STREAMS) for stream, axis in self._ups):
+            raise RequestError("up", self.up, UP)
 
     @property
     def wrench_axes(self) -> str:
@@ -63,6 +77,22 @@ class Topics:
     def wrench_tf_frame(self) -> str:
         """The frame in tf whose axes the wrench has, '' without one; `/tf:tip` is a frame, `tip` is not."""
         return "" if self.wrench_axes else self.wrench_frame.rpartition(":")[2].strip("/")
+
+    @property
+    def from_log(self) -> bool:
+        """Whether samples have the time at which their messages were recorded or received."""
+        return self.stamp == LOG_STAMPS
+
+    def up_of(self, stream: str) -> str:
+        """The axis that points up in the world of a stream. An axis for all is that of the poses."""
+        given = dict(self._ups)
+        return given.get(stream, Z_UP if stream == "wrench" else given.get("", Z_UP))
+
+    @property
+    def _ups(self) -> list[tuple[str, str]]:
+        """(stream, axis) of each part of `up`, '' for all poses."""
+        parts = [part.strip().rpartition("=") for part in self.up.split(",") if part.strip()]
+        return [(stream.strip(), axis.strip()) for stream, _, axis in parts]
 
     def over(self, other: Topics) -> Topics:
         """These topics, and those of another where these are not given."""
@@ -125,8 +155,8 @@ def _parsed(saved: object, path: Path) -> Topics:
     read = {key: _list if key == "covariate_topics" else _text for key in KEYS}
     try:
         return topics_of({key: read[key](value, path, key) for key, value in saved.items()})
-    except RequestError:
-        raise RecordingError(f"{path}: wrench_bias is {saved['wrench_bias']!r}, give {' or '.join(BIASES)}") from None
+    except RequestError as error:
+        raise RecordingError(f"{path}: {error.field} is {error.value!r}, give {error.accepted}") from None
 
 
 def _list(value: object, path: Path, key: str) -> tuple[str, ...]:

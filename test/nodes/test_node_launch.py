@@ -101,8 +101,15 @@ def test_three_nodes_start_with_their_parameters(launch_file):
         "recording": f"{here}/bags/x",
         "rig": f"{here}/a.rig.yaml",
         "play.rate": 10.0,
-        "wait_for_subscribers": 30.0,
     }
+    assert running["push_replay"]["arguments"][3:] == ["-p", "wait_for_subscribers:=30.0"]
+
+
+def test_a_file_of_parameters_overrides_what_the_launch_sets_for_a_replay(launch_file):
+    """Arguments come before the file, as rcl's last value counts; parameters of the launch come after it."""
+    replay = nodes(launch_file, recording="bags/x", use_sim_time="true", params_file="/p.yaml")["push_replay"]
+    assert "play.clock_publish_frequency:=40.0" in replay["arguments"]
+    assert replay["parameters"][0] == "/p.yaml" and "play.clock_publish_frequency" not in parameters(replay)
 
 
 def test_default_is_the_shipped_model_for_server_and_validator(launch_file):
@@ -129,7 +136,7 @@ def test_executables_are_installed_under_their_node_names(launch_file):
     for executable, node in running.items():
         assert (REPOSITORY / "scripts" / "run" / executable).exists()
         assert (node["package"], node["namespace"]) == ("push_predictor", "cell")
-        assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
+        assert node["arguments"][:3] == ["--ros-args", "--log-level", "debug"]
 
 
 def test_nodes_run_in_their_enclaves_of_the_policy(launch_file, record_file):

@@ -6,13 +6,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from replay_bags import POSE, START, WRENCH, push_messages, write_bag
 
+from push_predictor.nodes import push_replay
 from push_predictor.nodes.push_replay import PushReplay
 from push_predictor.online.check_process import CheckProcess
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.topics import Topics, save_topics
 
 LAB = {"/vicon/block/block": "geometry_msgs/msg/TransformStamped", "/tf": "tf2_msgs/msg/TFMessage"}
@@ -79,3 +83,34 @@ def test_damaged_saved_topics_do_not_end_the_replay(bag: Path, monkeypatch: pyte
     bench = Bench(bag, NAMED, monkeypatch)
     bench.check()
     assert len(bench.started) == 1 and len(bench.logged) == 1 and "key 'slider' is not accepted" in bench.logged[0]
+
+
+def test_topics_without_a_schema_are_played_as_the_types_that_they_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    played: list[dict[str, str]] = []
+
+    def made(node: object, topics: dict[str, str], *_: object) -> object:
+        played.append(topics)
+        return SimpleNamespace(skipped={})
+
+    monkeypatch.setattr(push_replay, "ReplayTopics", made)
+    untyped = [(topic, "", time, data) for topic, _, time, data in push_messages(0.1)]
+    blob = [("/blob", "", START, b"\0\1\0\0\1\2\3")]
+    bench = Bench(tmp_path, Topics(), monkeypatch)
+    lists, expressions = (
+        ("topics_to_filter", "exclude_topics_to_filter"),
+        ("regex_to_filter", "exclude_regex_to_filter"),
+    )
+    values = {**{name: list[str]() for name in lists}, **dict.fromkeys(expressions, "")}
+    node: Any = SimpleNamespace(
+        _streams=Topics(),
+        _values={f"play.{name}": value for name, value in values.items()},
+        _ending=Event(),
+        get_logger=bench.get_logger,
+    )
+    PushReplay._open_topics(node, open_bag(write_bag(tmp_path / "a.mcap", untyped + blob)))
+    assert played == [{"/pusher/pose": POSE, "/pusher/wrench": WRENCH, "/slider/pose": POSE}]
+    assert "/blob was recorded without a schema and is not read" in bench.logged
+    PushReplay._open_topics(node, open_bag(write_bag(tmp_path / "b.mcap", blob + [("/slider/pose", *blob[0][1:])])))
+    assert played[1] == {} and "slider_topic 'slider/pose'" in bench.logged[-1]

@@ -14,6 +14,8 @@ from hosted_nodes import refused_start
 from replay_bags import push_messages, write_bag
 
 from push_predictor.nodes import runtime
+from push_predictor.nodes.parameter_tables import PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR
+from push_predictor.nodes.parameters import Param, native
 from push_predictor.nodes.push_replay import PushReplay
 from push_predictor.nodes.replay.topics import is_played
 
@@ -29,6 +31,8 @@ def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ({}, "recording: '' is not accepted"),
         ({"recording": "/nowhere.mcap"}, "/nowhere.mcap: cannot be read"),
         ({"play.rate": -1.0}, "play.rate: -1.0 is not accepted, give a number from 1e-06 up to 1e+06"),
+        ({"up": "q"}, "up: 'q' is not accepted, give x, y, z, -x, -y or -z, of some streams STREAM=AXIS"),
+        ({"stamp": "sent"}, "stamp: 'sent' is not accepted, give header or log"),
         ({"play.rate": "fast"}, "play.rate: 'fast' is not accepted"),
         ({"play.delay": -1.0}, "play.delay: -1.0 is not accepted, give a number from 0"),
         ({"play.read_ahead_queue_size": 0}, "play.read_ahead_queue_size: 0 is not accepted"),
@@ -43,6 +47,14 @@ def test_bad_parameter_ends_in_one_line_and_status_1(
     given = {"recording": second, **params} if params else {}
     line = refused_start(partial(runtime.run, "push_replay", PushReplay), monkeypatch, capfd, **given)
     assert line.startswith("push_replay: ") and text in line
+
+
+@pytest.mark.parametrize("table", [PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR])
+def test_a_bare_y_in_a_parameter_file_is_the_axis(table: tuple[Param, ...]) -> None:
+    by_name = {param.name: param for param in table}
+    for given in (True, "y"):
+        assert by_name["up"].allows(given) and native(by_name["up"], given) == "y"
+    assert not by_name["up"].allows(False) and not by_name["stamp"].allows(True)
 
 
 @pytest.mark.parametrize(

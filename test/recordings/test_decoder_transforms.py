@@ -36,7 +36,7 @@ def original() -> Recording:
 
 def put(buffer: TransformBuffer, messages: list[Message]) -> None:
     for sent, topic, data in messages:
-        buffer.put(Messages.of(topic, TF_TYPES[0], [sent], [data]), topic == "/tf_static", live=True)
+        buffer.put(Messages.of(topic, TF_TYPES[0], [sent], [data]), topic == "/tf_static", np.array([sent]))
 
 
 def taken(buffer: TransformBuffer, messages: list[Message], frame: str, portion: int = 40) -> tuple[IntArray, Array]:

@@ -187,3 +187,12 @@ def test_a_rig_in_the_metadata_of_a_db3_folder_is_read(tmp_path: Path) -> None:
     information["rosbag2_bagfile_information"]["custom_data"] = original().rig.to_record()
     (path / "metadata.yaml").write_text(yaml.safe_dump(information))
     assert_same_windows(replace(read_recording(path, topics=NAMES), name="lab"))
+
+
+def test_a_damaged_name_in_the_tables_of_a_db3_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = db3_file(vicon_and_ur(), tmp_path / "lab")
+    before, found, after = path.read_bytes().rpartition(b"name TEXT NOT NULL,\n      type")
+    assert found
+    path.write_bytes(before + b"\xf1" + found[1:] + after)
+    with pytest.raises(RecordingError, match="is not a readable sqlite3 bag of rosbag2"):
+        open_bag(path)

@@ -248,3 +248,20 @@ def write_ros1(lab: Lab, path: Path) -> Path:
         for stamp, topic, data in lab.in_order():
             writer.write(connections[topic], stamp, bytes(lab.store.cdr_to_ros1(data, lab.kinds[topic])))
     return path
+
+
+def write_without_schema(lab: Lab, path: Path, *topics: str) -> Path:
+    """Write a file in which these topics have no schema, by the package `mcap`."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channels = {}
+        for topic, kind in lab.kinds.items():
+            schema = 0 if topic in topics else writer.register_schema(kind, "ros2msg", lab.definition(kind).encode())
+            channels[topic] = writer.register_channel(topic, "cdr", schema)
+        for stamp, topic, data in lab.in_order():
+            writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()
+    return path

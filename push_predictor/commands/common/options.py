@@ -123,6 +123,18 @@ def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
         help="frame of all poses: tf turns poses of other frames into it. Default: frames in /tf are looked up in "
         "world or the root, other poses keep their frame",
     )
+    group.add_argument(
+        "--stamp",
+        default="",
+        choices=("header", "log"),
+        help="time of each sample: of its header (default), or at which the recorder received it, for all streams",
+    )
+    group.add_argument(
+        "--up",
+        default="",
+        metavar="AXIS|STREAM=AXIS",
+        help="axis of the poses' world that points up: x, y, z (default), -x, -y or -z. Of single streams: slider=y",
+    )
     if not saves:
         group.add_argument("--save-topics", action="store_true", help="save these options in NAME.recording.yaml")
 

@@ -199,7 +199,8 @@ class TransformTopics:
         """Move arrived messages from the middleware into the buffer."""
         for static, subscription in ((True, self._static), (False, self._moving)):
             if taken := [*subscription.taken()]:
-                self.buffer.put(as_messages(taken, subscription.name, TF_TYPE)[0], static, live=True)
+                messages, arrived = as_messages(taken, subscription.name, TF_TYPE)
+                self.buffer.put(messages, static, arrived)
                 self.heard = self.heard if static else monotonic()
 
 

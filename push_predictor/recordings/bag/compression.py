@@ -11,29 +11,59 @@ from pathlib import Path
 import zstandard
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.notes import Notes
 
 ENDING = ".zstd"
+FRAME = b"\x28\xb5\x2f\xfd"  # the first bytes of a zstd frame
 LARGEST_MESSAGE = 1 << 28  # bytes; a foreign bag must not exhaust the memory
+_START = 16  # bytes; enough for the first bytes of each kind of recording
 _AT_ONCE = 1 << 20  # bytes; a message that claims more is decompressed in pieces
 _PIECE, _COMPRESSED_PIECE = 1 << 15, 1 << 10  # bytes; small, because data before damage in the same piece are lost
 
 
-def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
-    """NAME.mcap in the folder, decompressed from NAME.mcap.zstd.
+def is_compressed(file: Path) -> bool:
+    """Whether a file begins as a zstd frame, whatever its name."""
+    return _start(file, len(FRAME)) == FRAME
 
-    A file with another suffix is returned unchanged. A damaged file is decompressed up to the damage, with a note. The
-    result uses at most half of the free disk space. Raises RecordingError if nothing can be decompressed.
+
+def start_of(file: Path) -> bytes:
+    """The first bytes of a file, of a compressed one those of its content; none if they cannot be read."""
+    if not is_compressed(file):
+        return _start(file, _START)
+    try:
+        with file.open("rb") as stream:
+            return zstandard.ZstdDecompressor().stream_reader(stream).read(_START)
+    except (OSError, zstandard.ZstdError):
+        return b""
+
+
+def _start(file: Path, size: int) -> bytes:
+    try:
+        with file.open("rb") as stream:
+            return stream.read(size)
+    except OSError:
+        return b""
+
+
+def unpack_file(file: Path, folder: Path, notes: Notes) -> Path:
+    """A file in the folder, decompressed from a compressed one.
+
+    A damaged file is decompressed up to the damage, with a note. The result uses at most half of the free disk space.
+    Raises RecordingError if nothing can be decompressed.
     """
-    if file.suffix != ENDING:
-        return file
-    target = folder / file.stem
+    target = folder / file.name
     try:
         _unpack(file, target, notes)
     except OSError as error:
         raise RecordingError(f"{file}: cannot be decompressed ({error})") from None
     if not target.stat().st_size:
-        raise RecordingError(f"{file}: cannot be decompressed ({notes.pop() if notes else 'it is empty'})")
+        raise RecordingError(f"{file}: cannot be decompressed ({notes[-1] if notes else 'it is empty'})")
     return target
+
+
+def as_cdr(data: bytes | bytearray) -> bytes:
+    """A recorded message, decompressed if it is a zstd frame: CDR never begins as one. Raises zstandard.ZstdError."""
+    return unpack_message(data) if data[: len(FRAME)] == FRAME else bytes(data)
 
 
 def unpack_message(data: bytes | bytearray) -> bytes:
@@ -54,7 +84,7 @@ def unpack_message(data: bytes | bytearray) -> bytes:
     return bytes(found)
 
 
-def _unpack(file: Path, target: Path, notes: list[str]) -> None:
+def _unpack(file: Path, target: Path, notes: Notes) -> None:
     allowed = shutil.disk_usage(target.parent).free // 2
     with file.open("rb") as packed, target.open("wb") as unpacked:
         reader = zstandard.ZstdDecompressor().stream_reader(packed, _COMPRESSED_PIECE, read_across_frames=True)
@@ -64,4 +94,4 @@ def _unpack(file: Path, target: Path, notes: list[str]) -> None:
                     raise zstandard.ZstdError(f"it needs more than {allowed} bytes, half of the free disk space")
                 unpacked.write(piece)
         except zstandard.ZstdError as error:
-            notes.append(f"{file} at byte {packed.tell()}, or just before: cannot be decompressed ({error})")
+            notes.add(f"{file} at byte {packed.tell()}, or just before: cannot be decompressed ({error})", lost=True)

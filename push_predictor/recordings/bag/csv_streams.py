@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from heapq import merge
@@ -16,8 +15,11 @@ import numpy as np
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
+from push_predictor.recordings.bag.column_units import Column, column_of
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.spreadsheet import ERRORS, cells_of
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -47,16 +49,16 @@ class CsvStreams:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder
-        self.notes: list[str] = []
+        self.notes = Notes()
         self.schemas: dict[str, str] = {}
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, Mapping[str, str]] = {}
         self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
         for file in _files(folder):
-            if file.suffix == ".csv" or file.stem in STREAMS or _parquet_is_read():
-                self._streams |= _streams(file)
+            if file.suffix.lower() == ".csv" or file.stem.lower() in STREAMS or _parquet_is_read():
+                self._streams |= _streams(file, self.notes)
             else:
-                self.notes.append(f"{file.name} is ignored; {PARQUET}")
+                self.notes.add(f"{file.name} is ignored; {PARQUET}")
 
     @property
     def topics(self) -> dict[str, str]:
@@ -75,12 +77,13 @@ class CsvStreams:
 
 def is_csv_recording(folder: Path) -> bool:
     """Whether a folder contains the two streams that a recording needs."""
-    return {"slider", "pusher"} <= {file.stem for file in _files(folder)}
+    return {"slider", "pusher"} <= {file.stem.lower() for file in _files(folder)}
 
 
 def _files(folder: Path) -> list[Path]:
     """The files of the streams; of one with both endings the CSV file."""
-    found = {file.stem: file for ending in ("parquet", "csv") for file in sorted(folder.glob(f"*.{ending}"))}
+    files = sorted(folder.iterdir())
+    found = {f.stem: f for ending in (".parquet", ".csv") for f in files if f.suffix.lower() == ending}
     return [file for _, file in sorted(found.items())]
 
 
@@ -92,22 +95,42 @@ def _parquet_is_read() -> bool:
     return True
 
 
-def _streams(file: Path) -> dict[str, tuple[str, IntArray, list[bytes]]]:
+def _streams(file: Path, notes: Notes) -> dict[str, tuple[str, IntArray, list[bytes]]]:
     header, rows = _cells(file)
-    if file.stem not in STREAMS:
-        if header[0] != "time" or len(header) < 2:
+    columns = _columns(file, header)
+    if (stream := file.stem.lower()) not in STREAMS:
+        if columns[0].name != "time" or len(header) < 2:
             raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
-        stamp, values = _numbers(file, header, rows)
-        columns = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
+        stamp, values = _numbers(file, header, rows, columns[0].factor)
+        scalars = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
         layout = STAMPED_SCALAR_LAYOUT
-        return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in columns.items()}
-    topic, accepted = STREAMS[file.stem]
-    if header not in accepted:
+        return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in scalars.items()}
+    topic, accepted = STREAMS[stream]
+    by_name = {column.name: place for place, column in enumerate(columns)}
+    names = next((names for names in accepted if {*names} == {*by_name} and len(names) == len(columns)), None)
+    if names is None:
         choice = " or ".join(repr(",".join(names)) for names in accepted)
         raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give {choice}")
-    stamp, values = _numbers(file, header, rows)
-    kind, layout, spatial = _as_message(header, values)
+    order = [by_name[name] for name in names]
+    _note_units(file, columns, notes)
+    factors = [columns[place].factor for place in order]
+    in_order = [(line, [row[place] for place in order]) for line, row in rows]
+    stamp, values = _numbers(file, [header[place] for place in order], in_order, factors[0])
+    kind, layout, spatial = _as_message(names, values * np.array(factors[1:], np.float64))
     return {topic: (kind, stamp, encode(stamp, spatial, layout))}
+
+
+def _columns(file: Path, header: Sequence[str]) -> list[Column]:
+    try:
+        return [column_of(text) for text in header]
+    except ValueError as error:
+        raise RecordingError(f"{file} line 1: {error}") from None
+
+
+def _note_units(file: Path, columns: Sequence[Column], notes: Notes) -> None:
+    """Note the columns that are converted to SI units."""
+    if converted := [f"{column.name} in {column.unit}" for column in columns if column.factor != 1]:
+        notes.add(f"{file.name}: {', '.join(converted)} is converted to SI units")
 
 
 def _as_message(header: Sequence[str], values: Array) -> tuple[str, Layout, Array]:
@@ -123,13 +146,11 @@ def _as_message(header: Sequence[str], values: Array) -> tuple[str, Layout, Arra
 
 def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
     """The header, and the rows with their line numbers."""
-    if file.suffix == ".parquet":
+    if file.suffix.lower() == ".parquet":
         return _parquet_cells(file)
     try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream, strict=True)
-            found = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        found = cells_of(file.read_bytes())
+    except ERRORS as error:
         raise RecordingError(f"{file}: cannot be read as CSV ({error})") from None
     if len(found) < 2:
         raise RecordingError(f"{file}: contains no rows, give a header and one row for each sample")
@@ -157,27 +178,36 @@ def _parquet_cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[st
     return tuple(table.column_names), list(enumerate(cells, start=2))
 
 
-def _numbers(file: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> tuple[IntArray, Array]:
-    """Stamps (n,) in ns and the other columns (n, k); an empty cell is NaN."""
+def _numbers(
+    file: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], seconds: Decimal
+) -> tuple[IntArray, Array]:
+    """Stamps (n,) in ns and the other columns (n, k); an empty cell is NaN. seconds: unit of the time."""
     stamp, values = np.zeros(len(rows), np.int64), np.zeros((len(rows), len(header) - 1))
     for place, (line, row) in enumerate(rows):
-        stamp[place] = _stamp(file, line, row[0])
+        stamp[place] = _stamp(file, line, row[0], seconds)
         for column, cell in enumerate(row[1:]):
             try:
                 values[place, column] = float(cell or "nan")
             except ValueError:
+                accepted = f"a number{_with_point(cell)}, or leave it empty"
                 raise RecordingError(
-                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give a number, or leave it empty"
+                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give {accepted}"
                 ) from None
     return stamp, values
 
 
-def _stamp(file: Path, line: int, cell: str) -> int:
+def _stamp(file: Path, line: int, cell: str, seconds: Decimal) -> int:
     """A time in ns. A float has no room for the nanoseconds of a date, a decimal has."""
     try:
-        found = Decimal(cell).scaleb(9)
+        found = (Decimal(cell) * seconds).scaleb(9)
     except InvalidOperation:
         found = Decimal("nan")
     if not found.is_finite() or not 0 <= found < _LATEST:
-        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give s from 0 to {_LATEST // 10**9}")
+        accepted = f"s from 0 to {_LATEST // 10**9}{_with_point(cell)}"
+        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give {accepted}")
     return round(found)
+
+
+def _with_point(cell: str) -> str:
+    """What a number with a comma lacks, in a file that has decimal points as well."""
+    return " with a decimal point" if "," in cell else ""

@@ -14,7 +14,7 @@ import zlib
 from array import array
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
@@ -26,6 +26,7 @@ from mcap.records import Channel, ChunkIndex, McapRecord, Metadata, MetadataInde
 from mcap.stream_reader import StreamReader
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.compression import FRAME, as_cdr
 from push_predictor.recordings.bag.mcap_records import (
     HEAD,
     LARGEST_CHUNK,
@@ -39,7 +40,8 @@ from push_predictor.recordings.bag.mcap_records import (
     unpack_chunk,
 )
 from push_predictor.recordings.bag.messages import Messages, RawMessage
-from push_predictor.types import IntArray
+from push_predictor.recordings.bag.notes import Notes
+from push_predictor.types import BoolArray, IntArray
 
 _Bytes: TypeAlias = bytes | bytearray
 _MESSAGE = struct.Struct("<BQHIQQ")  # with its head
@@ -85,6 +87,11 @@ class _Page:
         """Where in the file the records at a place begin."""
         return self._offsets[bisect_right(self._begins, place) - 1]
 
+    def compressed(self, start: IntArray) -> BoolArray:
+        """Which messages, by where they begin, are compressed: CDR begins with another byte than a zstd frame."""
+        within = np.minimum(start, self.size - 1)  # of an empty message at the end
+        return np.asarray(np.frombuffer(self.records, np.uint8)[within] == FRAME[0])
+
     def joined(self, start: IntArray, length: IntArray) -> bytes:
         """Parts of the records one after the other; most messages of a topic have one length."""
         if (length == length[0]).all():
@@ -99,21 +106,20 @@ class McapFile:
 
     topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if
     unknown}; metadata: {record name: {key: value}}; notes: damage found so far, with file and byte offset
-    (opening reads the summary, messages() the rest). unpack turns a recorded message into CDR and raises one of
-    UNREADABLE if it cannot; name: of the file in notes, by default its path.
+    (opening reads the summary, messages() the rest). A channel without a schema has the type '' unless `topics` is
+    completed. name: of the file in notes, by default its path.
 
     Raises RecordingError for a file that is empty or not MCAP.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[_Bytes], bytes] = bytes, name: str = "") -> None:
+    def __init__(self, path: Path, *, name: str = "") -> None:
         self.path = path
         self.topics: dict[str, str] = {}
         self.schemas: dict[str, str] = {}
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, dict[str, str]] = {}
-        self.notes: list[str] = []
+        self.notes = Notes()
         self._name = name or str(path)
-        self._unpack = unpack
         self._channels: dict[int, Channel] = {}  # of two different descriptions the first
         self._types: dict[int, str] = {}
         self._listed: int | None = None  # number of messages in the summary
@@ -145,9 +151,11 @@ class McapFile:
             places = np.frombuffer(page.places, np.int64).reshape(-1, 4)  # damaged times have more than 63 bits
             for number, of in self._wanted(topics).items():
                 _, time, start, end = places[places[:, 0] == number].T
-                if self._unpack is bytes and len(time):
+                if not len(time):
+                    continue
+                if not page.compressed(start).any():
                     yield Messages(*of, time, page.joined(start, end - start), end - start)
-                elif len(time):
+                else:
                     spans = zip(start.tolist(), end.tolist(), strict=True)
                     data = {row: self._unpacked(page, *span) for row, span in enumerate(spans)}
                     known = {row: each for row, each in data.items() if each is not None}
@@ -171,7 +179,7 @@ class McapFile:
                     page = _Page()
             yield page
         if self._listed not in (None, seen):
-            self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
+            self._lost(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
     def _find(self, content: _Bytes, offset: int, page: _Page, topics: Collection[str] | None) -> int:
         """Add the places of the messages among consecutive records to a page; returns their number.
@@ -198,7 +206,7 @@ class McapFile:
             if at != size and offset != self._cut:
                 raise ValueError(f"the last record of a chunk ends at byte {at} of {size}")
         except UNREADABLE as error:
-            self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
+            self._lost(offset, f"a record cannot be read ({error or type(error).__name__})")
         for number in sorted(set(page.places[before::4])):
             self._check_channel(number, topics, offset)
         return (len(page.places) - before) // 4
@@ -206,7 +214,7 @@ class McapFile:
     def _unpacked(self, page: _Page, start: int, end: int) -> bytes | None:
         """A message as CDR, None if it cannot be decompressed."""
         try:
-            return self._unpack(page.records[start:end])
+            return as_cdr(page.records[start:end])
         except UNREADABLE:
             page.undone[page.offset_of(start)] += 1
             return None
@@ -214,15 +222,15 @@ class McapFile:
     def _leave(self, page: _Page) -> None:
         """Note what could not be decompressed; the next chunk is read when this one is no longer in memory."""
         for offset, count in page.undone.items():
-            self._note(offset, f"{count} messages cannot be decompressed and were skipped")
+            self._lost(offset, f"{count} messages cannot be decompressed and were skipped")
         page.records = b""
 
     def _check_channel(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
         """Note a channel that has no description, or one that is wanted and has another encoding than CDR."""
         if (known := self._channels.get(channel)) is None:
-            self._note(offset, f"channel {channel} has no description; its messages were skipped")
+            self._lost(offset, f"channel {channel} has no description; its messages were skipped")
         elif topics and known.topic in topics and known.message_encoding != "cdr":
-            self._note(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
+            self._lost(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
 
     # --- the records of the data ---
 
@@ -244,7 +252,7 @@ class McapFile:
                 content = self._content(stream, opcode, offset, length, follows)
                 known = follows or opcode in _WITH_LENGTHS
             except UNREADABLE as error:
-                self._note(offset, str(error) or type(error).__name__)
+                self._lost(offset, str(error) or type(error).__name__)
                 content, known = b"", follows
             yield opcode, offset, content
             del content
@@ -286,7 +294,7 @@ class McapFile:
                 # In a file with an end, or with chunks after this one, bytes are missing within it.
                 if self._closed or next_chunk(stream, offset + 1) is not None:
                     raise ValueError(self._lost_from(offset))
-                self._note(offset, self._lost_from(offset))
+                self._lost(offset, self._lost_from(offset))
                 self._cut = offset
             return unpack_chunk(stream, head)
         except UNREADABLE as error:
@@ -300,7 +308,7 @@ class McapFile:
     def _wanted(self, topics: Collection[str] | None) -> dict[int, tuple[str, str]]:
         """Topic and type by CDR channel, of all topics or of the given ones."""
         return {
-            channel.id: (channel.topic, self._types.get(channel.schema_id, ""))
+            channel.id: (channel.topic, self._types.get(channel.schema_id) or self.topics[channel.topic])
             for channel in self._channels.values()
             if channel.message_encoding == "cdr" and (topics is None or channel.topic in topics)
         }
@@ -372,7 +380,7 @@ class McapFile:
         self._end_checked = True
         _, _, stated = _DATA_END.unpack(read_at(stream, end, _DATA_END.size).ljust(_DATA_END.size, b"\0"))
         if stated and _checksum(stream, end) != stated:  # 0: none was computed
-            self._note(end, "the checksum of the data is wrong; they are damaged somewhere before it")
+            self._lost(end, "the checksum of the data is wrong; they are damaged somewhere before it")
         if self._summary_start in (0, end + _DATA_END.size):
             return
         try:  # bytes were lost or inserted; the summary still lists the offsets of the chunks
@@ -382,14 +390,16 @@ class McapFile:
         listed = [record.chunk_start_offset for record in summary if isinstance(record, ChunkIndex)]
         if moved := [place for place, found in zip_longest(listed, chunks) if place != found]:
             there = f"{len(chunks)} chunks were found, the summary lists {len(listed)}"
-            self._note(moved[0] or self._size, f"a chunk is missing or has moved; {there}")
+            self._lost(moved[0] or self._size, f"a chunk is missing or has moved; {there}")
 
-    def _note(self, offset: int, what: str) -> None:
+    def _lost(self, offset: int, what: str) -> None:
+        self._note(offset, what, lost=True)
+
+    def _note(self, offset: int, what: str, *, lost: bool = False) -> None:
         text = f"{self._name} at byte {offset}: {what}"
         if len(self.notes) >= MOST_NOTES:
             text = f"{self._name}: further damage is not listed"
-        if text not in self.notes:
-            self.notes.append(text)
+        self.notes.add(text, lost=lost)
 
 
 def _checked_size(path: Path, name: str) -> int:

@@ -11,11 +11,13 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from push_predictor.errors import RecordingError
 
 _RULE = "=" * 80
 _LINE = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+(\w+)\s*(.*)$")
+_STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.|$)")
 _DEEPEST = 8  # levels of nested types that are searched
 
 
@@ -51,16 +53,61 @@ def fields_of_types(definitions: Mapping[str, tuple[Field, ...]], type_name: str
     return list(_paths(definitions, short_name(type_name), wanted, "", _DEEPEST))
 
 
+class Step(NamedTuple):
+    """A step of a field path: the name of a field, and what is in the brackets after it, None without brackets."""
+
+    name: str
+    choice: str | None
+
+    @property
+    def text(self) -> str:
+        """As it was written."""
+        return self.name if self.choice is None else f"{self.name}[{self.choice}]"
+
+    @property
+    def chooses(self) -> bool:
+        """Whether an element is chosen by what is in it, not by its number."""
+        return self.choice is not None and not self.choice.isdecimal()
+
+
+def steps_of(path: str) -> list[Step]:
+    """The steps of a field path such as `poses[0]` or `bodies[name=block].pose`; none if it is no path."""
+    found, at = list[Step](), 0
+    while at < len(path):
+        if (step := _STEP.match(path, at)) is None:
+            return []
+        found.append(Step(step[1], step[2]))
+        at = step.end()
+    return [] if path.endswith(".") else found
+
+
 def type_at(definitions: Mapping[str, tuple[Field, ...]], type_name: str, path: str) -> str | None:
-    """The type of one value at a field path such as `pose.pose` or `poses[0]`, None if there is no such field."""
-    name = short_name(type_name)
-    for part in path.split("."):
-        step, _, index = part.partition("[")
-        field = next((field for field in definitions.get(name, ()) if field.name == step), None)
-        if field is None or (field.array is None) != (not index) or (index and not re.fullmatch(r"\d+\]", index)):
+    """The type of the value at a field path, of a whole array as in `float64[16]`; None if there is no such field."""
+    name, steps = short_name(type_name), steps_of(path)
+    for number, step in enumerate(steps, start=1):
+        field = next((field for field in definitions.get(name, ()) if field.name == step.name), None)
+        if field is None or (field.array is None and step.choice is not None):
+            return None
+        if field.array is not None and step.choice is None:
+            return f"{field.type}[{field.array or ''}]" if number == len(steps) else None
+        if step.chooses and not _can_choose(definitions, field.type, str(step.choice)):
             return None
         name = field.type
-    return name
+    return name if steps else None
+
+
+def _can_choose(definitions: Mapping[str, tuple[Field, ...]], element: str, choice: str) -> bool:
+    """Whether elements of a type contain what a choice names: KEY=VALUE, or any text."""
+    key, given, _ = choice.partition("=")
+    if given:
+        return not {"/", "["} & {*(type_at(definitions, element, key) or "/")}
+    return bool(choice) and has_text(definitions, element)
+
+
+def has_text(definitions: Mapping[str, tuple[Field, ...]], type_name: str, depth: int = _DEEPEST) -> bool:
+    """Whether a type has a text, but for those in arrays."""
+    fields = [field for field in definitions.get(type_name, ()) if field.array is None] if depth else []
+    return any(field.type == "string" or has_text(definitions, field.type, depth - 1) for field in fields)
 
 
 def _paths(
@@ -70,6 +117,8 @@ def _paths(
         path = f"{prefix}{field.name}{'' if field.array is None else '[0]'}"
         if field.type in wanted:
             yield path
+        elif f"{field.type}[{field.array}]" in wanted:
+            yield f"{prefix}{field.name}"
         else:
             yield from _paths(definitions, field.type, wanted, f"{path}.", depth - 1)
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
 
 METADATA_FILE = "metadata.yaml"
@@ -24,15 +25,11 @@ _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """files: as in relative_file_paths; custom_data: {record name: {key: value}}; notes: faults found.
-
-    compression: what rosbag2 compressed in addition to MCAP, 'file', 'message' or ''.
-    """
+    """files: as in relative_file_paths; custom_data: {record name: {key: value}}; notes: faults found."""
 
     files: tuple[str, ...] = ()
     custom_data: dict[str, Mapping[str, object]] = field(default_factory=dict)
-    compression: str = ""
-    notes: list[str] = field(default_factory=list)
+    notes: Notes = field(default_factory=Notes)
 
 
 @dataclass(frozen=True)
@@ -67,8 +64,11 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         return BagMetadata()
     except (*_DAMAGED, yaml.YAMLError) as error:
         reason = str(error).replace("\n", " ")
-        return BagMetadata(notes=[f"{path}: cannot be read ({reason}); the files are used in order of name"])
-    return BagMetadata(files, _records(information.get("custom_data")), _compression(information, path))
+        unread = BagMetadata()
+        unread.notes.add(f"{path}: cannot be read ({reason}); the files are used in order of name")
+        return unread
+    _check_kinds(information, path)
+    return BagMetadata(files, _records(information.get("custom_data")))
 
 
 def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, object]]:
@@ -161,17 +161,14 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
     ]
 
 
-def _compression(information: Mapping[str, object], path: Path) -> str:
-    """What rosbag2 compressed: 'file', 'message' or ''. Raises RecordingError for another storage."""
+def _check_kinds(information: Mapping[str, object], path: Path) -> None:
+    """Raise RecordingError for a storage or a compression that is not read; else the bytes show what they are."""
     if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", "sqlite3", ""):
         raise RecordingError(f"{path}: storage {storage!r} is not accepted, give mcap or sqlite3")
     mode = str(information.get("compression_mode") or "none").lower()
     kind = str(information.get("compression_format") or "").lower()
-    if mode == "none":
-        return ""
-    if mode not in ("file", "message") or kind != "zstd":
+    if mode != "none" and (mode not in ("file", "message") or kind != "zstd"):
         raise RecordingError(f"{path}: compression {kind!r} by {mode} is not accepted, give zstd by file or message")
-    return mode
 
 
 def _records(custom_data: object) -> dict[str, Mapping[str, object]]:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.compression import unpack_file, unpack_message
+from push_predictor.recordings.bag.compression import ENDING, is_compressed, start_of, unpack_file
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
 from push_predictor.recordings.bag.mcap_file import McapFile
+from push_predictor.recordings.bag.mcap_records import MAGIC as MCAP
 from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
@@ -21,6 +22,7 @@ from push_predictor.recordings.bag.metadata import (
     embedded_records,
     read_bag_metadata,
 )
+from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.ros1_file import MAGIC as ROS1
 from push_predictor.recordings.bag.ros1_file import Ros1File
 from push_predictor.recordings.bag.sqlite_file import MAGIC as SQLITE
@@ -30,6 +32,7 @@ __all__ = ["Bag", "RawMessage", "open_bag"]
 
 BagFile = McapFile | SqliteFile | Ros1File | CsvStreams
 ENDINGS = (".mcap", ".db3", ".bag")
+MOST_GAPS = 20  # missing files that are named
 
 
 class Bag:
@@ -61,7 +64,10 @@ class Bag:
     @property
     def topics(self) -> dict[str, str]:
         """{topic: type}, by topic name."""
-        merged = {topic: kind for file in self.files[::-1] for topic, kind in file.topics.items()}
+        merged: dict[str, str] = {}
+        for file in self.files:
+            for topic, kind in file.topics.items():
+                merged[topic] = merged.get(topic) or kind
         return dict(sorted(merged.items()))
 
     @property
@@ -81,14 +87,27 @@ class Bag:
         return {**embedded_records(records), **self._described.custom_data, **records}
 
     @property
-    def notes(self) -> list[str]:
+    def notes(self) -> Notes:
         """Sentences about the damage found so far."""
-        own = [*self._described.notes, *(note for file in self.files for note in file.notes)]
-        return own + [
-            f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which is used"
-            for name, record in self._described.custom_data.items()
-            if any(file.metadata.get(name, record) != record for file in self.files)
-        ]
+        found = Notes()
+        for each in (self._described.notes, *(file.notes for file in self.files)):
+            found.add_all(each)
+        for name, record in self._described.custom_data.items():
+            if any(file.metadata.get(name, record) != record for file in self.files):
+                found.add(
+                    f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which is used"
+                )
+        return found
+
+    def spelled(self, name: str) -> str:
+        """The bag's own spelling of a topic's name, with a slash before it if there is no such topic."""
+        return next((topic for topic in self.topics if topic.strip("/") == name.strip("/")), f"/{name.strip('/')}")
+
+    def set_type(self, topic: str, kind: str) -> None:
+        """State the type of a topic where its schema is missing."""
+        for file in self.files:
+            if file.topics.get(topic) == "":
+                file.topics[topic] = kind
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
@@ -107,22 +126,31 @@ class Bag:
 def open_bag(path: Path) -> Bag:
     """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them or of CSV or Parquet streams.
 
-    The first bytes of a file decide which it is. Raises RecordingError without such files, or if all are empty or
-    foreign; a single such file becomes a note.
+    The first bytes of a file decide which it is, and whether it is compressed. Raises RecordingError without such
+    files, or if all are empty or foreign; a single such file becomes a note.
     """
     path = Path(path)
-    if not path.is_dir():
-        return Bag(path, [_file(path)], BagMetadata())
-    described = read_bag_metadata(path)
-    if not (files := _listed(path, described) or _found(path)):
+    described = read_bag_metadata(path) if path.is_dir() else BagMetadata()
+    if not (files := _files(path, described) if path.is_dir() else [path]):
         if is_csv_recording(path):
             return Bag(path, [CsvStreams(path)], described)
-        raise RecordingError(
-            f"{path}: contains no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
-        )
-    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
+        files_needed = "no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
+        raise RecordingError(f"{path}: contains {files_needed}{_sheets(path)}")
+    packed = any(map(_packed, files))
+    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if packed else None
     folder = None if scratch is None else Path(scratch.name)
     return Bag(path, _opened(files, described, folder), described, scratch)
+
+
+def is_bag_file(path: Path) -> bool:
+    """Whether a file is a recording, by its name or by its first bytes."""
+    return _ending(path) in ENDINGS or _begins_as_bag(path)
+
+
+def _sheets(folder: Path) -> str:
+    """What to do with spreadsheets in a folder, '' without any."""
+    found = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in (".xlsx", ".xls", ".ods"))
+    return f"; save the sheets of {found[0]} as these CSV files" if found else ""
 
 
 def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[BagFile]:
@@ -136,42 +164,78 @@ def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> 
             refused.append(error)
     if not opened:
         raise refused[0]
-    described.notes.extend(f"{error}; the other files are used" for error in refused)
+    for reason in refused:
+        described.notes.add(f"{reason}; the other files are used", lost=True)
     return opened
 
 
 def _open(file: Path, described: BagMetadata, scratch: Path | None) -> BagFile:
-    if scratch is not None:
-        unpacked = unpack_file(file, scratch, described.notes)
-        return _file(unpacked, name=str(file) if unpacked == file else f"{file}, decompressed,")
-    return _file(file, unpack=unpack_message if described.compression == "message" else bytes)
+    if scratch is None or not _packed(file):
+        return _file(file)
+    return _file(unpack_file(file, scratch, described.notes), name=f"{file}, decompressed,")
 
 
-def _file(path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> BagFile:
+def _file(path: Path, *, name: str = "") -> BagFile:
     """A file of the kind that its first bytes show."""
-    try:
-        with path.open("rb") as stream:
-            start = stream.read(len(SQLITE))
-    except OSError:
-        start = b""  # McapFile states why
+    start = start_of(path)
     if start.startswith(SQLITE):
-        return SqliteFile(path, unpack=unpack, name=name)
-    return Ros1File(path) if start.startswith(ROS1) else McapFile(path, unpack=unpack, name=name)
+        return SqliteFile(path, name=name)
+    return Ros1File(path) if start.startswith(ROS1) else McapFile(path, name=name)
 
 
-def _listed(folder: Path, described: BagMetadata) -> list[Path]:
-    """The existing files named in metadata.yaml, in its order."""
+def _files(folder: Path, described: BagMetadata) -> list[Path]:
+    """The files named in metadata.yaml, in its order; if none of them is there, those that are found."""
     # Older bags have the folder's name before the file's.
-    named = [folder / Path(name).name for name in described.files]
-    absent = [file.name for file in named if not file.is_file()]
-    described.notes.extend(f"{folder}: {name} is listed in {METADATA_FILE} but missing" for name in absent)
-    return [file for file in named if file.is_file()]
+    named = [_packed_or_not(folder / Path(name).name) for name in described.files]
+    files = [file for file in named if file.is_file()] or _found(folder)
+    for file in named:
+        if not file.is_file():
+            absent = f"{folder}: {file.name} is listed in {METADATA_FILE} but missing"
+            described.notes.add(absent, lost=len(files) < len(named))  # else all were renamed
+    if len(files) >= len(named):
+        for name in _gaps(folder, files):
+            described.notes.add(f"{folder}: {name} is missing between the numbered files", lost=True)
+    return files
+
+
+def _gaps(folder: Path, files: list[Path]) -> list[str]:
+    """The names that are missing if all files are the numbered parts of a recording, which rosbag2 counts from 0."""
+    parts = [re.fullmatch(r"(.*_)(\d+)", file.name.partition(".")[0]) for file in files]
+    found = [(part[1], int(part[2])) for part in parts if part]
+    if len(found) < len(files) or len({name for name, _ in found}) != 1:
+        return []
+    (name, _), numbers = found[0], {number for _, number in found}
+    first = 0 if name == f"{folder.name}_" else min(numbers)
+    return [f"{name}{number}" for number in range(first, max(numbers)) if number not in numbers][:MOST_GAPS]
+
+
+def _packed_or_not(file: Path) -> Path:
+    """The file, or the same one compressed or decompressed since the list was written."""
+    others = (file.with_name(f"{file.name}{ENDING}"), file.with_name(file.name.removesuffix(ENDING)))
+    return next((each for each in (file, *others) if each.is_file()), file)
 
 
 def _found(folder: Path) -> list[Path]:
-    """The files of the folder, bag_2 before bag_10; of several kinds, those of the first in ENDINGS."""
-    kinds = ([*folder.glob(f"*{ending}")] for ending in ENDINGS)
-    return sorted(next(filter(None, kinds), []), key=_numbered)
+    """The files of the folder, bag_2 before bag_10; of several kinds, those of the first in ENDINGS.
+
+    Where no name ends so, those that begin as a bag.
+    """
+    files = sorted((file for file in folder.iterdir() if file.is_file()), key=_numbered)
+    kinds = ([file for file in files if _ending(file) == ending] for ending in ENDINGS)
+    return next(filter(None, kinds), None) or [file for file in files if _begins_as_bag(file)]
+
+
+def _ending(file: Path) -> str:
+    """The suffix of a name, without that of compression."""
+    return Path(file.name.removesuffix(ENDING)).suffix
+
+
+def _packed(file: Path) -> bool:
+    return file.suffix == ENDING or is_compressed(file)
+
+
+def _begins_as_bag(file: Path) -> bool:
+    return start_of(file).startswith((MCAP, SQLITE, ROS1))
 
 
 def _numbered(file: Path) -> list[tuple[str, int]]:

@@ -14,6 +14,7 @@ from typing import Any
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.notes import Notes
 
 MAGIC = b"#ROSBAG"
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
@@ -28,7 +29,7 @@ class Ros1File:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.notes: list[str] = []
+        self.notes = Notes()
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, Mapping[str, str]] = {}
         with _opened(path) as reader:
@@ -54,7 +55,7 @@ class Ros1File:
                 except StopIteration:
                     break
                 except (ReaderError, *_DAMAGE) as error:
-                    self._note(f"damaged after {read} messages ({error or type(error).__name__}); the rest is not read")
+                    self._lost(f"damaged after {read} messages ({error or type(error).__name__}); the rest is not read")
                     break
                 read += 1
                 kind = _lower_package(c.msgtype)
@@ -63,7 +64,7 @@ class Ros1File:
                 except (SerdeError, *_DAMAGE):
                     undone += 1
         if undone:
-            self._note(f"{undone} messages do not fit the definition of their type and were skipped")
+            self._lost(f"{undone} messages do not fit the definition of their type and were skipped")
 
     def _registered(self, connection: Any) -> str:
         """The type of a connection, known to the store from now on."""
@@ -75,15 +76,14 @@ class Ros1File:
                 found = get_types_from_msg(_lower_package(connection.msgdef.data), kind)
                 self._store.register({name: fields for name, fields in found.items() if name not in self._store.types})
             except (TypesysError, *_DAMAGE) as error:
-                self._note(f"{connection.topic}: the definition of {kind} cannot be read ({error})")
+                self._lost(f"{connection.topic}: the definition of {kind} cannot be read ({error})")
         return kind
 
     def _definition(self, kind: str) -> str:
         return str(self._store.generate_msgdef(kind, ros_version=2)[0]) if kind in self._store.types else ""
 
-    def _note(self, what: str) -> None:
-        if (text := f"{self.path}: {what}") not in self.notes:
-            self.notes.append(text)
+    def _lost(self, what: str) -> None:
+        self.notes.add(f"{self.path}: {what}", lost=True)
 
 
 @contextmanager

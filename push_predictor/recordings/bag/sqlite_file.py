@@ -9,15 +9,18 @@ Python contains sqlite3, so that these bags need no further package.
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.compression import as_cdr
 from push_predictor.recordings.bag.mcap_records import UNREADABLE
 from push_predictor.recordings.bag.messages import RawMessage
+from push_predictor.recordings.bag.notes import Notes
 
 MAGIC = b"SQLite format 3\0"
+_DAMAGE = (sqlite3.Error, UnicodeDecodeError)  # the latter: of names in a damaged schema
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
 
 
@@ -27,9 +30,9 @@ class SqliteFile:
     Raises RecordingError for a file that is not a bag of rosbag2.
     """
 
-    def __init__(self, path: Path, *, unpack: Callable[[bytes | bytearray], bytes] = bytes, name: str = "") -> None:
-        self.path, self._name, self._unpack = path, name or str(path), unpack
-        self.notes: list[str] = []
+    def __init__(self, path: Path, *, name: str = "") -> None:
+        self.path, self._name = path, name or str(path)
+        self.notes = Notes()
         self._channels: dict[int, tuple[str, str]] = {}
         self.qos: dict[str, str] = {}
         try:
@@ -37,7 +40,7 @@ class SqliteFile:
                 self._read_topics(database)
                 self.schemas = self._read_definitions(database)
                 self.metadata = self._read_metadata(database)
-        except (sqlite3.Error, OSError) as error:
+        except (*_DAMAGE, OSError) as error:
             raise RecordingError(f"{self._name}: is not a readable sqlite3 bag of rosbag2 ({error})") from None
 
     @property
@@ -59,15 +62,15 @@ class SqliteFile:
                         undone += 1  # in a damaged file a cell may have any type
                         continue
                     try:
-                        message = self._unpack(data)
+                        message = as_cdr(data)
                     except UNREADABLE:
                         undone += 1
                     else:
                         yield RawMessage(*wanted[number], time, message)
-        except sqlite3.Error as error:
-            self._note(f"damaged after {read} messages ({error}); the rest is not read")
+        except _DAMAGE as error:
+            self._lost(f"damaged after {read} messages ({error}); the rest is not read")
         if undone:
-            self._note(f"{undone} messages cannot be read or decompressed and were skipped")
+            self._lost(f"{undone} messages cannot be read or decompressed and were skipped")
 
     def _opened(self) -> sqlite3.Connection:
         # A recorder that was killed leaves a write-ahead log; without one nothing is written next to the bag.
@@ -83,10 +86,10 @@ class SqliteFile:
             f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
         ):
             if not (isinstance(topic, str) and isinstance(kind, str)):
-                self._note(f"the topic number {number} has no readable name or type; its messages were skipped")
+                self._lost(f"the topic number {number} has no readable name or type; its messages were skipped")
                 continue
             if encoding != "cdr":
-                self._note(f"{topic} is encoded as {encoding!r}, cdr is accepted; its messages were skipped")
+                self._lost(f"{topic} is encoded as {encoding!r}, cdr is accepted; its messages were skipped")
                 continue
             self._channels[number] = (topic, kind)
             self.qos[topic] = offered or ""
@@ -105,9 +108,8 @@ class SqliteFile:
         found = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
         return {"rosbag2": {"serialized_metadata": found[0]}} if found else {}
 
-    def _note(self, what: str) -> None:
-        if (text := f"{self._name}: {what}") not in self.notes:
-            self.notes.append(text)
+    def _lost(self, what: str) -> None:
+        self.notes.add(f"{self._name}: {what}", lost=True)
 
 
 def _has(database: sqlite3.Connection, table: str) -> bool:

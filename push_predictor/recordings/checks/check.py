@@ -3,7 +3,7 @@
 
 """Check a recording or a push table before anything is learnt from it.
 
-The stages are asked in order: streams, frames, clocks, geometry, force; the coverage of the windows follows in
+The stages are asked in order: losses, streams, frames, clocks, geometry, force; the coverage of the windows follows in
 checked.py. Each works on what the stages before have accepted, and leaves out what their findings explain.
 """
 
@@ -14,6 +14,7 @@ from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import frame_stage
 from push_predictor.recordings.checks.geometry import geometry_stage
+from push_predictor.recordings.checks.losses import loss_stage
 from push_predictor.recordings.checks.stream_checks import stream_stage
 from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.checks.units import table_units
@@ -22,7 +23,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 
-STAGES = (stream_stage, frame_stage, clock_stage, geometry_stage, force_stage)
+STAGES = (loss_stage, stream_stage, frame_stage, clock_stage, geometry_stage, force_stage)
 
 
 def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:

@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.motion import Motion, motion_of
+from push_predictor.recordings.checks.stream_facts import StreamFacts
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 
@@ -19,12 +20,16 @@ from push_predictor.recordings.streams import Recording
 class Evidence:
     """A recording, as far as the stages so far accept its samples, its rig, and what they found.
 
+    facts: of the streams "slider" and "pusher", where they have enough samples; empty before the stage of streams.
     A stage takes it and returns it with its own findings. It does not look for what an earlier finding explains.
+    synchronous: whether single pushes show that the accepted stamps of slider and tip are on one clock.
     """
 
     recording: Recording
     rig: Rig
     findings: tuple[Finding, ...] = ()
+    facts: Mapping[str, StreamFacts] = field(default_factory=dict)
+    synchronous: bool = False
 
     @property
     def refused(self) -> bool:

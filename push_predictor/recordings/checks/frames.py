@@ -12,7 +12,8 @@ from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.geometry import tip_follows
 from push_predictor.recordings.checks.motion import Motion, body_velocity
-from push_predictor.recordings.checks.units import orientation_finding
+from push_predictor.recordings.checks.orientation import orientation_finding
+from push_predictor.recordings.checks.up import up_findings
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array, BoolArray
@@ -27,9 +28,13 @@ LEAST_SHARE = 0.1  # of the body's motion that no push explains, where the tip i
 def frame_stage(evidence: Evidence) -> Evidence:
     """Whether the tracked body lies on the surface, and which way it is up."""
     recording, rig, motion = evidence.recording, evidence.rig, evidence.motion
+    raised = up_findings(recording, rig)
+    if any(finding.severity == "refused" for finding in raised):
+        return evidence.found(raised)
+    evidence = evidence.found(raised)
     if held := fixed_to_tip(motion, rig):
         return evidence.found([held])
-    oriented = orientation_finding(recording.slider)
+    oriented = orientation_finding(recording.slider, rig)
     # A tip has a constant heading too: the exchange of topics explains more, and the geometry shows it.
     if oriented is not None and oriented.severity == "refused" and tip_follows(motion, recording, rig):
         return evidence

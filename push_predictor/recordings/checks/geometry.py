@@ -17,15 +17,22 @@ from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
-from push_predictor.recordings.checks.outline_findings import FEWEST_PUSHES, frames_apart, outline_findings, unchecked
-from push_predictor.recordings.checks.outline_fit import SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
-from push_predictor.recordings.checks.units import orientation_finding
+from push_predictor.recordings.checks.motion import SPANS, Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.orientation import orientation_finding
+from push_predictor.recordings.checks.outline_findings import (
+    FEWEST_PUSHES,
+    LAG_ALLOWANCE,
+    frames_apart,
+    outline_findings,
+    unchecked,
+)
+from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
 FEWEST_CONTACTS = 20  # samples
+LEAST_STEADY = 0.7  # share of the contact without its begin and end, up to which those do not distort a robust fit
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
@@ -35,6 +42,7 @@ FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wro
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
 RIGHT_HANDED = "Use right-handed frames, seen from above."
+FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up slider=-z` does that."
 IN_ORDER = "Give x before y, in right-handed frames seen from above."
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
 
@@ -62,8 +70,8 @@ MIRRORS = {
     "heading_clockwise": Mirror(
         (1.0, 0.0), (0.0, 1.0), -1.0, _sign("heading"), "Negate the heading: counter-clockwise is positive."
     ),
-    "frame_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), -1.0, _sign("y axis and heading"), RIGHT_HANDED),
-    "frame_mirrored_x": Mirror((-1.0, 0.0), (0.0, 1.0), -1.0, _sign("x axis and heading"), RIGHT_HANDED),
+    "frame_mirrored": Mirror((1.0, 0.0), (0.0, -1.0), -1.0, _sign("y axis and heading"), FROM_ABOVE),
+    "frame_mirrored_x": Mirror((-1.0, 0.0), (0.0, 1.0), -1.0, _sign("x axis and heading"), FROM_ABOVE),
     "axes_exchanged": Mirror(
         (0.0, 1.0), (1.0, 0.0), -1.0, "The slider's x and y axes are exchanged, its heading too.", IN_ORDER
     ),
@@ -76,9 +84,13 @@ MIRRORS = {
 
 
 def geometry_stage(evidence: Evidence) -> Evidence:
-    """Whether the tip's positions in contact fit the outline."""
+    """Whether the tip's positions in contact fit the outline; unknown where a tilted view distorts them."""
+    if evidence.has("world_tilted"):
+        return evidence
     found = geometry_findings(evidence.recording, evidence.rig, evidence.motion)
-    oriented = orientation_finding(evidence.recording.slider)
+    if evidence.synchronous:
+        found = [finding for finding in found if finding.name != "clocks_apart"]
+    oriented = orientation_finding(evidence.recording.slider, evidence.rig)
     if oriented is not None and oriented.severity == "refused" and all(each.name != "topics_swapped" for each in found):
         found = [oriented]
     return evidence.found(found)
@@ -91,14 +103,16 @@ def geometry_findings(recording: Recording, rig: Rig, motion: Motion | None) -> 
     """
     if (contacts := contacts_of(motion)) is None:
         return _without_contact(recording, rig, motion)
-    fit = fit_outline(contacts, rig)
+    if motion is not None and (pushes := _too_brief(motion, rig)) is not None:
+        return [unchecked(pushes)]
+    contacts, fit = _fit_on_one_clock(recording, rig, contacts)
     if rig.outline.rotational_symmetry == 0 and _leads(motion) > AT_REST > 3.0 * _leads(
         motion_of(swapped(recording), rig)
     ):
         return [_swapped(fit.gap)]
     if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
-    if fit.gap >= LARGE_GAP or _is_implausible(fit, rig):
+    if fit.gap >= LARGE_GAP + contacts.noise or _is_implausible(fit, rig):
         return _findings_of_large_gap(recording, rig, motion, contacts, fit)
     found = outline_findings(contacts, rig, fit)
     return found and (_mirror_image_findings(contacts, rig, fit.gap, BETTER * fit.gap) or found)
@@ -136,9 +150,39 @@ def contacts_of(motion: Motion | None) -> Contacts | None:
     """The samples in contact, None if there are too few."""
     if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
         return None
-    touch = motion.contact
+    steady, touch = int(np.sum(motion.steady)), motion.contact
+    vague = motion.span > SPANS[0] or steady < LEAST_STEADY * np.sum(touch)  # where a contact begins and ends
+    if vague and steady >= FEWEST_CONTACTS:
+        touch = motion.steady
     tips = to_body(motion.tip, motion.slider)[touch]
-    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch])
+    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch], motion.noise)
+
+
+def _too_brief(motion: Motion, rig: Rig) -> int | None:
+    """The number of pushes that are steady, None unless they are few because others are too fast or too short.
+
+    A tip that hits a slider at high speed loses it again, and is at the outline for a moment only.
+    """
+    steady, pushes = len(np.unique(motion.push[motion.steady])), np.unique(motion.push[motion.contact])
+    if steady >= FEWEST_PUSHES or len(pushes) < FEWEST_PUSHES:
+        return None
+    gap = np.abs(rig.outline.project(to_body(motion.tip, motion.slider)).distance - rig.pusher_radius)
+    nearest = [float(np.min(gap[motion.contact & (motion.push == push)])) for push in pushes]
+    return steady if np.median(nearest) < WindowOptions().touch_gap else None
+
+
+def _fit_on_one_clock(recording: Recording, rig: Rig, contacts: Contacts) -> tuple[Contacts, OutlineFit]:
+    """The contacts and their fit, once more with the stamps corrected where the clocks are apart."""
+    fit = fit_outline(contacts, rig)
+    lag = float(fit.estimate[LAG])
+    if abs(lag) <= LAG_ALLOWANCE or fit.gap > LARGE_GAP + contacts.noise:
+        return contacts, fit
+    slider = recording.slider
+    corrected = replace(recording, slider=replace(slider, stamp=slider.stamp - round(1e9 * lag)))
+    if (again := contacts_of(motion_of(corrected, rig))) is None:
+        return contacts, fit
+    better = fit_outline(again, rig)
+    return (replace(again, lag=lag), better) if better.cost < fit.cost else (contacts, fit)
 
 
 def _gap(recording: Recording, rig: Rig) -> float:

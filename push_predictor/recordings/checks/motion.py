@@ -20,9 +20,18 @@ from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
-SPAN = 0.05  # s before and after a sample that determine its speed
-MOVING = 0.003  # m/s: a faster slider moves, whatever the tracker's noise
+SPANS = (
+    0.05,
+    0.07,
+    0.1,
+    0.14,
+    0.2,
+    0.28,
+    0.4,
+)  # s before and after a sample that determine its speed: the first that noise allows
+MOVING_SHARE, MOVING = 0.4, 0.01  # of the lowered tip's speed; m/s: the noise of a slider's speed is to be smaller
 NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
+STEADY, STEADY_TIP = 0.5, 0.3  # change of velocity, as a share of it, of a slider and a tip that neither hit nor part
 FEWEST = 5  # samples of each stream
 OFF = 0.001  # m from the outline
 
@@ -32,9 +41,11 @@ class Motion:
     """n samples at the slider's stamps.
 
     time (n,) s; slider (n, 3): x, y m, heading rad, unwrapped; tip (n, 2) m; tip_height (n,) m above its lowest place;
-    tip_velocity (n, 2) and tip_speed (n,) m/s, means over SPAN on both sides; force (n, 2) N on the tip, NaN if
-    unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip. push (n,):
-    number of the contact.
+    tip_velocity (n, 2) and tip_speed (n,) m/s, means over SPANS[0] on both sides; force (n, 2) N on the tip, NaN if
+    unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip; steady (n,): in
+    contact and neither begins nor ends to move, so that the tip is at the outline. push (n,): number of the contact.
+    noise: standard deviation (m) of the outline's place in one sample, by the tracker's noise. span: s around a
+    sample, on both sides, that determine the slider's speed.
     """
 
     time: Array
@@ -46,7 +57,10 @@ class Motion:
     force: Array
     moving: BoolArray
     contact: BoolArray
+    steady: BoolArray
     push: IntArray
+    noise: float = 0.0
+    span: float = SPANS[0]
 
 
 @dataclass(frozen=True)
@@ -101,17 +115,21 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
         return None
     time = time[order]
     pose = np.column_stack([slider.x, slider.y, np.unwrap(slider.heading)])[order]
-    tip = _at(time, tip_time[tip_order], np.column_stack([pusher.x, pusher.y, pusher.z])[tip_order])
-    velocity, turn = _velocity(time, pose), np.sqrt(rig.outline.polar_moment)
-    tip_velocity = _velocity(time, tip[:, :2])
-    speed = np.hypot(np.hypot(velocity[:, 0], velocity[:, 1]), turn * velocity[:, 2])
-    tip_speed, options = np.hypot(*tip_velocity.T), WindowOptions()
+    tip = values_at(time, tip_time[tip_order], np.column_stack([pusher.x, pusher.y, pusher.z])[tip_order])
+    tip_velocity, options = _velocity(time, tip[:, :2], SPANS[0]), WindowOptions()
+    tip_speed = np.hypot(*tip_velocity.T)
     lowered = tip[:, 2] - slider.z[order] < options.lift
-    moving = speed > np.clip(NOISE * _speed_noise(pose * [1.0, 1.0, turn]), options.least_speed, MOVING)
+    pushing = tip_speed[lowered & (tip_speed > options.least_speed)]
+    slider_speed = _SliderSpeed(time, pose, rig, MOVING_SHARE * float(np.median(pushing)) if len(pushing) else MOVING)
+    moving = slider_speed.moving
     contact = moving & lowered & (tip_speed > options.least_speed)
+    steady = contact & slider_speed.steady & _is_steady(*_halves(time, tip[:, :2], SPANS[0]), STEADY_TIP)
     force = _force(recording, origin, time)
+    noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    return Motion(time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, moving, contact, number)
+    return Motion(
+        time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, moving, contact, steady, number, noise
+    )
 
 
 def body_velocity(motion: Motion) -> Array:
@@ -157,20 +175,60 @@ def _seconds(stamp: IntArray, origin: int) -> Array:
     return np.asarray(1e-9 * (stamp - origin))
 
 
-def _at(time: Array, known: Array, values: Array) -> Array:
+def values_at(time: Array, known: Array, values: Array) -> Array:
+    """Values (n, k) at times (n,) s, between those (m, k) known at times (m,) s."""
     return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 
-def _velocity(time: Array, values: Array) -> Array:
-    """Mean velocities (n, k) from SPAN before to SPAN after each sample."""
-    before, after = np.maximum(time - SPAN, time[0]), np.minimum(time + SPAN, time[-1])
-    return np.asarray((_at(after, time, values) - _at(before, time, values)) / (after - before)[:, None])
+def _velocity(time: Array, values: Array, span: float) -> Array:
+    """Mean velocities (n, k) from a span (s) before to one after each sample."""
+    before, after = np.maximum(time - span, time[0]), np.minimum(time + span, time[-1])
+    return np.asarray((values_at(after, time, values) - values_at(before, time, values)) / (after - before)[:, None])
 
 
-def _speed_noise(values: Array) -> float:
-    """Standard deviation (m/s) of the speed at rest, from the second differences of n samples (n, k), m."""
-    spread = SD * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0)
-    return float(np.max(spread) * np.sqrt(2.0) / (2.0 * SPAN))
+def _halves(time: Array, values: Array, span: float) -> tuple[Array, Array]:
+    """Mean velocities (n, k) in a span (s) before, and in one after each sample."""
+    before, after = values_at(time - span, time, values), values_at(time + span, time, values)
+    return (values - before) / span, (after - values) / span
+
+
+def _is_steady(before: Array, after: Array, share: float, noise: float = 0.0) -> BoolArray:
+    """Whether velocities (n, k) differ by less than a share of the larger one, and the noise (m/s) of their change."""
+    largest = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
+    return np.asarray(np.linalg.norm(after - before, axis=1) < share * largest + noise)
+
+
+class _SliderSpeed:
+    """Which samples (n,) of a slider's poses (n, 3) move, and which move steadily; turns count at the outline.
+
+    span: s before and after a sample that determine its speed.
+    """
+
+    def __init__(self, time: Array, pose: Array, rig: Rig, wanted: float = MOVING) -> None:
+        place = pose * [1.0, 1.0, np.sqrt(rig.outline.polar_moment)]
+        wanted = min(wanted, MOVING)
+        self.span = next((span for span in SPANS if NOISE * _speed_noise(place, span) < wanted), SPANS[-1])
+        noise = _speed_noise(place, self.span)
+        least = max(NOISE * noise, WindowOptions().least_speed)
+        self.moving = np.linalg.norm(_velocity(time, place, self.span), axis=1) > least
+        before, after = _halves(time, place, self.span)
+        both = np.minimum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)) > least
+        self.steady = self.moving & both & _is_steady(before, after, STEADY, NOISE * noise)
+
+
+def moving_slider(time: Array, pose: Array, rig: Rig) -> BoolArray:
+    """Which samples (n,) of a slider move; time (n,) s, pose (n, 3): x, y m, heading rad, unwrapped."""
+    return np.asarray(_SliderSpeed(time, pose, rig).moving)
+
+
+def noise_of(values: Array) -> Array:
+    """Standard deviations (k,) of the noise of n samples (n, k), from their second differences."""
+    return np.asarray(SD * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0))
+
+
+def _speed_noise(values: Array, span: float) -> float:
+    """Standard deviation (m/s) of the speed at rest of n samples (n, k), m."""
+    return float(np.max(noise_of(values)) * np.sqrt(2.0) / (2.0 * span))
 
 
 def _force(recording: Recording, origin: int, time: Array) -> Array:
@@ -180,7 +238,7 @@ def _force(recording: Recording, origin: int, time: Array) -> Array:
         return np.full((len(time), 2), np.nan)
     stamp, rows = np.unique(wrench.stamp, return_index=True)
     known = _seconds(stamp, origin)
-    force = _at(time, known, np.column_stack([wrench.fx, wrench.fy])[rows])
+    force = values_at(time, known, np.column_stack([wrench.fx, wrench.fy])[rows])
     around = np.concatenate([[-np.inf], known, [np.inf]])
     after = np.searchsorted(around, time)
     missing = around[after] - around[after - 1] > LONGEST_BREAK

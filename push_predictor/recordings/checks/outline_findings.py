@@ -39,6 +39,7 @@ from push_predictor.types import Array
 Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "proportions"]
 DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
 LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
+SLOWEST_FILTER = 0.2  # s of delay
 SEPARATE = 0.0002  # m; sd of size and tip radius, fitted together, above which the contacts do not separate them
 FINE = 0.0001  # m; a spread of the pushes below it leaves nothing to explain
 LARGEST_TIP_CHANGE = 0.55  # relative; a diameter given as the radius is a change of 0.5
@@ -67,7 +68,7 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
         found.append(_size(contacts, rig, cause))
     if cause.name == "tip_radius":
         found.append(_tip(cause, rig))
-    return [*found, *_clock_findings(cause.fit), *_shape_findings(cause.fit, rig)]
+    return [*found, *_clock_findings(cause.fit, contacts.lag), *_shape_findings(cause.fit, rig)]
 
 
 def value_of(fit: OutlineFit, parameter: int, unit: str, offset: float = 0.0) -> Value:
@@ -202,14 +203,23 @@ def _frames_apart(fit: OutlineFit) -> Finding:
     return Finding("frames_apart", "warning", sentence, advice, {"frame_yaw": yaw, **frame})
 
 
-def _clock_findings(fit: OutlineFit) -> list[Finding]:
-    if not _exceeds(fit, LAG, LAG_ALLOWANCE):
-        return []
-    lag, sd = float(fit.estimate[LAG]), float(fit.sd[LAG])
-    side = "late" if lag > 0.0 else "early"
-    sentence = f"The slider's stamps are {1e3 * abs(lag):.0f} ms {side} (sd {1e3 * sd:.2g} ms) against the pusher's."
+def _clock_findings(fit: OutlineFit, corrected: float) -> list[Finding]:
+    """corrected: the lag (s) that the fitted samples no longer have."""
+    lag = value_of(fit, LAG, "s", corrected)
+    return [clocks_apart(lag)] if abs(lag.value) > DOUBT * (lag.sd or 0.0) + LAG_ALLOWANCE else []
+
+
+def clocks_apart(lag: Value, the: str = "The") -> Finding:
+    """The finding that the slider's stamps are late (s), or early."""
+    side, sd = "late" if lag.value > 0.0 else "early", 1e3 * (lag.sd or 0.0)
+    size = f"{1e3 * abs(lag.value):.0f} ms" if abs(lag.value) < 10.0 else f"{abs(lag.value):.1f} s"
+    sentence = f"{the} slider's stamps are {size} {side} (sd {sd:.2g} ms) against the pusher's."
     advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
-    return [Finding("clocks_apart", "warning", sentence, advice, {"lag": Value(lag, "s", sd)})]
+    if 0.0 < lag.value < SLOWEST_FILTER:
+        advice += (
+            " A filter of the tracker has the same effect, and so has a commanded pose of the tip: record neither."
+        )
+    return Finding("clocks_apart", "warning", sentence, advice, {"lag": lag})
 
 
 @dataclass(frozen=True, eq=False)

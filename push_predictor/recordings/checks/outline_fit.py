@@ -12,7 +12,7 @@ samples of a push share their errors.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,8 @@ MOST_EVALUATIONS = 40  # of the gaps by a fit
 SMALLEST_GAIN = 1e-4  # relative change of the cost at which a fit ends: it moves the estimate by a fraction of its sd
 STARTS = 12  # turns from which the fit begins
 TIE = 1.3  # ratio of the gaps up to which the smallest turn is preferred: an almost symmetric outline has several
+NOISY = 4.0  # standard deviations of the median gap of a push
+MEDIAN_SD = 1.25  # of a median, in standard deviations of the mean
 MOST_PUSHES = 0.8  # share of the pushes that lie within `spread`: a push in five may be disturbed
 
 
@@ -50,17 +52,21 @@ class Contacts:
     """n samples in contact.
 
     tips (n, 2) m and velocities (n, 2) m/s of the tip in the slider's frame; push (n,): number of the push; poses
-    (n, 3) of the slider in the world frame: x, y (m) and heading (rad).
+    (n, 3) of the slider in the world frame: x, y (m) and heading (rad). noise: standard deviation (m) of the outline's
+    place in one sample. lag: of the slider's stamps, s, that is corrected in these samples.
     """
 
     tips: Array
     velocities: Array
     push: IntArray
     poses: Array
+    noise: float = 0.0
+    lag: float = 0.0
 
     def at(self, rows: IntArray | BoolArray) -> Contacts:
         """The chosen samples: indices, or a mask (n,)."""
-        return Contacts(self.tips[rows], self.velocities[rows], self.push[rows], self.poses[rows])
+        own = {name: getattr(self, name)[rows] for name in ("tips", "velocities", "push", "poses")}
+        return replace(self, **own)
 
     def drawn(self, count: int) -> Contacts:
         """At most `count` evenly drawn samples."""
@@ -77,8 +83,8 @@ class OutlineFit:
     minus that along its y. estimate and sd are 0 where a parameter was not fitted.
 
     gap: median absolute gap that is left, m; cost: its mean, m; push_gaps (pushes,): the median of each push, m,
-    signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples. centre (2,):
-    mean place of the tip, m, world frame.
+    signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples, push_noise
+    (pushes,) its standard deviation by the tracker's noise, m. centre (2,): mean place of the tip, m, world frame.
     """
 
     estimate: Array
@@ -88,6 +94,7 @@ class OutlineFit:
     push_gaps: Array
     push_contacts: Array
     push_samples: IntArray
+    push_noise: Array
     centre: Array
 
     @property
@@ -101,13 +108,13 @@ class OutlineFit:
         return float(np.quantile(np.abs(self.push_gaps), MOST_PUSHES))
 
     def off(self, outline: Outline, allowance: float) -> BoolArray:
-        """Which pushes (pushes,) have a larger gap (m).
+        """Which pushes (pushes,) have a larger gap (m), by more than the noise of their samples explains.
 
         Not those at corners, which are rounded, nor short ones: a jump of the slider's pose may look like a contact.
         """
         judged = _away_from_corners(outline, self.push_contacts) >= CORNER
         judged &= self.push_samples >= SHORT * np.median(self.push_samples)
-        return np.asarray((np.abs(self.push_gaps) > allowance) & judged)
+        return np.asarray((np.abs(self.push_gaps) > allowance + NOISY * self.push_noise) & judged)
 
 
 def fit_outline(contacts: Contacts, rig: Rig) -> OutlineFit:
@@ -180,8 +187,8 @@ def _fit(
     sd, cost, samples = problem.deviation(estimate), problem.cost(estimate), np.array([len(each) for each in rows])
     if turns := problem.outline.rotational_symmetry:
         estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
-    gap = float(np.median(np.abs(gaps)))
-    return OutlineFit(estimate, sd, gap, cost, gaps[middle], nearest.contact[middle], samples, problem.centre)
+    gap, noise = float(np.median(np.abs(gaps))), MEDIAN_SD * contacts.noise / np.sqrt(samples)
+    return OutlineFit(estimate, sd, gap, cost, gaps[middle], nearest.contact[middle], samples, noise, problem.centre)
 
 
 class Placed(NamedTuple):

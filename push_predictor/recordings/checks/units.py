@@ -1,14 +1,14 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lengths in millimetres, angles in degrees, times in milliseconds, quaternions with w first or not recorded."""
+"""Lengths in millimetres, angles in degrees, times in milliseconds."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.orientation import OUTRUN, STEEP, TRAVEL, tilt_of, turn_and_path
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
@@ -19,23 +19,25 @@ LARGEST = 2.0  # m: reach of a slider
 HIGHEST_RATE = 20e3  # Hz of samples
 LOWEST_RATE = 1.0  # Hz
 LONGEST = 30.0  # s of a table's row
-STILL = 1e-5  # rad; a tracker's noise is larger
-STEEP = np.radians(45.0)  # a slider lies flat, while w read as x rolls it by pi minus its heading
-FROZEN = 0.2  # rad; w read as x leaves a heading of about twice the true tilt
-COVERED = 95.0  # percentile: few samples may be tracked wrongly
-TRAVEL = 0.02  # m of a slider that also turns
-OUTRUN = 5.0  # path lengths of the tip; a slider does not move farther in a window, nor turn by more path lengths
-TURN_SPAN = 0.05  # s between the poses whose turns are summed
 PUSHER_MM = "Give positions in metres: divide by 1000."
 
 
+def stream_rates(recording: Recording) -> list[Finding]:
+    """Findings about the unit of the stamps."""
+    streams = (("slider", recording.slider), ("pusher", recording.pusher))
+    found = [_rate(name, stream) for name, stream in streams if len(stream) > 2]
+    return [finding for finding in found if finding is not None]
+
+
 def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
-    """Findings about the units of a recording's streams and rig."""
+    """Findings about the units of lengths and angles of a recording's streams and rig."""
     found = [_rig_length(rig)]
-    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        if len(stream) > 2:
-            found += [_rate(name, stream) or _speed(name, stream)]
-    if not any(found):
+    found += [
+        _speed(name, stream)
+        for name, stream in (("slider", recording.slider), ("pusher", recording.pusher))
+        if len(stream) > 2
+    ]
+    if not any(found) and tilt_of(recording.slider) <= STEEP:  # of a steep z axis, headings may be anything
         found.append(_turning(recording.slider, rig))
     return [finding for finding in found if finding is not None]
 
@@ -57,31 +59,6 @@ def table_units(table: PushTable, rig: Rig | None = None) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
-def orientation_finding(slider: PoseStream) -> Finding | None:
-    """A finding if the orientations of a slider that moves have another order of components, or are missing."""
-    x, y = slider.x[np.isfinite(slider.x)], slider.y[np.isfinite(slider.y)]
-    if not (len(x) and len(y)) or np.hypot(np.ptp(x), np.ptp(y)) < TRAVEL:
-        return None
-    tilt, largest = _tilt(slider), float(np.nanmax(np.abs(slider.heading)))
-    values = {"tilt": Value(tilt, "rad")}
-    if tilt > STEEP:
-        up = f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical"
-        if float(np.nanpercentile(np.abs(slider.heading), COVERED)) < FROZEN:
-            sentence = f"{up} and its heading does not change: the quaternion's order is probably w, x, y, z."
-            return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.", values)
-        advice = "Give a tracked frame whose z axis points up: contacts are mirrored otherwise."
-        return Finding("slider_tilted", "warning", f"{up}.", advice, values)
-    if largest > STILL:
-        return None
-    sentence = "The slider moves and its heading is exactly 0 throughout: its orientation is probably not recorded."
-    return Finding("heading_constant", "refused", sentence, "Record the orientation of the slider.")
-
-
-def _tilt(slider: PoseStream) -> float:
-    """The tilt (rad) that few samples exceed. The median would be small for w first and headings near pi."""
-    return 0.0 if slider.tilt is None or not len(slider.tilt) else float(np.nanpercentile(slider.tilt, COVERED))
-
-
 def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding | None:
     if value <= most:
         return None
@@ -100,7 +77,10 @@ def _rig_length(rig: Rig) -> Finding | None:
 
 
 def _rate(name: str, stream: PoseStream) -> Finding | None:
-    rate = 1.0 / max(1e-9 * float(np.median(np.diff(stream.stamp))), 1e-9)
+    step = np.diff(stream.stamp)
+    if not np.any(step > 0):
+        return None
+    rate = 1.0 / (1e-9 * float(np.median(step[step > 0])))  # a sample that was sent twice adds none
     if LOWEST_RATE <= rate <= HIGHEST_RATE:
         return None
     sentence = f"The {name}'s stamps give {rate:.3g} samples a second: the unit of the stamps is probably ms or us."
@@ -127,14 +107,8 @@ def _speed(name: str, stream: PoseStream) -> Finding | None:
 
 
 def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
-    """A pushed slider turns about as far as it moves, in terms of its size."""
-    usable = np.isfinite(slider.x + slider.y + slider.heading)
-    period = 1e-9 * float(np.median(np.diff(slider.stamp))) if len(slider) > 1 else TURN_SPAN
-    pose = np.column_stack([slider.x, slider.y, slider.heading])[usable][
-        :: max(1, round(TURN_SPAN / max(period, 1e-6)))
-    ]
-    step = np.diff(pose, axis=0)
-    turn, path = float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
+    """A finding if the slider turns farther than a pushed one."""
+    turn, path = turn_and_path(slider)
     if turn * rig.outline.reach <= OUTRUN * max(path, TRAVEL):
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."

@@ -31,10 +31,11 @@ from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import SCALAR_TARGET, TF_TYPES, Source
+from push_predictor.recordings.fields.up_axis import bodies_z_up, z_up
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import Topics
-from push_predictor.types import IntArray
+from push_predictor.types import Array, IntArray
 
 _RULES = {"slider": SLIDER, "pusher": PUSHER}
 FAR = 3_600_000_000_000  # ns from the poses' stamps, at which the stamp of a scalar is of another clock
@@ -70,19 +71,20 @@ class StreamDecoder:
         self.poses: dict[str, PoseTopic | PoseFrame] = {
             name: PoseFrame(source, rules, self.tf[key_of(source.topic)])
             if (source := sources[name]).frame
-            else PoseTopic(name, source, rules, first, topics.world, expected)
+            else PoseTopic(name, source, rules, first, topics, expected)
             for name, rules in _RULES.items()
         }
         self.wrench = WrenchInput(sources["wrench"], topics, first, "" if topics.world else expected)
-        self.scalars = {
-            name_of(source): TopicInput(source, SCALAR_TARGET) for name, source in named if name == COVARIATE
-        }
+        self.scalars = {name_of(source): self._scalar_input(source) for name, source in named if name == COVARIATE}
         self.headless = 0
         self._span: tuple[int, int] | None = None  # of the stamps (ns) of the last poses
 
     def add_scalar(self, source: Source) -> TopicInput:
         """Decode a further scalar."""
-        return self.scalars.setdefault(name_of(source), TopicInput(source, SCALAR_TARGET))
+        return self.scalars.setdefault(name_of(source), self._scalar_input(source))
+
+    def _scalar_input(self, source: Source) -> TopicInput:
+        return TopicInput(source, SCALAR_TARGET, from_log=self.topics.from_log)
 
     def inputs(self) -> dict[str, TopicInput]:
         """The inputs that are messages of a topic, by stream or name of the scalar."""
@@ -110,7 +112,7 @@ class StreamDecoder:
         """Add messages of a topic; those that no stream needs are ignored. arrived (n,): when, ns, of live ones."""
         key = key_of(messages.topic)
         if (buffer := self.tf.get(key.removesuffix(STATIC))) is not None and messages.type in TF_TYPES:
-            buffer.put(messages, key.endswith(STATIC), live=arrived is not None)
+            buffer.put(messages, key.endswith(STATIC), arrived)
             return
         for each in self.inputs().values():
             if key_of(each.source.topic) == key and each.kind:
@@ -118,15 +120,22 @@ class StreamDecoder:
 
     def take(self, last: bool = False) -> Samples:
         """The usable samples that are known with the messages since the last call; last: no more will come."""
-        slider, pusher = (self.poses[name].take(last) for name in POSES)
+        slider, pusher = (self._taken(name, last) for name in POSES)
         for stamp, _ in (slider, pusher):
             self._span = (int(stamp.min()), int(stamp.max())) if len(stamp) else self._span
         self.headless += int(np.sum(~has_orientation(pusher[1])))
         self.wrench.world, self.wrench.named = self.world, self.named
+        slider = slider[0], bodies_z_up(slider[1], self.topics.up_of("slider"))
         wrench = self.wrench.take(slider, pusher, last)
         for buffer in self.tf.values():
             buffer.forget()
+        pusher = pusher[0], bodies_z_up(pusher[1], self.topics.up_of("pusher"))
         return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench, self.take_scalars(last))
+
+    def _taken(self, name: str, last: bool) -> tuple[IntArray, Array]:
+        """Stamps (n,) ns and poses (n, 7) of slider or pusher in a world whose z axis is up."""
+        stamp, values = self.poses[name].take(last)
+        return stamp, z_up(values, self.topics.up_of(name))
 
     def take_scalars(self, last: bool = False) -> dict[str, ScalarStream]:
         """The samples of the scalars alone; they wait for the first pose, which has the right clock."""
@@ -169,7 +178,7 @@ def _buffers(topics: Topics, sources: Mapping[str, Source], expected: str) -> di
     if not names and (topics.world or topics.wrench_tf_frame):
         names = [key_of(TF)]
     return {
-        name: TransformBuffer([source.frame for source in frames if key_of(source.topic) == name], world)
+        name: TransformBuffer([s.frame for s in frames if key_of(s.topic) == name], world, topics.from_log)
         for name in names
     }
 

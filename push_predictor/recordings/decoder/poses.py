@@ -18,6 +18,7 @@ from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.fields.sources import POSE_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
+from push_predictor.recordings.topics import Topics
 from push_predictor.types import Array, IntArray
 
 Names: TypeAlias = NDArray[np.str_]
@@ -27,15 +28,17 @@ WAIT = 2_000_000_000  # ns that a pose in another frame waits for its transform
 class PoseTopic:
     """Poses in the messages of a topic. name: of the stream.
 
-    world: the frame into which tf turns poses that name another, '' to take them as they are; then headers must name
-    the frame `expected`, '' for any.
+    topics.world: the frame into which tf turns poses that name another, '' to take them as they are; then headers must
+    name the frame `expected`, '' for any.
     """
 
-    def __init__(self, name: str, source: Source, rules: Rules, tf: TransformBuffer, world: str, expected: str) -> None:
-        self.messages = TopicInput(source, POSE_TARGET, "" if world else expected)
+    def __init__(
+        self, name: str, source: Source, rules: Rules, tf: TransformBuffer, topics: Topics, expected: str
+    ) -> None:
+        self.messages = TopicInput(source, POSE_TARGET, "" if topics.world else expected, topics.from_log)
         self.problem = ""  # why poses are not turned
         self._name, self._rules, self._tf = name, rules, tf
-        self._world = world
+        self._world = topics.world
         self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 7))
         self._frame: Names = np.empty(0, np.str_)
 

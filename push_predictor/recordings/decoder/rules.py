@@ -19,6 +19,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 SMALLEST_COMPONENT = 1e-6  # a quaternion without a larger component has no orientation
 PLANAR_WRENCH = (0, 1, 5)  # columns of fx, fy and the torque about the vertical
 UNREADABLE, OTHER_FRAME, NO_TRANSFORM = "unreadable", "frame_id", "without transform"
+NO_ELEMENT = "without element"
 NOT_FINITE, NO_ORIENTATION, OTHER_CLOCK = "not finite", "no orientation", "another clock"
 
 Rules: TypeAlias = Mapping[str, Callable[[Array], BoolArray]]  # {fault: which of the numbers (n, k) have it}

@@ -8,12 +8,13 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.decoder.rules import OTHER_FRAME, UNREADABLE, Rules, broken, usable
+from push_predictor.recordings.decoder.rules import NO_ELEMENT, OTHER_FRAME, UNREADABLE, Rules, broken, usable
 from push_predictor.recordings.fields.sources import (
     Columns,
     FieldReader,
@@ -33,11 +34,12 @@ class TopicInput:
     """received: number of messages. rejected: unusable ones by fault; foreign: those of another type, by type.
 
     named: the frames that headers have named; expected: the one that they must name, '' for any. dropped: messages of
-    a live topic that nobody took in time. `put` may be called in any thread, the others in one.
+    a live topic that nobody took in time. from_log: samples have the time of receipt, or of the log.
+    `put` may be called in any thread, the others in one.
     """
 
-    def __init__(self, source: Source, target: Target, expected: str = "") -> None:
-        self.source, self.target, self.expected = source, target, expected
+    def __init__(self, source: Source, target: Target, expected: str = "", from_log: bool = False) -> None:
+        self.source, self.target, self.expected, self._from_log = source, target, expected, from_log
         self.kind = ""
         self.received = self.dropped = 0
         self.rejected: Counter[str] = Counter()
@@ -54,6 +56,11 @@ class TopicInput:
         return self._count
 
     @property
+    def names(self) -> list[str]:
+        """By what elements could be chosen in messages that lack the chosen one."""
+        return sorted(self._reader.names) if self._reader is not None else []
+
+    @property
     def timed(self) -> bool:
         """Whether messages contain their time, as far as their type is known."""
         return self._reader is not None and self._reader.timed
@@ -68,7 +75,7 @@ class TopicInput:
     def declare(self, kind: str, schemas: Mapping[str, str], where: object = "") -> None:
         """State the type of the messages from now on, see `check`."""
         field = self.check(kind, schemas, where)
-        reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas))
+        reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas), self._from_log)
         with self._lock:  # messages of an earlier type cannot be read as those of the new one
             old, self._undecoded = self._undecoded, 0
             self.dropped, self._count = self.dropped + old, self._count - old
@@ -77,6 +84,8 @@ class TopicInput:
 
     def put(self, messages: Messages, arrived: IntArray | None = None) -> None:
         """Add messages. arrived (n,): when they were received, ns, of a live topic."""
+        if self._from_log and arrived is not None:
+            messages = replace(messages, times=arrived)
         if messages.type != self.kind:
             self.foreign[messages.type] += len(messages)
             return
@@ -101,7 +110,7 @@ class TopicInput:
     def usable(self, rules: Rules) -> Columns:
         """Of `take` those that are readable, in the expected frame and break no rule; the others are rejected."""
         columns = self.take()
-        faults = {UNREADABLE: ~columns.valid}
+        faults = {NO_ELEMENT: columns.absent, UNREADABLE: ~columns.valid}
         if self.expected and self.timed:
             faults[OTHER_FRAME] = columns.frame_names() != self.expected
         return columns.rows(usable(faults | broken(columns.values, rules), self.rejected))
@@ -156,4 +165,5 @@ def _joined(parts: Sequence[Columns], count: int) -> Columns:
         np.concatenate([np.empty(0, np.bool_), *(part.valid for part in parts)]),
         np.concatenate([np.empty(0, np.int64), *(of[part.frame] for of, part in zip(number, parts, strict=True))]),
         tuple(frames),
+        np.concatenate([np.empty(0, np.bool_), *(part.absent for part in parts)]),
     )

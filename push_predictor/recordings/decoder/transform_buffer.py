@@ -67,12 +67,13 @@ class TransformBuffer:
     """Messages of /tf and /tf_static until they are taken as poses of frames.
 
     frames: those whose poses are wanted. world: the frame in which poses are given; empty: the root of the tree above
-    the first frame, once all its transforms have come for a second. unreadable: number of messages. Call `put` in any
+    the first frame, once all its transforms have come for a second. from_log: transforms have the time of receipt, or
+    of the log. unreadable: number of messages. Call `put` in any
     thread, the others in one.
     """
 
-    def __init__(self, frames: Sequence[str], world: str = "") -> None:
-        self.world = world
+    def __init__(self, frames: Sequence[str], world: str = "", from_log: bool = False) -> None:
+        self.world, self._from_log = world, from_log
         self._given = bool(world)
         self.dropped = self.unreadable = 0
         self._frames = list(frames)
@@ -88,8 +89,11 @@ class TransformBuffer:
         """How many messages came since poses were taken."""
         return self._unread + self._read
 
-    def put(self, messages: Messages, static: bool, live: bool = False) -> None:
-        """Add messages, of /tf_static if static; live: beyond LIMIT the oldest are dropped."""
+    def put(self, messages: Messages, static: bool, arrived: IntArray | None = None) -> None:
+        """Add messages, of /tf_static if static. arrived (n,) ns: of live ones; beyond LIMIT the oldest are dropped."""
+        live = arrived is not None
+        if self._from_log and arrived is not None:
+            messages = replace(messages, times=arrived)
         with self._lock:
             self._waiting.append((messages, static))
             self._unread += len(messages)
@@ -183,7 +187,7 @@ class TransformBuffer:
                 continue
             self._problem = ""
             try:
-                found = read_tree(portion)
+                found = read_tree(portion, self._from_log)
                 self.unreadable += found.unreadable
                 for child, edge in found.edges.items():
                     self._add(child, edge)

@@ -26,6 +26,7 @@ from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.pose_rows import at_tip, normalised, poses_at
 from push_predictor.recordings.fields.sources import WRENCH_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
+from push_predictor.recordings.fields.up_axis import Z_UP, wrenches_z_up, z_up
 from push_predictor.recordings.fields.wrench_bias import LEAST_FREE, WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import WrenchStream
@@ -54,7 +55,8 @@ class WrenchInput:
 
     def __init__(self, source: Source, topics: Topics, tf: TransformBuffer, expected: str) -> None:
         axes_of_world = topics.wrench_axes == WORLD_AXES
-        self.messages = TopicInput(source, WRENCH_TARGET, expected if axes_of_world else "")
+        self.messages = TopicInput(source, WRENCH_TARGET, expected if axes_of_world else "", topics.from_log)
+        self._up, self._up_of_sensor = topics.up_of("wrench"), topics.up_of("pusher")
         self.problem = self.turned_into = ""  # why the axes are not turned; the frame into which they are
         self.frame = topics.wrench_tf_frame
         self.world, self.named = topics.world, frozenset[str]()
@@ -70,8 +72,11 @@ class WrenchInput:
 
     def take(self, slider: tuple[IntArray, Array], tip: tuple[IntArray, Array], last: bool = False) -> WrenchStream:
         """The wrenches that are known with these new poses: stamps (n,) ns and poses (n, 7)."""
-        columns = self.messages.usable(WRENCH if self._posed is None else SPATIAL_WRENCH)
+        planar = self._posed is None and self._up == Z_UP
+        columns = self.messages.usable(WRENCH if planar else SPATIAL_WRENCH)
         found = Wrenches(columns.stamp, columns.values)
+        if self._posed is None and not planar:
+            found = found._replace(values=wrenches_z_up(found.values, self._up))
         if self._posed is not None:
             found = self._posed.put(found.stamp, found.values, *tip, last)
         if self.bias is not None:
@@ -88,12 +93,12 @@ class WrenchInput:
                 raise TransformError("no transform has been published")
             world = self.world or next((name for name in sorted(self.named) if name in tree.frames), "")
             self.turned_into = world or tree.root(self.frame)
-            found = self._tf.at(self.frame, self.turned_into, stamp, "wrench", last)
+            known, poses = self._tf.at(self.frame, self.turned_into, stamp, "wrench", last)
             self.problem = ""
         except TransformError as error:
             self.problem = str(error)
             return np.zeros(len(stamp), np.bool_), np.zeros((0, 7))
-        return found
+        return known, z_up(poses, self._up_of_sensor)
 
     @property
     def without_pose(self) -> int:

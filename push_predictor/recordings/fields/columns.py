@@ -9,6 +9,7 @@ messages that have the same lengths at the same bytes are then read at once, and
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 
 from push_predictor.recordings.bag.message_types import Field, short_name
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 _PREFIX = 4  # bytes of encapsulation, from which numbers are aligned
+_PADDING = 4  # bytes to a multiple of which a message may be filled up
 _NUMBERS = {
     **dict.fromkeys(("bool", "byte", "char"), "u1"),
     **{f"{sign}int{bits}": f"{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)},
@@ -68,6 +70,15 @@ class Block:
         with np.errstate(invalid="ignore"):  # widening a signalling NaN
             return np.asarray(column.view(f"{self.order}{code}").astype(np.float64))
 
+    def where(self, which: BoolArray) -> Block:
+        """Some of the messages."""
+        return self if which.all() else Block(self.rows[which], self.order, self.data[which], self.layout)
+
+    def raw_text(self, path: str) -> bytes:
+        """The bytes of a text of the first message, with its closing zero."""
+        at, length = self.layout.texts[path]
+        return self.data[0, at : at + length].tobytes()
+
     def text(self, path: str) -> tuple[list[str], IntArray]:
         """The different texts of a field, and which of them each of the n messages has."""
         at, length = self.layout.texts[path]
@@ -83,7 +94,7 @@ class BlockReader:
 
     def __init__(self, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]) -> None:
         self._type, self._definitions = short_name(type_name), definitions
-        self._wanted = [path.partition(".")[0].partition("[")[0] for path in wanted]
+        self._wanted = [re.split(r"[.\[]", path, maxsplit=1)[0] for path in wanted]
         self._known: dict[int, tuple[str, _Layout]] = {}  # the last layout of messages of a length
 
     def blocks(self, messages: Messages) -> Iterator[Block]:
@@ -102,9 +113,21 @@ class BlockReader:
     def _layout(self, message: NDArray[np.uint8]) -> tuple[str, _Layout]:
         known = self._known.get(len(message))
         if known is None or not _same(message[None], *known)[0]:
-            known = _walked(message.tobytes(), self._type, self._definitions, self._wanted)
+            known = _walked(message.tobytes(), self._type, self._definitions, self._wanted)[:2]
             self._known[len(message)] = known
         return known
+
+
+def whole_block(messages: Messages, definitions: Mapping[str, tuple[Field, ...]]) -> Block | None:
+    """All fields of the first message, if it is exactly as long as its type; else None."""
+    message, kind = messages.buffer[: int(messages.length[0])], short_name(messages.type)
+    try:
+        order, layout, end = _walked(message, kind, definitions, [each.name for each in definitions[kind]])
+    except (ValueError, LookupError, RecursionError):
+        return None
+    if not 0 <= len(message) - end < _PADDING:
+        return None
+    return Block(np.zeros(1, np.int64), order, np.frombuffer(message, np.uint8)[None], layout)
 
 
 def _same(data: NDArray[np.uint8], order: str, layout: _Layout) -> NDArray[np.bool_]:
@@ -117,8 +140,8 @@ def _same(data: NDArray[np.uint8], order: str, layout: _Layout) -> NDArray[np.bo
 
 def _walked(
     message: bytes, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]
-) -> tuple[str, _Layout]:
-    """(byte order, layout) of one message up to the last wanted field. Raises ValueError or LookupError."""
+) -> tuple[str, _Layout, int]:
+    """(byte order, layout, end) of one message up to the last wanted field. Raises ValueError or LookupError."""
     if len(message) < _PREFIX or message[0] != 0 or message[1] not in (0, 1):
         raise ValueError("not XCDR1")
     order = "<" if message[1] else ">"
@@ -127,7 +150,7 @@ def _walked(
     last = max(number for number, each in enumerate(fields) if each.name in wanted)
     for each in fields[: last + 1]:
         walk.field(each, each.name)
-    return order, walk.layout
+    return order, walk.layout, walk.at
 
 
 class _Walk:

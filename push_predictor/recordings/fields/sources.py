@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +18,18 @@ from push_predictor.recordings.bag.message_types import (
     STANDARD,
     WRENCH,
     Definitions,
+    Step,
     fields_of_types,
     parse_definitions,
     short_name,
+    steps_of,
     type_at,
 )
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
+from push_predictor.recordings.fields.elements import names as element_names
+from push_predictor.recordings.fields.elements import places
+from push_predictor.recordings.fields.pose_numbers import pose_rows_of
 from push_predictor.types import Array, BoolArray, IntArray
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -35,14 +41,21 @@ SCALAR_FIELDS = {
     "sensor_msgs/msg/RelativeHumidity": "relative_humidity",
     "sensor_msgs/msg/FluidPressure": "fluid_pressure",
 }
+MOST_NAMES = 12  # elements that a refusal lists
 _NANO = 1_000_000_000
+
+
+def _arrays(length: int | str) -> tuple[str, str]:
+    """The types of arrays of numbers of a length, '' for any."""
+    return f"float64[{length}]", f"float32[{length}]"
 
 
 @dataclass(frozen=True)
 class Target:
     """What a stream needs: the type of its messages in a recording, and types (package/Name) of fields that fit.
 
-    count: of its numbers. known: {message type: field that is read without being named}.
+    count: of its numbers. known: {message type: field that is read without being named}. pieces: the types of two
+    fields that fit together in any order, as A+B.
     """
 
     type: str
@@ -50,21 +63,42 @@ class Target:
     parts: frozenset[str]
     known: Mapping[str, str]
     what: str
+    pieces: tuple[frozenset[str], frozenset[str]] = (frozenset(), frozenset())
+
+    def fits(self, types: Sequence[str | None]) -> bool:
+        """Whether fields of these types contain what the stream needs."""
+        if len(types) == 1:
+            return types[0] in self.parts
+        orders = (types, types[::-1]) if len(types) == 2 else ()
+        return any(one in self.pieces[0] and other in self.pieces[1] for one, other in orders)
 
 
 POSE_TARGET = Target(
     POSE.name,
     7,
-    frozenset({"geometry_msgs/Pose", "geometry_msgs/Transform"}),
+    frozenset({"geometry_msgs/Pose", "geometry_msgs/Transform", *_arrays(16), *_arrays(12), *_arrays("")}),
     {
         POSE.name: "pose",
         "geometry_msgs/msg/TransformStamped": "transform",
         "nav_msgs/msg/Odometry": "pose.pose",
         "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
+        "geometry_msgs/msg/Pose": "position+orientation",
+        "geometry_msgs/msg/Transform": "translation+rotation",
     },
     "pose",
+    (
+        frozenset({"geometry_msgs/Point", "geometry_msgs/Vector3", *_arrays(3)}),
+        frozenset({"geometry_msgs/Quaternion", *_arrays(9)}),
+    ),
 )
-WRENCH_TARGET = Target(WRENCH.name, 6, frozenset({"geometry_msgs/Wrench"}), {WRENCH.name: "wrench"}, "wrench")
+WRENCH_TARGET = Target(
+    WRENCH.name,
+    6,
+    frozenset({"geometry_msgs/Wrench"}),
+    {WRENCH.name: "wrench", "geometry_msgs/msg/Wrench": "force+torque"},
+    "wrench",
+    (frozenset({"geometry_msgs/Vector3"}), frozenset({"geometry_msgs/Vector3"})),
+)
 SCALAR_TARGET = Target("", 1, NUMBERS, SCALAR_FIELDS, "number")
 
 
@@ -82,21 +116,22 @@ class Source:
     @property
     def topic(self) -> str:
         """The topic's name, as given."""
-        return self.text.partition(":")[0].partition(".")[0]
+        return re.split("[.:]", self.text, maxsplit=1)[0]
 
     @property
     def field(self) -> str:
         """The path of a field, '' if none was named."""
-        return self.text.partition(":")[0].partition(".")[2]
+        rest = self.text[len(self.topic) :]
+        return rest[1:] if rest.startswith(".") else ""
 
     @property
     def frame(self) -> str:
         """The name of a frame, '' if none was named."""
-        return self.text.partition(":")[2].strip("/")
+        return "" if self.field else self.text.partition(":")[2].strip("/")
 
     def frame_fits(self, may_have: bool) -> bool:
         """Whether there is no colon, or a frame after it where the stream may have one."""
-        return ":" not in self.text or (may_have and bool(self.frame))
+        return ":" not in self.text or bool(self.field) or (may_have and bool(self.frame))
 
     def check_type(self, kind: str, path: object) -> None:
         """Raise RecordingError for a frame in a topic of a type without frames."""
@@ -114,7 +149,8 @@ class Columns:
     """n decoded messages.
 
     stamp (n,) in ns: of the nearest header around the field, else when the message was logged or sent. values (n, k).
-    valid (n,): readable. frame (n,): number of the frame that the header names among `frames`.
+    valid (n,): readable. frame (n,): number of the frame that the header names among `frames`. absent (n,): readable,
+    but without the chosen element.
     """
 
     stamp: IntArray
@@ -122,6 +158,7 @@ class Columns:
     valid: BoolArray
     frame: IntArray
     frames: tuple[str, ...]
+    absent: BoolArray
 
     @property
     def named(self) -> frozenset[str]:
@@ -134,34 +171,69 @@ class Columns:
 
     def rows(self, which: BoolArray | slice) -> Columns:
         """Some of the messages."""
-        return Columns(self.stamp[which], self.values[which], self.valid[which], self.frame[which], self.frames)
+        stamp, values, valid, frame = self.stamp[which], self.values[which], self.valid[which], self.frame[which]
+        return Columns(stamp, values, valid, frame, self.frames, self.absent[which])
 
 
 class FieldReader:
-    """Reads a field of messages of one type as what a stream needs. timed: whether a header is around the field."""
+    """Reads a field of messages of one type as what a stream needs. timed: whether a header is around the field.
 
-    def __init__(self, target: Target, type_name: str, field: str, definitions: Definitions) -> None:
-        self._target, self._field = target, field
-        self._header = header_path(field, type_name, definitions)
-        self.timed = bool(self._header)
-        self._blocks = BlockReader(type_name, definitions, (field, self._header))
+    from_log: the stamps are the times of the messages, whatever their headers state. names: of elements, where one is
+    chosen by its name and some message lacks it.
+    """
+
+    def __init__(
+        self, target: Target, type_name: str, field: str, definitions: Definitions, from_log: bool = False
+    ) -> None:
+        self._target, self._from_log = target, from_log
+        self._fields = [steps_of(each) for each in fields_in(field)]
+        header = header_path(fields_in(field)[0], type_name, definitions)
+        self._header = steps_of(header)
+        self.timed = bool(header)
+        self._blocks = BlockReader(type_name, definitions, (*fields_in(field), header))
+        self.names: set[str] = set()
 
     def read(self, messages: Messages) -> Columns:
-        """The columns of n messages; one that is not readable has zeros."""
+        """The columns of n messages; one that is not valid has zeros."""
         n, frames = len(messages), {"": 0}
         stamp, values = messages.times.copy(), np.zeros((n, self._target.count))
-        valid, frame = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+        valid, absent, frame = np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.int64)
         for block in self._blocks.blocks(messages):
-            paths = block.paths(self._field)
-            if len(paths) != self._target.count:  # an index that this message does not have
-                continue
-            rows = block.rows
-            values[rows], valid[rows] = block.numbers(paths), True
-            if self._header:
-                stamp[rows], valid[rows] = header_stamps(block, self._header)
-                names, number = block.text(f"{self._header}.frame_id")
-                frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
-        return Columns(stamp, values, valid, frame, tuple(frames))
+            absent[block.rows] = True
+            for steps, which in places(block, self._fields[0]):
+                part, rows = block.where(which), block.rows[which]
+                if (numbers := self._numbers(part, steps)) is None:
+                    continue
+                values[rows], valid[rows], absent[rows] = numbers, True, False
+                if self._header:
+                    # The fields before the header are those before the field, with the same element.
+                    header = ".".join([*steps[: len(self._header) - 1], "header"])
+                    if not self._from_log:
+                        stamp[rows], valid[rows] = header_stamps(part, header)
+                    names, number = part.text(f"{header}.frame_id")
+                    frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
+            if absent[block.rows].all() and len(self.names) < MOST_NAMES:
+                self.names |= element_names(block, self._fields[0])
+        return Columns(stamp, values, valid, frame, tuple(frames), absent)
+
+    def _numbers(self, block: Block, first: Sequence[str]) -> Array | None:
+        """The numbers (n, count) of the fields; None without them. first: the steps of the first field."""
+        paths = [block.paths(".".join(self._found(steps, first))) for steps in self._fields]
+        if not all(paths):
+            return None
+        parts = [block.numbers(each) for each in paths]
+        found = pose_rows_of(parts) if self._target is POSE_TARGET else np.hstack(parts)
+        return found if found is not None and found.shape[1] == self._target.count else None
+
+    def _found(self, steps: Sequence[Step], first: Sequence[str]) -> list[str]:
+        """The steps of a field, with the elements that were chosen for the first field."""
+        same = [step for step, other in zip(steps, self._fields[0], strict=False) if step == other]
+        return [*first[: len(same)], *(step.text for step in steps[len(same) :])]
+
+
+def fields_in(text: str) -> list[str]:
+    """The fields in A+B, of another text itself."""
+    return re.split(r"\+(?![^\[]*\])", text)
 
 
 def definitions_of(type_name: str, schemas: Mapping[str, str]) -> Definitions:
@@ -178,7 +250,7 @@ def field_to_read(source: Source, type_name: str, target: Target, schemas: Mappi
     definitions = definitions_of(type_name, schemas)
     if not source.field and (known := target.known.get(type_name)):
         return known
-    if source.field and type_at(definitions, type_name, source.field) in target.parts:
+    if source.field and target.fits([type_at(definitions, type_name, each) for each in fields_in(source.field)]):
         return source.field
     raise source.error(path, _refusal(source, type_name, target, definitions))
 
@@ -191,7 +263,7 @@ def header_stamps(block: Block, header: str) -> tuple[IntArray, BoolArray]:
 
 def header_path(field: str, type_name: str, definitions: Definitions) -> str:
     """The path of the nearest header around a field, '' without one."""
-    parts = field.split(".")[:-1]
+    parts = [step.text for step in steps_of(field)[:-1]]
     for depth in range(len(parts), -1, -1):
         path = ".".join([*parts[:depth], "header"])
         if type_at(definitions, type_name, path) == "std_msgs/Header":
@@ -208,9 +280,13 @@ def _refusal(source: Source, type_name: str, target: Target, definitions: Defini
     if short_name(type_name) not in definitions:
         known = ", ".join(target.known)
         return f"{what}, and the bag does not contain its definition; accepted types are {known}"
-    fields = fields_of_types(definitions, type_name, set(target.parts))
+    fields = fields_of_types(definitions, type_name, {each for each in target.parts if not each.endswith("[]")})
     wrong = f" and has no {target.what} in field {source.field!r}" if source.field else ""
     if not fields:
         accepted = ", ".join(target.known) or "a topic with a number"
         return f"{what}{wrong}; no field of it is a {target.what}, {accepted} is accepted"
-    return f"{what}{wrong}, give one of its fields: {', '.join(f'{source.topic}.{field}' for field in fields[:12])}"
+    listed = ", ".join(f"{source.topic}.{field}" for field in fields[:12])
+    named = [field.replace("[0]", "[NAME]", 1) for field in fields if "[0]" in field]
+    named = [field for field in named if type_at(definitions, type_name, field)]
+    by_name = f"; {source.topic}.{named[0]} chooses the element with this name" if named else ""
+    return f"{what}{wrong}, give one of its fields: {listed}{by_name}"

@@ -124,8 +124,10 @@ class TransformTree:
         return found
 
 
-def read_tree(recorded: Sequence[tuple[Messages, bool]]) -> TransformTree:
+def read_tree(recorded: Sequence[tuple[Messages, bool]], from_log: bool = False) -> TransformTree:
     """The tree in messages of tf topics, each with whether it is the static topic.
+
+    from_log: the stamps are the times of the messages, whatever their headers state.
 
     Raises TransformError for a frame with two parents.
     """
@@ -136,7 +138,8 @@ def read_tree(recorded: Sequence[tuple[Messages, bool]]) -> TransformTree:
         for block in _READERS[messages.type].blocks(messages):
             read += len(block.rows)
             for number in range(len(block.paths("transforms")) // _NUMBERS):
-                for child, part in _parts(block, f"transforms[{number}]", static):
+                times = messages.times[block.rows] if from_log else None
+                for child, part in _parts(block, f"transforms[{number}]", static, times):
                     found.setdefault(child, []).append(part._replace(rows=part.rows + begin))
         unreadable += len(messages) - read
         begin += len(messages)
@@ -163,9 +166,11 @@ class _Part(NamedTuple):
     static: bool
 
 
-def _parts(block: Block, path: str, static: bool) -> Iterator[tuple[str, _Part]]:
-    """(child frame, samples) of one place in the list of transforms."""
+def _parts(block: Block, path: str, static: bool, times: IntArray | None) -> Iterator[tuple[str, _Part]]:
+    """(child frame, samples) of one place in the list of transforms. times (n,) ns: in place of the headers' stamps."""
     stamp, valid = header_stamps(block, f"{path}.header")
+    if times is not None:
+        stamp, valid = times, np.ones(len(times), np.bool_)
     poses = block.numbers(block.paths(f"{path}.transform"))
     # ROS 1 writes names of frames with a leading slash as well.
     parents, children = (

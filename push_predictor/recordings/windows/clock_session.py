@@ -14,6 +14,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
 from push_predictor.recordings.windows.cut import PushContext, WindowCutter
+from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.track import Track
@@ -42,8 +43,9 @@ class ClockSession:
         self.clocks_set: set[str] = set()
         self.evaluated = int(np.iinfo(np.int64).min)
         self._rig = rig
+        self._flips = HeadingFlips()
         self._segmenter = PushSegmenter(options)
-        self._cutter = WindowCutter(rig)
+        self._cutter = WindowCutter(rig, options.least_speed)
         self._dropouts: Counter[str] = Counter()
         self._origin: int | None = None
         self._first: int | None = None
@@ -64,7 +66,7 @@ class ClockSession:
     @property
     def stamp_jitter(self) -> dict[str, float]:
         """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
-        found = {name: track.regular for name, track in self.tracks.items()}
+        found = {name: track.repairs.regular for name, track in self.tracks.items()}
         return {name: each.noise.jitter for name, each in found.items() if each.noise is not None and each.corrected}
 
     @property
@@ -92,10 +94,13 @@ class ClockSession:
     def extend(self, name: str, stamp: IntArray, values: Array, final: bool = False) -> bool:
         """Add samples of a sensor; with `final` all are decided. Returns whether its clock was set in them."""
         track = self.tracks[name]
+        if name == "slider":
+            turned = self._flips.take(stamp, values[:, [0, 1, 3]])
+            values = np.column_stack([values[:, :3], values[:, 3] - turned])
         ordered = track.order.take(stamp, values, final)
         if self._origin is None and len(ordered.stamp):
             self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(track.regular.take(ordered, final or ordered.clock_set), self._origin or 0)
+        track.extend(track.repairs.take(ordered, final or ordered.clock_set), self._origin or 0)
         if ordered.clock_set:
             self.clocks_set.add(name)
         return ordered.clock_set

@@ -68,7 +68,9 @@ def contact_samples(
         after_break, in_break = after_break | overlap & ~absent, in_break | beyond & ~absent
     gap, closing_speed, opening_speed = _gaps(rig, slider, pusher, first, last)
     around, after = (_speed(pusher, time, tips, *span) for span in ((-NEAR, NEAR), (0.0, FORWARD_SPAN)))
-    speed, at_speed, forces = np.minimum(around, after), _at_speed(pusher, time, tips), _forces(wrench, time, absent)
+    # A step of the resolution is no motion.
+    speed = np.maximum(np.minimum(around, after) - pusher.resolution / (2.0 * NEAR), 0.0)
+    at_speed, forces = _at_speed(pusher, time, tips), _forces(wrench, time, absent)
     repositioned = _repositioned(slider, pusher, first, last)
     known = ~np.isnan(forces[:, 0])
     forces_or_none = ((x, y) if there else None for x, y, there in zip(*forces.T.tolist(), known.tolist(), strict=True))

@@ -16,6 +16,7 @@ from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
+from push_predictor.recordings.windows.parts import part_means, part_rows
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
@@ -63,9 +64,9 @@ class _Motions:
 class WindowCutter:
     """Cuts windows, those of one push after the other. counts: rejected windows by fault, a key of FAULTS."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, least_speed: float) -> None:
         self.counts: Counter[str] = Counter()
-        self._rig = rig
+        self._rig, self._least_speed = rig, least_speed
         self._slid = 0.0  # m; summed over windows: summed over samples, the tracker's noise would count as distance
         self._push, self._edge, self._index = -1, -1, 0  # of the last window: its push, edge and number in the push
 
@@ -88,7 +89,11 @@ class WindowCutter:
                 self._push, self._edge, self._index = push.push_index, -1, 0
             if motions.touch.at_vertex[k]:
                 self._keep_edge(motions, k)
-            fault = faults[k] if abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] > 0.0 else "not_a_push"
+            fault = (
+                faults[k]
+                if abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] >= self._least_speed
+                else "not_a_push"
+            )
             if fault:
                 self.counts[fault] += 1
                 continue
@@ -138,27 +143,16 @@ def pusher_motion(pusher: Track, begin: Array) -> tuple[Array, Array]:
     first = np.searchsorted(pusher.time, begin)
     last = np.maximum(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right"), first + FIT_SAMPLES)
     last = np.minimum(last, len(pusher.time))
-    count, rows = last - first, _rows(first, last)
+    count, rows = last - first, part_rows(first, last)
     time = pusher.time[rows] - np.repeat(begin, count)
-    mean_time, mean = _means(time[:, None], count), _means(pusher.values[rows, :2], count)
+    mean_time, mean = part_means(time[:, None], count), part_means(pusher.values[rows, :2], count)
     late, off = (
         time[:, None] - np.repeat(mean_time, count, axis=0),
         pusher.values[rows, :2] - np.repeat(mean, count, axis=0),
     )
-    spread = _means(late**2, count)
-    velocity = _means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
+    spread = part_means(late**2, count)
+    velocity = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
     return mean - velocity * mean_time, velocity
-
-
-def _rows(first: IntArray, last: IntArray) -> IntArray:
-    """The indices from each first to before each last, one after the other."""
-    count = last - first
-    return np.asarray(np.arange(int(count.sum())) + np.repeat(first - np.cumsum(count) + count, count))
-
-
-def _means(values: Array, count: IntArray) -> Array:
-    """Means (n, k) of n consecutive parts of values (m, k), each of `count` (n,) > 0 rows."""
-    return np.asarray(np.add.reduceat(values, np.cumsum(count) - count, axis=0) / count[:, None])
 
 
 def _motions(outline: Outline, slider: Track, pusher: Track, times: Array) -> _Motions:
@@ -214,7 +208,7 @@ def _forces(wrench: Track, times: Array) -> Array:
     found = np.full((times.shape[1], 2), np.nan)
     begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
     if (some := end > begin).any():
-        found[some] = _means(wrench.values[_rows(begin[some], end[some]), :2], (end - begin)[some])
+        found[some] = part_means(wrench.values[part_rows(begin[some], end[some]), :2], (end - begin)[some])
     return found
 
 

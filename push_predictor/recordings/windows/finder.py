@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
@@ -75,13 +75,13 @@ class WindowFinder:
         return self._earlier_touches + self._session.force_touches
 
     def find(self, recording: Recording) -> list[PushWindow]:
-        """All windows of a recording; see find_windows."""
+        """All windows of a recording; see find_windows. A sample that it has twice, as in a loop, counts once."""
         for name, stream in recording.scalars.items():
             self.add_scalar(name, stream)
         if recording.wrench is not None:
-            self.add_wrench(recording.wrench)
-        self.add_pusher(recording.pusher)
-        self.add_slider(recording.slider)
+            self.add_wrench(taken(recording.wrench, ~repeated(recording.wrench)))
+        self.add_pusher(taken(recording.pusher, ~repeated(recording.pusher)))
+        self.add_slider(taken(recording.slider, ~repeated(recording.slider)))
         return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 
 SHARE = 0.05  # of the period: less jitter stays, as a window hardly feels it
@@ -71,17 +71,17 @@ class RegularStamps:
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose stamps are known; with `final` all are."""
         if self._held is not None:
-            new, self._held = _joined(self._held, new), None
+            new, self._held = joined(self._held, new), None
         if self.noise is None and len(new.stamp) < DECIDING:
             if not final:
                 self._held = new
-                return _rows(new, slice(0, 0))
+                return taken(new, slice(0, 0))
             self.noise = stamp_noise(new.stamp)
         count = 0 if self.corrected else self._undisturbed(new.stamp)
         if self.noise is None or not self.corrected:
             return new
-        regular = self._regular(_rows(new, slice(count, None)), self.noise, final)
-        return _joined(_rows(new, slice(0, count)), regular)
+        regular = self._regular(taken(new, slice(count, None)), self.noise, final)
+        return joined(taken(new, slice(0, count)), regular)
 
     def _undisturbed(self, stamp: IntArray) -> int:
         """How many of these samples come before jitter shows: that of the first block corrects this block as well."""
@@ -105,14 +105,14 @@ class RegularStamps:
         for number, rows in enumerate(np.split(np.arange(len(new.stamp)), begins)):
             if number or self._segment is None:
                 if self._segment is not None:
-                    found.append(self._segment.take(_rows(new, rows[:0]), closed=True))
-                self._segment = _Segment(noise, _rows(new, slice(0, 0)))
-            found.append(self._segment.take(_rows(new, rows)))
+                    found.append(self._segment.take(taken(new, rows[:0]), closed=True))
+                self._segment = _Segment(noise, taken(new, slice(0, 0)))
+            found.append(self._segment.take(taken(new, rows)))
         if final and self._segment is not None:
-            found.append(self._segment.take(_rows(new, np.empty(0, np.int64)), closed=True))
+            found.append(self._segment.take(taken(new, np.empty(0, np.int64)), closed=True))
             self._segment = None
         self._last = int(new.stamp[-1]) if len(new.stamp) else self._last
-        return _joined(*found) if found else new
+        return joined(*found) if found else new
 
 
 class _Segment:
@@ -132,10 +132,10 @@ class _Segment:
 
     def take(self, new: OrderedSamples, closed: bool = False) -> OrderedSamples:
         """Add samples and return those whose regular stamps are known."""
-        self._samples = _joined(self._samples, new)
+        self._samples = joined(self._samples, new)
         self._count(closed)
         begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
-        found = _rows(self._samples, slice(begin, end))
+        found = taken(self._samples, slice(begin, end))
         stamp = self._samples.stamp[: len(self._number)]
         parts = [_line_at(stamp, self._number, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
         regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
@@ -164,7 +164,7 @@ class _Segment:
     def _forget(self) -> None:
         """Drop the samples before those that the next ones need."""
         count = max(self._returned - KEPT, 0)
-        self._samples, self._number = _rows(self._samples, slice(count, None)), self._number[count:]
+        self._samples, self._number = taken(self._samples, slice(count, None)), self._number[count:]
         self._returned -= count
 
 
@@ -184,17 +184,6 @@ def _line_at(stamp: IntArray, number: IntArray, begin: int, end: int) -> IntArra
     spread = (np.where(inside, x - mean_x[:, None], 0.0) ** 2).sum(axis=1)
     slope = (np.where(inside, x - mean_x[:, None], 0.0) * y).sum(axis=1) / np.where(spread > 0.0, spread, 1.0)
     return np.asarray(stamp[middle] + np.rint(mean_y - slope * mean_x).astype(np.int64))
-
-
-def _rows(samples: OrderedSamples, rows: slice | IntArray) -> OrderedSamples:
-    return OrderedSamples(samples.stamp[rows], samples.values[rows], samples.interrupted[rows], samples.clock_set)
-
-
-def _joined(*parts: OrderedSamples) -> OrderedSamples:
-    stamp, values, interrupted = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("stamp", "values", "interrupted")
-    )
-    return OrderedSamples(stamp, values, interrupted, parts[-1].clock_set)
 
 
 def stamp_noise(stamp: IntArray) -> StampNoise | None:

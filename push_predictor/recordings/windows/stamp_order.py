@@ -46,6 +46,24 @@ class OrderedSamples:
     clock_set: bool
 
 
+def taken(samples: OrderedSamples, rows: slice | IntArray) -> OrderedSamples:
+    """Some of the samples, by index."""
+    return OrderedSamples(samples.stamp[rows], samples.values[rows], samples.interrupted[rows], samples.clock_set)
+
+
+def joined(*parts: OrderedSamples) -> OrderedSamples:
+    """One portion of consecutive ones, at least one."""
+    stamp, values, interrupted = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("stamp", "values", "interrupted")
+    )
+    return OrderedSamples(stamp, values, interrupted, parts[-1].clock_set)
+
+
+def with_values(samples: OrderedSamples, values: Array) -> OrderedSamples:
+    """The samples with other values (n, k)."""
+    return OrderedSamples(samples.stamp, values, samples.interrupted, samples.clock_set)
+
+
 class StampOrder:
     """Takes samples as they arrive and returns those that are in order.
 

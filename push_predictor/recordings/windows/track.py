@@ -11,7 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.regular_stamps import RegularStamps
+from push_predictor.recordings.windows.repairs import StreamRepairs
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -35,7 +35,7 @@ class Track:
         self.values: Array = np.empty((0, width))
         self.interrupted: BoolArray = np.empty(0, dtype=np.bool_)
         self.order = StampOrder(width, self.is_jump if position else None)
-        self.regular = RegularStamps()
+        self.repairs = StreamRepairs(self.is_jump if position else None, angle)
         self.jumps = 0
         self._angle = angle
         self._period: float | None = None
@@ -51,11 +51,11 @@ class Track:
     @property
     def empty(self) -> bool:
         """Whether no sample has arrived, not even an undecided one."""
-        return not len(self) and not len(self.order.waiting[0]) and not self.regular.waiting
+        return not len(self) and not len(self.order.waiting[0]) and not self.repairs.waiting
 
     def extend(self, new: OrderedSamples, origin: int) -> None:
-        """Append samples that `order` accepted, with the stamps of `regular`."""
-        values, first = self._unwrapped(new.values), min(len(self), 1)
+        """Append samples that `order` accepted, as `repairs` returned them."""
+        values, first = new.values, min(len(self), 1)
         times = (np.concatenate([self.stamp[-1:], new.stamp]) - origin) * NANOSECOND
         jumps = np.zeros(len(values), dtype=np.bool_)
         if self.order.is_jump is not None:
@@ -99,6 +99,11 @@ class Track:
         """Median interval of the first samples, s; 0 until it is known."""
         return self._period or 0.0
 
+    @property
+    def resolution(self) -> float:
+        """The step (m) in which positions were written, 0 if it is fine."""
+        return 0.0 if self.repairs.smoothed is None else self.repairs.smoothed.resolution
+
     def breaks_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
         """For intervals (start, end] (m,): does a break overlap each, and does one extend beyond its end?
 
@@ -131,11 +136,3 @@ class Track:
         if self._angle is not None:
             jump = jump | (np.abs(wrap_angle(step[:, self._angle])) > JUMP_ANGLE + JUMP_TURN_RATE * elapsed)
         return np.asarray(jump)
-
-    def _unwrapped(self, values: Array) -> Array:
-        if self._angle is None or not len(values):
-            return values
-        values = values.copy()
-        before = self.values[-1:, self._angle]
-        values[:, self._angle] = np.unwrap(np.concatenate([before, values[:, self._angle]]))[len(before) :]
-        return values

@@ -1,0 +1,70 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The cells of a CSV file, also as spreadsheets write it: semicolons or tabs, decimal commas, a byte order mark.
+
+Numbers get a decimal point where all of the file have a comma. Empty columns at the end and empty rows are left out.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+
+ERRORS = (OSError, ValueError, csv.Error)  # ValueError: also of text that cannot be decoded
+_SEPARATORS = (",", ";", "\t")
+_MARKED = re.compile(r"sep=(.)\s*")  # Excel's first line
+_WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_WITH_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+
+Rows = list[tuple[int, list[str]]]
+
+
+def cells_of(data: bytes) -> Rows:
+    """The line number and the cells of each row, the header first. Raises one of ERRORS."""
+    text = _decoded(data)
+    separator, rows = _separator(text), Rows()
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    for row in reader:
+        cells = [cell.strip() for cell in row]
+        if any(cells) and not (reader.line_num == 1 and _MARKED.fullmatch(text.splitlines()[0])):
+            rows.append((reader.line_num, cells))
+    if not rows:
+        return rows
+    rows[0][1][0] = rows[0][1][0].removeprefix("#").strip()  # of a header as numpy.savetxt writes it
+    return _with_points(_without_empty_columns(rows), separator)
+
+
+def _decoded(data: bytes) -> str:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("it is not UTF-8 text; save it as CSV UTF-8") from None
+
+
+def _separator(text: str) -> str:
+    """The character that separates the cells of the header."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    if marked := _MARKED.fullmatch(first):
+        return marked[1]
+    return max(_SEPARATORS, key=first.count)
+
+
+def _without_empty_columns(rows: Rows) -> Rows:
+    """Without the empty cells at the end of each row, beyond the last name of the header."""
+    width = max((number for number, name in enumerate(rows[0][1], start=1) if name), default=1)
+    ends = (max((number for number, cell in enumerate(cells, start=1) if cell), default=0) for _, cells in rows)
+    return [(line, cells[: max(width, end)]) for (line, cells), end in zip(rows, ends, strict=True)]
+
+
+def _with_points(rows: Rows, separator: str) -> Rows:
+    """With decimal points, if numbers have a comma and none has a point."""
+    cells = {cell for _, row in rows[1:] for cell in row if "," in cell or (separator != "," and "." in cell)}
+    if not any(map(_WITH_COMMA.fullmatch, cells)) or any(map(_WITH_POINT.fullmatch, cells)):
+        return rows
+    changed = {cell: cell.replace(",", ".") for cell in cells if _WITH_COMMA.fullmatch(cell)}
+    return [rows[0], *((line, [changed.get(cell, cell) for cell in row]) for line, row in rows[1:])]

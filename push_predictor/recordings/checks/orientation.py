@@ -1,0 +1,71 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Orientations of the slider: quaternions with w first or not recorded, and tracked frames whose z axis is not up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream
+
+STILL = 1e-5  # rad; a tracker's noise is larger
+STEEP = np.radians(45.0)  # a slider lies flat, while w read as x rolls it by pi minus its heading
+OVERTURNED = np.pi - STEEP  # from here on the z axis points down
+FROZEN = 0.2  # rad; w read as x leaves a heading of about twice the true tilt
+COVERED = 95.0  # percentile: few samples may be tracked wrongly
+TRAVEL = 0.02  # m of a slider that also turns
+OUTRUN = 5.0  # path lengths; a slider does not turn by more of its own reach
+TURN_SPAN = 0.05  # s between the poses whose turns are summed
+
+
+def orientation_finding(slider: PoseStream, rig: Rig) -> Finding | None:
+    """A finding if the orientations of a slider that moves have another order of components, or are missing.
+
+    The z axis of its tracked frame may point down or sideways, as long as its x axis shows the heading.
+    """
+    x, y = slider.x[np.isfinite(slider.x)], slider.y[np.isfinite(slider.y)]
+    if not (len(x) and len(y)) or np.hypot(np.ptp(x), np.ptp(y)) < TRAVEL:
+        return None
+    tilt, largest = tilt_of(slider), float(np.nanmax(np.abs(slider.heading)))
+    if tilt > STEEP:
+        return _tilted(slider, rig, tilt)
+    if largest > STILL:
+        return None
+    sentence = "The slider moves and its heading is exactly 0 throughout: its orientation is probably not recorded."
+    return Finding("heading_constant", "refused", sentence, "Record the orientation of the slider.")
+
+
+def tilt_of(slider: PoseStream) -> float:
+    """The tilt (rad) that few samples exceed. The median would be small for w first and headings near pi."""
+    return 0.0 if slider.tilt is None or not len(slider.tilt) else float(np.nanpercentile(slider.tilt, COVERED))
+
+
+def turn_and_path(slider: PoseStream) -> tuple[float, float]:
+    """How far the slider turns (rad) and moves (m) in all; a pushed one turns about as far, in terms of its size."""
+    usable = np.isfinite(slider.x + slider.y + slider.heading)
+    period = 1e-9 * float(np.median(np.diff(slider.stamp))) if len(slider) > 1 else TURN_SPAN
+    pose = np.column_stack([slider.x, slider.y, slider.heading])[usable]
+    step = np.diff(pose[:: max(1, round(TURN_SPAN / max(period, 1e-6)))], axis=0)
+    return float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
+
+
+def _tilted(slider: PoseStream, rig: Rig, tilt: float) -> Finding:
+    values, up = (
+        {"tilt": Value(tilt, "rad")},
+        f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical",
+    )
+    if float(np.nanpercentile(np.abs(slider.heading), COVERED)) < FROZEN:
+        sentence = f"{up} and its heading does not change: the quaternion's order is probably w, x, y, z."
+        return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.", values)
+    turn, path = turn_and_path(slider)
+    if turn * rig.outline.reach > OUTRUN * max(path, TRAVEL):
+        sentence = f"{up}, and its x axis too is near the vertical: its heading is unknown."
+        return Finding("slider_tilted", "refused", sentence, "Give a tracked frame whose z axis points up.", values)
+    where = "points down" if tilt > OVERTURNED else "is level"
+    sentence = f"{up}: it {where}. The heading is that of the x axis, seen from above."
+    advice = "Give the outline as seen from above, y to the left of x, or a tracked frame whose z axis points up."
+    return Finding("slider_tilted", "warning", sentence, advice, values)

@@ -1,0 +1,118 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses of two bodies in one stream, and bodies that are exchanged for a while: jumps between two places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.track import JUMP_DISTANCE, JUMP_SPEED
+from push_predictor.types import Array, BoolArray
+
+LAG = 4  # samples: of up to so many bodies in turn, each one's next sample is at most so far
+USUAL = 90.0  # percentile of a body's own steps
+JUMP = 20.0  # times the usual step
+RETURN = 0.25  # of a jump: nearer to an earlier place than this, the stream is back there
+RECENT = 6  # stretches of a stream whose ends are remembered
+JUST = 500_000_000  # ns; a slider that is put back is elsewhere for longer
+FEWEST_RETURNS = 5  # to two places
+HALF = 0.25  # share of the samples from which the window finder cannot know which body is meant
+EXCHANGED = 0.02  # m between a body that was exchanged and the place where the other one was
+SPAN = 100_000_000  # ns around an exchange
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Stretches of a stream between jumps.
+
+    jumps (n - 1,): which steps are jumps. returns: how often one leads back to where an earlier stretch just ended;
+    distance: median of these jumps, m; share: of the samples that are at the place that is returned to most often, or
+    elsewhere, whichever is less.
+    """
+
+    jumps: BoolArray
+    returns: int = 0
+    distance: float = 0.0
+    share: float = 0.0
+
+
+def places_of(stream: PoseStream) -> Places:
+    """The stretches of a stream, in order of arrival. A pose at (0, 0) is that of a lost body."""
+    seen = np.isfinite(stream.x + stream.y) & ((stream.x != 0.0) | (stream.y != 0.0))
+    place, stamp = np.column_stack([stream.x, stream.y])[seen], stream.stamp[seen]
+    if len(place) < 2:
+        return Places(np.zeros(max(len(stream) - 1, 0), dtype=np.bool_))
+    step = np.hypot(*np.diff(place, axis=0).T)
+    elapsed = np.maximum(np.diff(stamp), 0) * NANOSECOND
+    jumps = step > np.maximum(JUMP_DISTANCE + JUMP_SPEED * elapsed, JUMP * _usual_step(place))
+    begins = np.append(0, np.flatnonzero(jumps) + 1)
+    ends = np.append(begins[1:], len(place)) - 1
+    body, returned = np.arange(len(begins)), list[int]()
+    for k in range(2, len(begins)):
+        before = np.arange(max(0, k - RECENT), k - 1)
+        before = before[stamp[begins[k]] - stamp[ends[before]] < JUST]
+        away = np.hypot(*(place[ends[before]] - place[begins[k]]).T)
+        if len(before) and away.min() < min(RETURN * step[begins[k] - 1], JUMP_DISTANCE):
+            body[k] = body[before[np.argmin(away)]]
+            returned.append(k)
+    if not returned:
+        return Places(jumps)
+    most = np.bincount(body[returned]).argmax()
+    share = float(np.sum((ends - begins + 1)[body == most])) / len(place)
+    return Places(jumps, len(returned), float(np.median(step[begins[returned] - 1])), min(share, 1.0 - share))
+
+
+def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:
+    """A finding if a stream jumps to and fro between two places."""
+    if places.returns < FEWEST_RETURNS:
+        return None
+    sentence = (
+        f"The {name}'s poses jump {places.returns} times to and fro between places "
+        f"{1e3 * places.distance:.0f} mm apart ({100.0 * places.share:.0f} % of the samples are elsewhere): "
+        "two bodies, or two nodes, publish on its topic."
+    )
+    often = places.share > HALF
+    advice = (
+        "Give each body its own topic, or name the one to read (`ros2 topic info --verbose` lists the publishers)."
+        if often
+        else "The samples elsewhere are discarded. Stop the second publisher (`ros2 topic info --verbose` lists both)."
+    )
+    values = {"share": Value(places.share, "1"), "distance": Value(places.distance, "m")}
+    return Finding(f"two_bodies_{name}", "refused" if often else "warning", sentence, advice, values)
+
+
+def exchanged(recording: Recording, slider: Places, pusher: Places) -> Finding | None:
+    """A warning if slider and tip take each other's place for a while."""
+    one, other = recording.slider, recording.pusher
+    if len(slider.jumps) != len(one) - 1 or len(pusher.jumps) != len(other) - 1:
+        return None
+    at = np.flatnonzero(slider.jumps) + 1
+    tips = np.flatnonzero(pusher.jumps) + 1
+    if not (len(at) and len(tips)):
+        return None
+    place, tip = np.column_stack([one.x, one.y]), np.column_stack([other.x, other.y])
+    nearest = tips[np.argmin(np.abs(other.stamp[tips][None, :] - one.stamp[at][:, None]), axis=1)]
+    together = np.abs(other.stamp[nearest] - one.stamp[at]) < SPAN
+    crossed = _near(place[at], tip[nearest - 1]) & _near(tip[nearest], place[at - 1])
+    count = int(np.sum(together & crossed))
+    if count < 2:
+        return None
+    sentence = f"Slider and tip take each other's place {count} times, both in one instant: the tracker exchanges them."
+    advice = "The windows break there. Give the bodies marker patterns that differ more."
+    return Finding("bodies_exchanged", "warning", sentence, advice, {"exchanges": Value(count, "1")})
+
+
+def _near(one: Array, other: Array) -> BoolArray:
+    return np.asarray(np.hypot(*(one - other).T) < EXCHANGED)
+
+
+def _usual_step(place: Array) -> float:
+    """The step (m) that few exceed, to the nearest of the next samples: the others may be of other bodies."""
+    ahead = [np.hypot(*(place[lag:] - place[:-lag]).T)[: max(len(place) - LAG, 0)] for lag in range(1, LAG + 1)]
+    return float(np.percentile(np.min(ahead, axis=0), USUAL)) if len(place) > LAG else 0.0

@@ -1,0 +1,106 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What rate, resolution and noise of the poses allow to learn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.stream_facts import StreamFacts
+from push_predictor.recordings.windows.cut import FIT_SAMPLES
+from push_predictor.recordings.windows.push_window import WindowOptions
+
+WINDOW = WindowOptions().duration  # s
+TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
+FEWEST_SAMPLES = 3  # of a stream in a window; two always fit a line, whatever their noise
+NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
+FEWEST_HOLDS = 2
+LEVER = 0.05  # m of an outline from its centre
+DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
+
+
+def quality_findings(facts: Mapping[str, StreamFacts]) -> list[Finding]:
+    """Findings about streams of poses, by name."""
+    found = [of(name, each) for name, each in facts.items() for of in (_resolution, _source, _holds, _rate, _noise)]
+    return [finding for finding in found if finding is not None]
+
+
+def _resolution(name: str, facts: StreamFacts) -> Finding | None:
+    if not facts.coarse:
+        return None
+    sentence = f"The {name}'s positions have a resolution of {_step(facts.quantum)}"
+    if facts.heading_quantum > 0.0:
+        sentence += f", its headings of {np.degrees(facts.heading_quantum):.2g} degrees"
+    values = {"quantum": Value(facts.quantum, "m"), "fit_span": Value(facts.fit_span, "s")}
+    if facts.fit_span > TWO_LINES * WINDOW:
+        sentence += f": too coarse for speeds and displacements in a window of {WINDOW:g} s."
+        advice = "Record the numbers as measured, with at least 5 decimals of a metre and 4 of a radian."
+        return Finding(f"resolution_{name}", "refused", sentence, advice, values)
+    sentence += f": speeds need lines over {1e3 * facts.fit_span:.0f} ms, in place of 20 ms."
+    advice = "Windows use such lines. Better: write at least 5 decimals of a metre and 4 of a radian."
+    return Finding(f"resolution_{name}", "warning", sentence, advice, values)
+
+
+def _source(name: str, facts: StreamFacts) -> Finding | None:
+    if not facts.slower_source:
+        return None
+    rate = 1.0 / facts.source_period
+    sentence = (
+        f"The {name}'s poses are repeated: {1.0 / facts.period:.0f} messages a second carry {rate:.3g} poses a second."
+    )
+    advice = "Windows take the poses in between from lines. Record the topic of the source, with its own stamps."
+    return Finding(f"repeated_poses_{name}", "warning", sentence, advice, {"rate": Value(rate, "Hz")})
+
+
+def _holds(name: str, facts: StreamFacts) -> Finding | None:
+    if facts.slower_source or len(facts.holds) < FEWEST_HOLDS or facts.coarse:
+        return None
+    share = 100.0 * facts.held / facts.samples
+    sentence = (
+        f"The {name}'s pose is repeated with new stamps {len(facts.holds)} times while the body moves on, for "
+        f"{1e3 * float(np.median(facts.holds)):.0f} ms (median): {share:.1f} % of the samples are stale."
+    )
+    advice = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
+    values = {"holds": Value(float(len(facts.holds)), "1"), "share": Value(0.01 * share, "1")}
+    return Finding(f"held_poses_{name}", "warning", sentence, advice, values)
+
+
+def _rate(name: str, facts: StreamFacts) -> Finding | None:
+    count = WINDOW / facts.source_period
+    if count > FIT_SAMPLES - 0.5:
+        return None
+    rate, least = 1.0 / facts.source_period, FIT_SAMPLES / WINDOW
+    sentence = f"The {name} has {rate:.3g} poses a second: {count:.1f} in a window of {WINDOW:g} s"
+    values = {"rate": Value(rate, "Hz")}
+    advice = f"Record it with at least {least:.0f} Hz; 100 Hz is usual."
+    if count < FEWEST_SAMPLES - 0.5:
+        sentence += ", too few for a speed and the begin and end of a push."
+        return Finding(f"rate_{name}", "refused", sentence, advice, values)
+    sentence += ". Begin and end of a push are known to one interval, and speeds have no redundant sample."
+    return Finding(f"rate_{name}", "warning", sentence, advice, values)
+
+
+def _noise(name: str, facts: StreamFacts) -> Finding | None:
+    if facts.coarse or max(facts.noise, LEVER * facts.heading_noise) < NOISY:
+        return None
+    sentence = f"The {name}'s poses have noise of {1e3 * facts.noise:.2g} mm"
+    if facts.heading_noise > 0.0:
+        sentence += f" and {np.degrees(facts.heading_noise):.2g} degrees"
+    sentence += (
+        f" (standard deviation): an observed displacement is uncertain by {1e3 * np.sqrt(2.0) * facts.noise:.2g} mm."
+    )
+    values = {"noise": Value(facts.noise, "m"), "heading_noise": Value(facts.heading_noise, "rad")}
+    advice = "A model learns this as spread of the outcome. Use a tracker of less noise, or larger markers."
+    return Finding(f"noise_{name}", "warning", sentence, advice, values)
+
+
+def _step(quantum: float) -> str:
+    """A resolution in words, by decimals where it is one."""
+    for decimals, step in enumerate(DECIMALS):
+        if abs(quantum / step - 1.0) < 0.01:
+            return f"{decimals} decimals ({1e3 * step:g} mm)"
+    return f"{1e3 * quantum:.2g} mm"

@@ -1,0 +1,123 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a stream of poses is by itself: rate, resolution, noise, and what was repaired in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.windows.held import HARMLESS, HeldPoses
+from push_predictor.recordings.windows.regular_stamps import SD
+from push_predictor.recordings.windows.resolution import LEVER, Resolution, lengths
+from push_predictor.recordings.windows.smoothing import SHORTEST, SmoothedPoses, fit_span
+from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.recordings.windows.track import Track
+from push_predictor.types import Array, BoolArray, IntArray
+
+LEAST_SHARE = 0.3  # of the changes follow on repeats: the source is slower than its messages
+FEWEST_CHANGES = 20  # in motion, from which the rate of the source is estimated
+ROUNDED = np.sqrt(12.0)  # standard deviations of a rounding error in one step
+THIRD = np.sqrt(20.0)  # standard deviations of a third difference in one of a sample
+
+
+@dataclass(frozen=True)
+class StreamFacts:
+    """A stream of poses in its own stamps.
+
+    period: median interval of the stamps, s; source_period: of the poses behind them, the same unless the stream
+    repeats them. quantum: resolution of the positions (m), heading_quantum (rad), 0 where it is unknown. fit_span: the
+    span (s) that lines need for a speed in this resolution. noise (m), heading_noise (rad): standard deviations of a
+    sample. held: number of stale poses; holds: how often, beyond the usual interval, they were held.
+    """
+
+    samples: int
+    period: float
+    source_period: float
+    quantum: float
+    heading_quantum: float
+    fit_span: float
+    noise: float
+    heading_noise: float
+    held: int
+    holds: tuple[float, ...]
+
+    @property
+    def slower_source(self) -> bool:
+        """Whether the poses come from a source that is slower than the messages."""
+        return self.source_period > self.period
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the resolution is too coarse for the speed over the first 20 ms of a window."""
+        return self.fit_span > SHORTEST
+
+
+def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream]:
+    """The facts of a stream of at least two poses, and the stream as repaired; angle: whether headings count.
+
+    The stamps must increase.
+    """
+    track = Track(4, position=True, angle=3 if angle else None)
+    values = np.column_stack([stream.x, stream.y, stream.z, np.unwrap(stream.heading)])
+    column = 3 if angle else None
+    pose = lengths(values, column)
+    quanta = Resolution(pose.shape[1]).take(pose)
+    quantum = float(np.max(quanta[-1]))
+    samples = OrderedSamples(
+        stream.stamp, np.column_stack([values, np.max(quanta, axis=1)]), np.zeros(len(values), dtype=np.bool_), False
+    )
+    held = HeldPoses(column)
+    kept = held.take(samples, final=True)
+    smoothed = SmoothedPoses(track.is_jump, column).take(kept, final=True)
+    period = float(np.median(np.diff(stream.stamp))) * NANOSECOND
+    source_period = _source_period(stream.stamp, pose, held, period)
+    noise = _noise(values[_changed(pose)] if source_period > period else values)
+    facts = StreamFacts(
+        samples=len(stream),
+        period=period,
+        source_period=source_period,
+        quantum=float(np.max(quanta[-1, :2])),
+        heading_quantum=float(quanta[-1, 2] / LEVER) if angle else 0.0,
+        fit_span=float(fit_span(quantum, period)),
+        noise=float(max(*noise[:2], np.max(quanta[-1, :2]) / ROUNDED)),
+        heading_noise=float(noise[2]) if angle else 0.0,
+        held=held.stale,
+        holds=tuple(held.dropouts),
+    )
+    return facts, stream if not (held.stale or facts.coarse) else _with(stream, smoothed)
+
+
+def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
+    rows = np.searchsorted(stream.stamp, samples.stamp)
+    x, y, z, heading = samples.values[:, :4].T
+    tilt = None if stream.tilt is None else stream.tilt[rows]
+    return replace(stream, stamp=samples.stamp, x=x, y=y, z=z, heading=heading, tilt=tilt)
+
+
+def _source_period(stamp: IntArray, pose: Array, held: HeldPoses, period: float) -> float:
+    """The mean interval (s) of the changes in motion, where many of them follow on repeats; else the period."""
+    begins = _changed(pose)
+    change = np.linalg.norm(np.diff(pose[begins], axis=0), axis=1)
+    interval = np.diff(stamp[begins]) * NANOSECOND
+    longest = max(held.updates, default=0.0)
+    moving: BoolArray = (change > HARMLESS) & (interval <= max(longest, period))
+    count = int(np.sum(moving))
+    if count < FEWEST_CHANGES or len(held.updates) < LEAST_SHARE * count:
+        return period
+    return float(np.mean(interval[moving]))
+
+
+def _changed(pose: Array) -> IntArray:
+    """The samples whose pose is not that of the one before."""
+    return np.flatnonzero(np.append(True, np.any(pose[1:] != pose[:-1], axis=1)))
+
+
+def _noise(values: Array) -> Array:
+    """Standard deviations (3,) of x, y (m) and heading (rad), from third differences: motion hardly changes them."""
+    third = np.diff(values[:, [0, 1, 3]], 3, axis=0)
+    return SD * np.median(np.abs(third), axis=0) / THIRD if len(third) else np.zeros(3)

@@ -1,0 +1,188 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which way is up in the frames of slider and tip, from their positions alone.
+
+A pushed slider stays on a plane, and the tip keeps its height while it pushes: the normal of that plane is vertical.
+Between pushes the tip is lifted, never lowered into the table: that is up. Seen from above, slider and tip move the
+same way in a push; seen from opposite sides, one motion is the mirror image of the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.orientation import OVERTURNED, tilt_of
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.regular_stamps import SD
+from push_predictor.types import Array, BoolArray
+
+STEPS = (0.1, 0.2, 0.5)  # s between the positions whose difference is a step of the motion: the first that noise allows
+LEAST_STEP = 0.0002  # m
+NOISE = 5.0  # standard deviations of a step at rest: what moves farther moves
+QUIET = 0.001  # m; of a step at rest, beyond which pushes are hidden in it
+MOST_STEPS = 4000  # evenly drawn
+FEWEST_STEPS = 20
+FLAT = 3.0  # the steps spread so many times farther in the plane, in its narrower direction, than out of it
+ROUNDS = 12  # of the robust fit of the plane
+ACCURACY = 1e-5  # m; a smaller distance from the plane is rounding
+UPRIGHT = np.radians(30.0)  # an axis this near to the vertical is meant to be up
+LENGTH_ALLOWANCE = 0.0005  # m that a tilted view may shorten the slider
+LIFT = 0.005  # m above the height of pushes
+MOSTLY = 4.0  # times as many samples lie on the upper side
+ALIKE = (0.4, 1.5)  # lengths of the slider's steps in a push, in terms of the tip's
+MIRRORED = 1.3  # ratio of the agreements of the two motions, mirrored and as they are
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Up:
+    """The vertical in a stream's frame: a unit vector (3,); signed: whether its direction is known to be up."""
+
+    normal: Array
+    signed: bool = False
+
+    @property
+    def tilt(self) -> float:
+        """Angle (rad) to the frame's z axis, up to pi; up to pi / 2 where the direction is unknown."""
+        return float(np.arccos(np.clip(self.normal[2] if self.signed else abs(self.normal[2]), -1.0, 1.0)))
+
+    @property
+    def axis(self) -> str | None:
+        """The axis that is meant to be up, such as "-y", None if no axis is near the vertical."""
+        k = int(np.argmax(np.abs(self.normal)))
+        if abs(self.normal[k]) < np.cos(UPRIGHT):
+            return None
+        return f"{'-' if self.normal[k] < 0.0 else ''}{AXES[k]}"
+
+
+def up_findings(recording: Recording, rig: Rig) -> list[Finding]:
+    """A refusal if an axis other than z is up in a stream, a warning if z is tilted; empty where z is up."""
+    ups = {name: up for name, up in _ups(recording).items() if up is not None}
+    wrong = {name: up for name, up in ups.items() if up.axis != "z" or _foreshortens(up, rig)}
+    if not wrong:
+        return []
+    values = {f"{name}_tilt": Value(up.tilt, "rad") for name, up in wrong.items()}
+    axes = [up.axis for up in wrong.values()]
+    if None in axes or "z" in axes:
+        return [_tilted(wrong, values)]
+    both = len(ups) == len(wrong) == 2 and len(set(axes)) == 1
+    options = ["--up " + (f"{axis}" if both else f"{name}={axis}") for name, axis in zip(wrong, axes, strict=True)]
+    given = " and ".join(f"`{option}`" for option in dict.fromkeys(options))
+    return [Finding("world_up", "refused", _raised(wrong), f"Turn the poses until z points up: {given}.", values)]
+
+
+def _raised(wrong: dict[str, Up]) -> str:
+    """What shows that another axis is up."""
+    named = [f"in the {name}'s frame {up.axis}" for name, up in wrong.items()]
+    if all(up.axis == "-z" for up in wrong.values()):
+        frames = " and ".join(f"the {name}'s frame" for name in wrong)
+        shown = "the tip is lifted towards negative z" if "pusher" in wrong else "the slider moves as seen from below"
+        return f"z points down in {frames}: {shown}. Contacts would be mirrored."
+    return f"The axis that points up is {' and '.join(named)}, not z: it is normal to the plane of the pushes."
+
+
+def _tilted(wrong: dict[str, Up], values: dict[str, Value]) -> Finding:
+    refused = any(up.axis is None for up in wrong.values())
+    stated = " and ".join(f"{np.degrees(up.tilt):.0f} degrees in the {name}'s frame" for name, up in wrong.items())
+    sentence = f"The plane of the pushes is tilted against the plane of x and y by {stated}: it shortens lengths."
+    advice = "Calibrate the frame on the table, or publish its pose in a level frame on /tf and give --world-frame."
+    return Finding("world_tilted", "refused" if refused else "warning", sentence, advice, values)
+
+
+def _foreshortens(up: Up, rig: Rig) -> bool:
+    """Whether a tilted view shortens the slider by more than a finding on its size allows."""
+    return rig.outline.reach * (1.0 - abs(float(up.normal[2]))) > LENGTH_ALLOWANCE
+
+
+def _ups(recording: Recording) -> dict[str, Up | None]:
+    """The vertical in the frames of slider and pusher, None where the positions do not show it."""
+    slider, pusher = recording.slider, recording.pusher
+    if min(len(slider), len(pusher)) < FEWEST_STEPS:
+        return {}
+    begin, end = max(slider.stamp.min(), pusher.stamp.min()), min(slider.stamp.max(), pusher.stamp.max())
+    span, least = _span(slider)
+    time = np.linspace(begin, end - 1e9 * span, MOST_STEPS)
+    if time[-1] <= time[0]:
+        return {}
+    (_, step), (tip, tip_step) = _positions(slider, time, span), _positions(pusher, time, span)
+    length, tip_length = np.linalg.norm(step, axis=1), np.linalg.norm(tip_step, axis=1)
+    moved = (length > least) & (tip_length > LEAST_STEP)
+    one, other = _plane(step[moved]), _plane(tip_step[moved])
+    if other is not None:
+        other = _lifted(tip @ other.normal, moved, other)
+    if one is not None and other is not None:
+        pushed = moved & (length > ALIKE[0] * tip_length) & (length < ALIKE[1] * tip_length)
+        one = _as_seen_with(other, one, step[pushed], tip_step[pushed], slider)
+    return {"slider": one, "pusher": other}
+
+
+def _span(slider: PoseStream) -> tuple[float, float]:
+    """The time (s) of a step, and the length (m) from which on a step is a motion, whatever the tracker's noise."""
+    place = np.column_stack([slider.x, slider.y, slider.z])
+    noise = NOISE * float(np.max(SD * np.median(np.abs(np.diff(place, 2, axis=0)), axis=0))) / np.sqrt(3.0)
+    return next((span for span in STEPS if noise * STEPS[0] < QUIET * span), STEPS[-1]), max(noise, LEAST_STEP)
+
+
+def _positions(stream: PoseStream, time: Array, span: float) -> tuple[Array, Array]:
+    """Places (n, 3) m at times (n,) ns, and the steps (n, 3) m from there in a span (s)."""
+    order = np.unique(stream.stamp, return_index=True)[1]
+    known = stream.stamp[order].astype(np.float64)
+    columns = [of[order] for of in (stream.x, stream.y, stream.z)]
+    now, then = (np.column_stack([np.interp(at, known, of) for of in columns]) for at in (time, time + 1e9 * span))
+    return now, then - now
+
+
+def _plane(steps: Array) -> Up | None:
+    """The normal of the plane in which most of the steps (n, 3) m lie, None if they do not show one.
+
+    The axis that is nearest to it points along it.
+    """
+    if len(steps) < FEWEST_STEPS:
+        return None
+    weight = np.ones(len(steps))
+    for _ in range(ROUNDS):
+        _, axes = np.linalg.eigh((steps * weight[:, None]).T @ steps)
+        off = np.abs(steps @ axes[:, 0])
+        weight = 1.0 / (off + ACCURACY)
+    narrow = float(np.sqrt(np.median((steps @ axes[:, 1]) ** 2)))
+    if narrow < max(FLAT * float(np.median(off)), LEAST_STEP):
+        return None
+    normal = axes[:, 0]
+    return Up(normal * np.sign(normal[np.argmax(np.abs(normal))]))
+
+
+def _lifted(height: Array, moved: BoolArray, up: Up) -> Up:
+    """With the direction in which the tip is lifted, if it is; height (n,) m along the normal."""
+    usual = float(np.median(height[moved]))
+    above, below = int(np.sum(height > usual + LIFT)), int(np.sum(height < usual - LIFT))
+    if max(above, below) < FEWEST_STEPS or max(above, below) < MOSTLY * min(above, below):
+        return up
+    return Up(up.normal if above > below else -up.normal, signed=True)
+
+
+def _as_seen_with(tip: Up, slider: Up, steps: Array, tip_steps: Array, stream: PoseStream) -> Up:
+    """The slider's vertical, in the direction from which its steps (n, 3) m are those of the tip, and not mirrored.
+
+    Axes of a planar tracker that are mirrored are no matter of up and down.
+    """
+    one, other = _seen_along(slider.normal, steps), _seen_along(tip.normal, tip_steps)
+    alike, mirrored = abs(np.sum(np.conj(one) * other)), abs(np.sum(one * other))
+    if max(alike, mirrored) < MIRRORED * min(alike, mirrored):  # pushes along one line: as in one world
+        return Up(tip.normal, tip.signed) if slider.axis == (tip.axis or "").removeprefix("-") else slider
+    same = alike > mirrored
+    level = slider.axis == "z" and tip.axis == "z"
+    if level and not same and tilt_of(stream) < OVERTURNED:
+        return slider
+    return Up(slider.normal if same else -slider.normal, signed=tip.signed)
+
+
+def _seen_along(normal: Array, steps: Array) -> Array:
+    """Directions of steps (n, 3) as complex numbers (n,) in a right-handed frame whose third axis is the normal."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    return np.asarray(np.exp(1j * np.arctan2(steps @ np.cross(normal, first), steps @ first)))

@@ -1,0 +1,132 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses that are repeated with new stamps while the body moves on: by a tracker that lost it, or by a slower source.
+
+A repeat is stale if the next change exceeds what a body at the speed seen around it moves in one interval. Stale poses
+of a slow source are replaced by those on the line to its next pose, as between any two samples. Where the source is
+silent for longer than usual they are discarded, which makes a dropout. A body at rest repeats its pose, too: nothing
+is changed there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.windows.resolution import lengths
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
+from push_predictor.types import Array, BoolArray, IntArray
+
+HARMLESS = 1e-4  # m: so small a change makes no outcome wrong
+CONTINUES = 5.0  # times the way at the speed after it; a body that was placed elsewhere moves farther
+MARGIN = 1.5  # times the way in one interval: after one missing sample it is 2
+LONGEST_HOLD = 1_000_000_000  # ns: a body that repeats its pose for longer is at rest
+USUAL = 9  # changes whose median interval is the usual one
+
+
+class HeldPoses:
+    """Takes the samples of one stream in order and returns them without stale ones.
+
+    A repeat waits until the body has changed its pose twice, or for LONGEST_HOLD. The result does not depend on the
+    portions. stale: number of stale samples; updates: intervals (s) between the poses of a slow source; dropouts:
+    intervals (s) of a source that was silent for longer than usual.
+    """
+
+    def __init__(self, angle: int | None = None) -> None:
+        """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        self.stale = 0
+        self.updates: list[float] = []
+        self.dropouts: list[float] = []
+        self._angle = angle
+        self._samples: OrderedSamples | None = None  # those that wait, after the first sample of the same pose
+        self._returned = 0  # of these samples
+        self._before = np.empty(0, np.int64)  # stamps (ns) at which the poses before these began
+        self._pose: Array | None = None  # the one before these
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        samples = new if self._samples is None else joined(self._samples, new)
+        pose = lengths(samples.values, self._angle)
+        begins = np.flatnonzero(np.append(True, np.any(pose[1:] != pose[:-1], axis=1))[: len(pose)])
+        keep, values, decided = self._judge(samples, pose, begins, final)
+        rows = np.arange(self._returned, decided)
+        found = taken(with_values(samples, values), rows[keep[rows]])
+        self._forget(with_values(samples, values), pose, begins, decided)
+        return found
+
+    def _judge(
+        self, samples: OrderedSamples, pose: Array, begins: IntArray, final: bool
+    ) -> tuple[BoolArray, Array, int]:
+        """Which samples (n,) are kept, their values, and how many are decided; begins: of the runs of one pose."""
+        stamp, ends = samples.stamp, np.append(begins[1:], len(pose))
+        keep, values = np.ones(len(pose), dtype=np.bool_), samples.values.copy()
+        first = np.concatenate([self._before, stamp[begins]])
+        for run in np.flatnonzero(ends - begins > 1).tolist():
+            begin, end = int(begins[run]), int(ends[run])
+            if stamp[end - 1] - stamp[begin] > LONGEST_HOLD:
+                continue
+            if not final and not self._decidable(stamp, begins, run):
+                return keep, values, max(begin + 1, self._returned)
+            if run + 1 < len(begins) and self._is_stale(stamp, pose, begins, run, float(values[end, -1])):
+                rows = np.arange(max(begin + 1, self._returned), end)
+                usual = first[: run + len(self._before) + 2][-USUAL - 1 :]
+                interval = float(stamp[end] - stamp[begin]) * NANOSECOND
+                self.stale += len(rows)
+                slow = interval <= longest_interval(float(np.median(np.diff(usual))) * NANOSECOND)
+                (self.updates if slow else self.dropouts).append(interval)
+                if slow:
+                    share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
+                    values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
+                else:
+                    keep[rows] = False
+        return keep, values, len(pose)
+
+    def _decidable(self, stamp: IntArray, begins: IntArray, run: int) -> bool:
+        """Whether the two poses after that of a run are known, or the first of them lasts."""
+        if run + 2 < len(begins):
+            return True
+        return run + 1 < len(begins) and int(stamp[-1] - stamp[begins[run + 1]]) > LONGEST_HOLD
+
+    def _is_stale(self, stamp: IntArray, pose: Array, begins: IntArray, run: int, quantum: float) -> bool:
+        """Whether the body moved on during a run: the change after it is too large for one interval."""
+        if run + 2 >= len(begins):
+            return False
+        begin, now, later = (int(at) for at in begins[run : run + 3])
+        change = float(np.linalg.norm(pose[now] - pose[begin]))
+        rests = int(stamp[later - 1] - stamp[now]) > LONGEST_HOLD
+        after = (
+            0.0 if rests else float(np.linalg.norm(pose[later] - pose[now])) / int(stamp[later] - stamp[now])
+        )  # m/ns
+        if change > CONTINUES * after * int(stamp[now] - stamp[begin]):
+            return False
+        one = MARGIN * max(after, self._speed_before(stamp, pose, begins, run)) * int(stamp[now] - stamp[now - 1])
+        return change > HARMLESS + MARGIN * quantum + one
+
+    def _speed_before(self, stamp: IntArray, pose: Array, begins: IntArray, run: int) -> float:
+        """From the pose before that of a run to it, m/ns; 0 for the first."""
+        if run:
+            last, since = pose[begins[run - 1]], int(stamp[begins[run - 1]])
+        elif self._pose is not None:
+            last, since = self._pose, int(self._before[-1])
+        else:
+            return 0.0
+        return float(np.linalg.norm(pose[begins[run]] - last)) / int(stamp[begins[run]] - since)
+
+    def _forget(self, samples: OrderedSamples, pose: Array, begins: IntArray, decided: int) -> None:
+        """Keep the samples that wait, and the first and the last one before them that have the same pose."""
+        if not len(pose):
+            return
+        run = int(np.searchsorted(begins, max(decided - 1, 0), side="right")) - 1
+        begin = int(begins[run])
+        if run:
+            self._pose = pose[begins[run - 1]]
+        self._before = np.concatenate([self._before, samples.stamp[begins[:run]]])[-USUAL:]
+        rows = np.unique([begin, decided - 1, *range(decided, len(pose))])
+        self._samples = taken(samples, rows)
+        self._returned = int(np.sum(rows < decided))

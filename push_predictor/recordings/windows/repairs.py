@@ -1,0 +1,59 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is repaired in a stream in order: stale poses, stamps with jitter, and a coarse resolution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.recordings.windows.held import HeldPoses
+from push_predictor.recordings.windows.regular_stamps import RegularStamps
+from push_predictor.recordings.windows.resolution import Resolution, lengths
+from push_predictor.recordings.windows.smoothing import SmoothedPoses
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, with_values
+from push_predictor.types import Array
+
+
+class StreamRepairs:
+    """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
+
+    held, smoothed: None for a stream without a position. The result does not depend on the portions.
+    """
+
+    def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
+        """is_jump: of poses whose first two columns are a position, m; None for other streams.
+
+        angle: index of the column with a heading, rad, which is unwrapped; None without one.
+        """
+        self.regular = RegularStamps()
+        self.held = None if is_jump is None else HeldPoses(angle)
+        self.smoothed = None if is_jump is None else SmoothedPoses(is_jump, angle)
+        self._resolution = Resolution(2 if angle is None else 3)
+        self._angle = angle
+        self._heading: Array = np.empty(0)  # the last one, rad
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return self.regular.waiting + sum(step.waiting for step in (self.held, self.smoothed) if step is not None)
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        if self.held is None or self.smoothed is None:
+            return self.regular.take(new, final)
+        values = self._unwrapped(new.values)
+        # The repair of one must not hide the resolution from the next: they get it as a further column.
+        quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
+        new = with_values(new, np.column_stack([values, quantum]))
+        for step in (self.held, self.regular, self.smoothed):
+            new = step.take(new, final)
+        return with_values(new, new.values[:, :-1])
+
+    def _unwrapped(self, values: Array) -> Array:
+        if self._angle is None or not len(values):
+            return values
+        values = values.copy()
+        heading = np.unwrap(np.concatenate([self._heading, values[:, self._angle]]))
+        values[:, self._angle], self._heading = heading[len(self._heading) :], heading[-1:]
+        return values

@@ -1,0 +1,140 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses of a coarse resolution, read from lines through the samples around each.
+
+Between two steps of its resolution a coordinate stands still and then jumps: neither its speed nor its place is that of
+the body. A line over several steps has both. It spans as little as the resolution allows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.windows.parts import part_means, part_rows
+from push_predictor.recordings.windows.resolution import EVIDENCE, LEVER
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, joined, taken, with_values
+from push_predictor.types import Array, BoolArray, IntArray
+
+SPEED_ERROR = 0.0015  # m/s: of a line's slope, standard deviation; a slower tip counts as resting
+SHORTEST, LONGEST = 0.020, 0.2  # s: a window's velocity is fitted over the one; the other is a window
+LONGEST_GAP = 0.1  # s without samples that no line spans
+KINK = 3.0  # times the mean square of rounding: what a line leaves where the motion changes within its span
+AT_ONCE = 4096  # samples that get their lines at once: each needs its neighbours' in memory
+
+
+def fit_span(quantum: Array | float, period: float) -> Array:
+    """The span (s) over which a line through samples of a resolution (m) has a slope with an error of SPEED_ERROR.
+
+    Rounding is an independent error of quantum / sqrt(12) at each sample; n = span / period samples leave the slope an
+    error of sqrt(12 / n) / span times that.
+    """
+    return np.asarray((np.asarray(quantum) * np.sqrt(period) / SPEED_ERROR) ** (2.0 / 3.0))
+
+
+class SmoothedPoses:
+    """Takes the samples of one stream in order and returns them with smoothed positions and headings.
+
+    Samples of a fine resolution are returned at once and unchanged; others wait for the span of a line. resolution: of
+    the newest samples, m; 0 if it is fine.
+    """
+
+    def __init__(self, is_jump: IsJump, angle: int | None = None) -> None:
+        """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        self._columns = [0, 1] if angle is None else [0, 1, angle]
+        self._is_jump = is_jump
+        self.resolution = 0.0
+        self._first: IntArray = np.empty(0, np.int64)  # stamps (ns) that determine the period
+        self._samples: OrderedSamples | None = None
+        self._half = np.empty(0)  # s, of the lines at these samples
+        self._returned = 0  # of these samples
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        self._first = np.concatenate([self._first, new.stamp])[: EVIDENCE + 1]
+        samples = new if self._samples is None else joined(self._samples, new)
+        self._half = np.concatenate([self._half, self._halves(new.values)])
+        stamp = samples.stamp
+        complete = stamp + 2e9 * self._half < (stamp[-1] if len(stamp) else 0)
+        waits = np.flatnonzero(~complete & (self._half > 0.0))
+        end = len(stamp) if final or not len(waits) else max(int(waits[0]), self._returned)
+        rows = np.arange(self._returned, end)
+        values = samples.values[rows]
+        if (coarse := self._half[rows] > 0.0).any():
+            values[np.flatnonzero(coarse)[:, None], self._columns] = self._lines(samples, rows[coarse])
+        found = with_values(taken(samples, rows), values)
+        begin = (
+            int(np.searchsorted(stamp, (stamp[end] if end < len(stamp) else stamp[-1]) - 1e9 * LONGEST)) if end else 0
+        )
+        keep = slice(min(begin, end), None)
+        self._samples, self._half, self._returned = taken(samples, keep), self._half[keep], end - keep.start
+        return found
+
+    def _halves(self, values: Array) -> Array:
+        """Half the span (n,) s of the lines at samples (n, k), 0 for a fine resolution."""
+        period = float(np.median(np.diff(self._first))) * NANOSECOND if len(self._first) > 1 else 0.0
+        span = fit_span(values[:, -1], period)
+        if len(span):
+            self.resolution = float(values[-1, -1]) if span[-1] > SHORTEST else 0.0
+        return np.where(span > SHORTEST, 0.5 * np.minimum(span, LONGEST), 0.0)
+
+    def _lines(self, samples: OrderedSamples, rows: IntArray) -> Array:
+        """The values (m, c) of the smoothed columns at m samples, on least-squares lines through those around each.
+
+        Where the motion has a kink in this span, on the line through those before or after that fits better.
+        """
+        stamp, values = samples.stamp, samples.values[:, self._columns]
+        half = (1e9 * self._half[rows]).astype(np.int64)
+        piece = self._pieces(samples)
+        begin, end = np.searchsorted(piece, piece[rows]), np.searchsorted(piece, piece[rows], side="right")
+        spans = ((half, half), (2 * half, 0), (0, 2 * half))
+        first = [np.maximum(np.searchsorted(stamp, stamp[rows] - before), begin) for before, _ in spans]
+        last = [np.minimum(np.searchsorted(stamp, stamp[rows] + after, side="right"), end) for _, after in spans]
+        found, misfit = _lines_at(stamp, values, rows, first[0], last[0])
+        rounding = samples.values[rows, -1] ** 2 / 12.0
+        kinks = np.flatnonzero(self._total(misfit) > KINK * rounding)
+        if len(kinks):
+            sides = [_lines_at(stamp, values, rows[kinks], first[k][kinks], last[k][kinks]) for k in (1, 2)]
+            least = np.argmin([self._total(of) for _, of in sides], axis=0)
+            better = np.min([self._total(of) for _, of in sides], axis=0) < self._total(misfit[kinks]) / KINK
+            found[kinks] = np.where(
+                better[:, None], np.where(least[:, None] == 0, sides[0][0], sides[1][0]), found[kinks]
+            )
+        return found
+
+    def _total(self, misfit: Array) -> Array:
+        """The misfit (m,) m^2 of all columns, from their mean squares (m, c)."""
+        return np.asarray(misfit @ np.array([1.0, 1.0, LEVER**2])[: len(self._columns)])
+
+    def _pieces(self, samples: OrderedSamples) -> IntArray:
+        """Numbers (n,) of the pieces between breaks, which no line spans."""
+        elapsed = np.diff(samples.stamp) * NANOSECOND
+        breaks: BoolArray = samples.interrupted[1:] | (elapsed > LONGEST_GAP)
+        breaks = breaks | self._is_jump(samples.values[:-1], samples.values[1:], elapsed)
+        return np.concatenate([[0], np.cumsum(breaks)]) if len(samples.stamp) else np.empty(0, np.int64)
+
+
+def _lines_at(stamp: IntArray, values: Array, rows: IntArray, first: IntArray, last: IntArray) -> tuple[Array, Array]:
+    """The values (m, c) at m samples of the lines through those from each first to before each last.
+
+    Also the mean square (m, c) of what a line leaves.
+    """
+    found, misfit = [], []
+    for at in range(0, len(rows), AT_ONCE):
+        part = slice(at, at + AT_ONCE)
+        count, inside = (last - first)[part], part_rows(first[part], last[part])
+        time = np.asarray((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
+        mean_time, mean = part_means(time, count), part_means(values[inside], count)
+        late = time - np.repeat(mean_time, count, axis=0)
+        off = values[inside] - np.repeat(mean, count, axis=0)
+        spread = part_means(late**2, count)
+        slope = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
+        found.append(mean - slope * mean_time)
+        misfit.append(part_means((off - np.repeat(slope, count, axis=0) * late) ** 2, count))
+    return np.concatenate(found), np.concatenate(misfit)
