@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 from made_up_traces import pushes, slippery
 from synthetic import square_rig
 
