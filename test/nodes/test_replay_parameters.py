@@ -17,7 +17,7 @@ from push_predictor.nodes import runtime
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR
 from push_predictor.nodes.parameters import Param, native
 from push_predictor.nodes.push_replay import PushReplay
-from push_predictor.nodes.replay.topics import is_played
+from push_predictor.nodes.replay_topics import is_played
 from push_predictor.recordings.topics import KEYS
 
 
