@@ -3,7 +3,8 @@
 
 """Whether a model fits a recording: a sentence, a label of few words, and what to do.
 
-The evidence is the alarm, and the share of the outcomes that the predicted intervals contain.
+The evidence is the alarm, the share of the outcomes that the predicted intervals contain, and the squared error against
+that of mechanics with textbook parameters: a model that learnt from pushes and predicts worse learnt their faults.
 """
 
 from __future__ import annotations
@@ -57,6 +58,9 @@ def judged(metrics: Mapping[str, Any]) -> Judgement:
     if pushes < FEWEST:
         action = f"Record at least {FEWEST} pushes, then validate again."
         return Judgement("too few pushes", f"Too few pushes to judge the model: {evidence}.", action)
+    if worse := _worse_than_textbook(metrics):
+        action = "Check the recordings that it learnt from with `push_predictor check`, and this one."
+        return Judgement("worse than physics", f"The model predicts worse than textbook physics: {worse}.", action)
     if 2 * int(metrics.get("n_training_pushes", 0)) >= pushes:
         action = "Validate it with a recording that was not used for training."
         return Judgement("fits its training", f"The model fits its own training pushes: {evidence}.", action)
@@ -64,6 +68,15 @@ def judged(metrics: Mapping[str, Any]) -> Judgement:
         action = "Use the model, but watch its errors: without the alarm a slow change stays unseen."
         return Judgement("no objection", f"Nothing speaks against the model: {evidence}.", action)
     return Judgement("fits", f"The model fits: {evidence}.", "Use the model for pushes like these.")
+
+
+def _worse_than_textbook(metrics: Mapping[str, Any]) -> str:
+    """The squared errors in words, if that of the model is clearly larger; else empty."""
+    textbook = metrics.get("textbook")
+    if textbook is None or not (textbook["difference"].get("low") or 0.0) > 0.0:
+        return ""
+    own, physics = metrics["nmse"]["total"], textbook["nmse"]["total"]
+    return f"its squared error (total NMSE) is {own:.3g}, that of physics {physics:.3g}"
 
 
 def covered(metrics: Mapping[str, Any]) -> float:

@@ -20,6 +20,7 @@ from push_predictor.evaluation.metrics import (
     standardised,
 )
 from push_predictor.evaluation.push_scores import push_scores
+from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.predictors.tails import IntervalKind, Tails, half_widths, joint_radius
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -35,7 +36,7 @@ class Comparison:
 
     mean, observed (n, 3); covariance (n, 3, 3); exact_log_density (n, 3), None where the predictive is Gaussian;
     push_id (n,); training_mean (3,), the reference of the NMSE; tails: of the predictive distribution, None for a
-    Gaussian.
+    Gaussian. textbook (n, 3): what mechanics with textbook parameters predicts, None if it was not computed.
     """
 
     model: str
@@ -47,6 +48,7 @@ class Comparison:
     exact_log_density: Array | None
     training_mean: Array
     tails: Tails | None = None
+    textbook: Array | None = None
 
     @property
     def variance(self) -> Array:
@@ -78,7 +80,12 @@ def compare(model: PushModel, table: PushTable) -> Comparison:
 def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
     """Combine given predictions (n, 3), (n, 3, 3), for instance from a service, with a table's outcomes."""
     moments = comparison_of_moments(model, table, mean, covariance)
-    return replace(moments, exact_log_density=model.exact_log_density(table))
+    textbook = analytical_mechanics(model.rig.outline, model.rig.pusher_radius)
+    return replace(
+        moments,
+        exact_log_density=model.exact_log_density(table),
+        textbook=textbook.displacement(table.inputs, table.duration),
+    )
 
 
 def comparison_of_moments(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
@@ -117,6 +124,7 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
         "coverage": {str(level): _coverage(c, level) if count else None for level in COVERAGE_LEVELS},
         "joint_coverage": _joint_coverage(c),
         "interval": _intervals(c),
+        "textbook": _textbook(c),
     }
 
 
@@ -150,6 +158,17 @@ def _intervals(c: Comparison) -> dict[str, object]:
     draws = push_scores(c).resampled()
     nmse_draws, nlpd_draws = draws.nmse.sum(axis=1), draws.nlpd.sum(axis=1)
     return {"level": 0.95, "by": "push", "nmse": _interval(nmse_draws), "nlpd": _interval(nlpd_draws)}
+
+
+def _textbook(c: Comparison) -> dict[str, object] | None:
+    """The NMSE of mechanics with textbook parameters, and the model's minus it, with a 95 % interval over pushes."""
+    if c.textbook is None or not len(c.observed):
+        return None
+    scores = nmse(c.textbook, c.observed, c.training_mean)
+    own = nmse(c.mean, c.observed, c.training_mean)
+    draws = [push_scores(each).resampled().nmse.sum(axis=1) for each in (c, replace(c, mean=c.textbook))]
+    interval = _interval(draws[0] - draws[1]) or {"low": None, "high": None}
+    return {"nmse": _named(scores), "difference": {"value": _number(np.sum(own) - np.sum(scores)), **interval}}
 
 
 def _interval(draws: Array) -> dict[str, float | None] | None:

@@ -20,12 +20,14 @@ from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
+from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.load import no_inspection
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
+from push_predictor.residuals.channels.clocks import NAMES, clock_errors, clock_notes
 from push_predictor.residuals.channels.contrast import ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
@@ -68,9 +70,11 @@ def trace_data(
     data = [Path(path) for path in paths]
     options, inspect = window_options(model), checks or no_inspection
     loaded = load_evidence(data, rig, options, topics=topics, inspect=inspect)
+    clocks: tuple[Finding, ...] = ()
     if checks is not None:
         checks.judged_by(data, loaded.table, loaded.rig)
-    return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
+        clocks = checks.found(*NAMES)
+    return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch, clocks=clocks)
 
 
 def trace(
@@ -81,19 +85,23 @@ def trace(
     covariates: Sequence[str] | None = None,
     seed: int = 0,
     watch: Watch = no_watch,
+    clocks: Sequence[Finding] = (),
 ) -> Trace:
     """Find what the model fails to explain in these windows, and what it depends on.
 
     alpha: probability of any false alarm if nothing changed. covariates: those to try, all recorded ones if None.
-    watch: called with the name of each stage and the share of the work done when it begins. Raises RequestError for an
-    alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
+    watch: called with the name of each stage and the share of the work done when it begins. clocks: findings of `check`
+    about clocks that are off; no model is extended then. Raises RequestError for an alpha outside (0, 1), a covariate
+    that is not recorded, or too few pushes.
     """
     question = Question.of(model, loaded, alpha, covariates, seed)
     found = search_all(question, watch)
     if found.corrected is not None:
-        return _of_measurement(question, found.corrected)
+        return _of_measurement(question, found.corrected, (CUT_AGAIN if found.corrected.evidence else NO_STREAMS,))
+    if clocks and (found.motion.terms or found.motion.variance or found.forces.effects):
+        return _of_measurement(question, Corrected(clock_errors(clocks), None, None), clock_notes(clocks))
     watch("extended model", 0.7)
-    return _of_motion(question, found)
+    return _of_motion(question, found, clock_notes(clocks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +117,10 @@ class _Extension:
 # --- measurement ---------------------------------------------------------------------------------------------------
 
 
-def _of_measurement(question: Question, corrected: Corrected) -> Trace:
+def _of_measurement(question: Question, corrected: Corrected, notes: Sequence[str]) -> Trace:
     """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
     model, measured = question.model, corrected.finding
-    first, cut = measured.effects[0], corrected.evidence is not None
+    first = measured.effects[0]
     refit = held_out_windows(refit_base(model, question.evidence.table)).calibrated()
     return Trace(
         verdict="measurement",
@@ -136,14 +144,14 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         remaining=None,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(question)),
+        notes=(*notes, *notes_of_data(question)),
     )
 
 
 # --- motion, variance and wrench -----------------------------------------------------------------------------------
 
 
-def _of_motion(question: Question, found: Searched) -> Trace:
+def _of_motion(question: Question, found: Searched, notes: Sequence[str]) -> Trace:
     motion, measured, forces = found.motion, found.measured, found.forces
     extension = _extension(question, motion)
     gain, after = extension.gain, extension.after or extension.refit
@@ -177,7 +185,7 @@ def _of_motion(question: Question, found: Searched) -> Trace:
             for fault in found.harmless
             for size in fault.parameters
         ),
-        notes=(*notes_of(question, found), *notes_of_shift(question.shifted)),
+        notes=(*notes, *notes_of(question, found), *notes_of_shift(question.shifted)),
     )
 
 

@@ -56,6 +56,20 @@ def test_coverage_error_and_alarm_decide_the_label(found: dict[str, Any], label:
 
 
 @pytest.mark.parametrize(
+    ("low", "pushes", "label"),
+    [(0.01, 100, "worse than physics"), (-0.01, 100, "fits"), (None, 100, "fits"), (0.01, 9, "too few pushes")],
+)
+def test_a_model_worse_than_textbook_physics_does_not_fit_whatever_its_coverage(
+    low: float | None, pushes: int, label: str
+) -> None:
+    textbook = {"nmse": {"total": 0.5}, "difference": {"value": 0.16, "low": low, "high": 0.3}}
+    found = judged({**metrics(0.95, pushes, 0.66), "textbook": textbook, "n_training_pushes": pushes - 1})
+    assert found.label == ("fits its training" if label == "fits" else label)
+    assert ("is 0.66, that of physics 0.5" in found.sentence) == (label == "worse than physics")
+    assert len(found.sentence.split()) <= 25
+
+
+@pytest.mark.parametrize(
     "found",
     [
         metrics(share, pushes, nmse, **alarm)

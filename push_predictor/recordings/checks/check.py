@@ -12,13 +12,13 @@ from __future__ import annotations
 from push_predictor.recordings.checks.clocks import clock_stage
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.force.stage import force_stage
 from push_predictor.recordings.checks.frames import frame_stage
 from push_predictor.recordings.checks.geometry import geometry_stage
 from push_predictor.recordings.checks.losses import loss_stage
 from push_predictor.recordings.checks.stream_checks import stream_stage
 from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.checks.units import table_units
-from push_predictor.recordings.checks.wrench import force_stage
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable

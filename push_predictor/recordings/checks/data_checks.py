@@ -29,6 +29,7 @@ class DataChecks:
         self._failing = ("refused", "warning") if strict else ("refused",)
         self._report = report
         self._reported: set[str] = set()
+        self._found: list[Finding] = []
 
     def __call__(self, path: Path, data: Recording | PushTable, rig: Rig | None) -> None:
         """Check what was read from a path."""
@@ -45,7 +46,12 @@ class DataChecks:
         """Check which part of the domain the pushes of all paths cover: a model is judged on that part only."""
         self._judge(paths, pushed_part(table, rig))
 
+    def found(self, *names: str) -> tuple[Finding, ...]:
+        """The findings of these names so far, in order."""
+        return tuple(finding for finding in self._found if finding.name in names)
+
     def _judge(self, paths: Iterable[Path], findings: Sequence[Finding]) -> None:
+        self._found += findings
         name = ", ".join(map(str, paths))
         if wrong := [finding.text for finding in findings if finding.severity in self._failing]:
             raise RecordingError(f"{name}: {' '.join(wrong)}")

@@ -71,9 +71,9 @@ def up_findings(recording: Recording, rig: Rig) -> list[Finding]:
     if None in axes or "z" in axes:
         return [_tilted(wrong, values)]
     both = len(ups) == len(wrong) == 2 and len(set(axes)) == 1
-    options = ["--up " + (f"{axis}" if both else f"{name}={axis}") for name, axis in zip(wrong, axes, strict=True)]
-    given = " and ".join(f"`{option}`" for option in dict.fromkeys(options))
-    return [Finding("world_up", "refused", _raised(wrong), f"Turn the poses until z points up: {given}.", values)]
+    option = f"{axes[0]}" if both else ",".join(f"{name}={axis}" for name, axis in zip(wrong, axes, strict=True))
+    advice = f"Turn the poses until z points up: `--up={option}`."
+    return [Finding("world_up", "refused", _raised(wrong), advice, values)]
 
 
 def _raised(wrong: dict[str, Up]) -> str:

@@ -124,8 +124,9 @@ def _absent(wrench: Track | None, time: Array) -> BoolArray:
         return np.ones(len(time), dtype=np.bool_)
     known = np.concatenate([[-np.inf], wrench.time, [np.inf]])
     after = np.searchsorted(known, time)
-    ended = (after == len(known) - 1) & (time <= known[-2] + wrench.longest_gap)
-    return np.asarray((known[after] - known[after - 1] > LONGEST_BREAK) & ~ended)
+    at_ends = (time >= wrench.time[0] - wrench.longest_gap) & (time <= wrench.time[-1] + wrench.longest_gap)
+    inside = (after > 1) & (after < len(known) - 1)
+    return np.asarray((known[after] - known[after - 1] > LONGEST_BREAK) & (inside | ~at_ends))
 
 
 def _forces(wrench: Track | None, time: Array, absent: BoolArray) -> Array:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -90,11 +90,15 @@ class ForceTiming:
         self._last_contact = -np.inf
 
     def add(
-        self, sample: ContactSample, contact: bool, free_force: Sequence[tuple[float, float]], least_force: float
+        self,
+        sample: ContactSample,
+        contact: bool,
+        free_force: Sequence[tuple[float, float]],
+        least_force: Callable[[], float],
     ) -> None:
         """Add a sample. contact: whether the geometry shows one; free_force: what the sensor last read without one.
 
-        least_force: N, a smaller one does not show a contact.
+        least_force: N, a smaller one does not show a contact; asked at a touch only.
         """
         if sample.force is None or sample.after_break or not free_force:
             self._samples.clear()
@@ -107,7 +111,7 @@ class ForceTiming:
             if contact and sample.time - self._last_contact > PAUSE:
                 self._touch = sample
         elif sample.time > self._touch.time + SEARCHED:
-            self._judge(self._touch, np.median(free_force, axis=0), least_force)
+            self._judge(self._touch, np.median(free_force, axis=0), least_force())
         if contact:
             self._last_contact = sample.time
 

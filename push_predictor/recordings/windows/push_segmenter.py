@@ -69,7 +69,9 @@ class PushSegmenter:
         """Add one sample and return the windows that end at or before it."""
         self._update_breaks(sample)
         self._update_tare(sample)
-        self._touching = touching = not (sample.in_break or self._inside) and self._touches(sample)
+        judged = not (sample.in_break or self._inside)
+        self._shown = judged and self._shows_contact(sample)
+        self._touching = touching = judged and self._touches(sample)
         self.samples += 1
         self.touching += touching
         if touching and self._first_touch is None:
@@ -104,18 +106,17 @@ class PushSegmenter:
             self._zero = None
 
     def _touches(self, sample: ContactSample) -> bool:
-        self._shown = shown = self._shows_contact(sample)
-        moving = shown and sample.speed >= self.options.least_speed
-        self.timing.add(sample, moving, self._free_force, max(CLEAR * self.options.least_force, self._least_force()))
+        pushing = self._shown and sample.speed >= self.options.least_speed
+        self.timing.add(sample, pushing, self._free_force, self._clear_force)
         if sample.height > self.options.lift:
             return False
         pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
         if self.timing.apart:
-            return shown
+            return self._shown
         if sample.force is not None and self._free_force:
             return pressed
         # The force on a resting tip may be a preload: it can continue a contact but not show its begin or end.
-        return shown or (self._touching and pressed)
+        return self._shown or (self._touching and pressed)
 
     def _shows_contact(self, sample: ContactSample) -> bool:
         """Whether the geometry shows a contact: the gap is small and does not shrink before it, nor grow after it."""
@@ -134,6 +135,10 @@ class PushSegmenter:
     def _least_force(self) -> float:
         """The force (N) above which there is contact."""
         return max(self.options.least_force, NOISE_FACTOR * self._tare()[1])
+
+    def _clear_force(self) -> float:
+        """The force (N) that shows a contact without delay."""
+        return max(CLEAR * self.options.least_force, self._least_force())
 
     def _tare(self) -> tuple[tuple[float, float] | None, float]:
         """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""

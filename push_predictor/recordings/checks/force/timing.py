@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.wrench_direction import TOPIC
+from push_predictor.recordings.checks.force.direction import TOPIC
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream

@@ -12,11 +12,11 @@ import numpy as np
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.force.direction import FEWEST_PUSHES, TOPIC, direction_findings
+from push_predictor.recordings.checks.force.presence import presence_findings
+from push_predictor.recordings.checks.force.timing import force_delays, rate_finding, timing_finding, unseen_finding
 from push_predictor.recordings.checks.geometry import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
-from push_predictor.recordings.checks.wrench_direction import FEWEST_PUSHES, TOPIC, direction_findings
-from push_predictor.recordings.checks.wrench_presence import presence_findings
-from push_predictor.recordings.checks.wrench_timing import force_delays, rate_finding, timing_finding, unseen_finding
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
@@ -78,7 +78,7 @@ def wrench_findings(
         return []
     free = _free(motion, rig) if outlined else np.zeros(len(motion.time), dtype=np.bool_)
     zero, spread = _zero(motion.force[free])
-    touching = motion.contact & np.isfinite(motion.force[:, 0])
+    touching = motion.touching & np.isfinite(motion.force[:, 0])
     if np.sum(touching) < FEWEST:
         return []
     few = len(np.unique(motion.push[touching])) < FEWEST_PUSHES
