@@ -20,6 +20,7 @@ from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
 
 LEAST_SHARE = 0.1  # of the poses in motion are repeats: the source is slower than its messages
+MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
 FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is estimated
 AROUND = 25  # samples on either side that show whether a body moves: more than a slow source repeats a pose
 STEPS, LEAST_WAY = 3.0, 5e-5  # steps of the resolution, m: a body moves by more in one interval
@@ -77,7 +78,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
     kept = held.take(samples, final=True)
     smoothed = SmoothedPoses(track.is_jump, column).take(kept, final=True)
     period = float(np.median(np.diff(stream.stamp))) * NANOSECOND
-    source_period = _source_period(pose, quantum, period)
+    source_period = _source_period(pose, quantum, period, len(held.dropouts))
     noise = _noise(values[_changed(pose)] if source_period > period else values)
     facts = StreamFacts(
         samples=len(stream),
@@ -101,7 +102,7 @@ def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
     return replace(stream, stamp=samples.stamp, x=x, y=y, z=z, heading=heading, tilt=tilt)
 
 
-def _source_period(pose: Array, quantum: float, period: float) -> float:
+def _source_period(pose: Array, quantum: float, period: float, holds: int) -> float:
     """The mean interval (s) of new poses in motion, where many of them are repeated; else the period."""
     if len(pose) <= 2 * AROUND:
         return period
@@ -110,6 +111,9 @@ def _source_period(pose: Array, quantum: float, period: float) -> float:
     again = np.all(pose[1:] == pose[:-1], axis=1)[AROUND - 1 : -AROUND]
     count = int(np.sum(moving))
     share = float(np.mean(again[moving])) if count else 0.0
+    runs = int(np.sum(again[1:] & ~again[:-1] & moving[1:]))
+    if holds > MOST_HOLDS * runs:  # single losses, not a slow source
+        return period
     return period / (1.0 - share) if count >= FEWEST_MOVING and LEAST_SHARE < share < 1.0 else period
 
 

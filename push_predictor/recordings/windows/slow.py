@@ -71,7 +71,7 @@ class SlowPoses:
             longest = np.maximum(SHORTEST_DROPOUT, DROPOUT_PERIODS * usual)
             found[USUAL + 1 :] = (usual > SLOW) & (last > SLOW) & (last <= longest)
         jumps = self._is_jump(samples.values[:-1], samples.values[1:], interval)
-        return found & ~samples.interrupted & ~np.append(False, jumps)[: len(found)]
+        return np.asarray(found & ~samples.interrupted & ~np.append(False, jumps)[: len(found)])
 
     def _with_poses(self, samples: OrderedSamples, rows: IntArray, slow: BoolArray) -> OrderedSamples:
         """The samples in these consecutive rows, with the poses that are put in before those of a slow stream."""
