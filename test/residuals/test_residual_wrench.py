@@ -16,8 +16,16 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.channels.contrast import ChannelFinding
+from push_predictor.residuals.channels.contrast import (
+    ChannelFinding,
+    Quantity,
+    along,
+    best_and_rivals,
+    searched,
+    stacked,
+)
 from push_predictor.residuals.channels.wrench import log_load, wrench_effects
+from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array
 
@@ -200,3 +208,17 @@ def test_drift_of_the_force_in_a_recording_is_found_and_leaves_the_motion_unchan
     assert effect.mechanism == "surface_friction"
     assert {effect.covariate, *effect.rivals} >= {"elapsed_time", "push_index", "slid_distance"}
     assert effect.parameters[0].low > 0.2
+
+
+def test_simplest_form_within_a_standard_error_of_the_best_is_chosen() -> None:
+    """A slight curvature gains a little by chance; a strong one surely."""
+    stack, name = stacked(made(2), None), "topic:/hum"
+    x = made(2).covariates[name]
+    noise, ones = np.random.default_rng(4).standard_normal(len(x)), np.ones((len(x), 1))
+    bases = [standard_basis(basis, name, x) for basis in ("linear", "quadratic")]
+    tried = [along(stack, "surface_friction", name, basis, np.ones(1)) for basis in bases]
+    for curvature, form in ((0.1, "linear"), (0.5, "quadratic")):
+        z = (x + curvature * x**2 + noise)[:, None]
+        assert best_and_rivals(z, tried, ones, stack.block)[0].basis.name == "quadratic"
+        (chosen,), _, _ = searched(Quantity.of(z, ones, stack, tried, stack.new), 0.01)
+        assert chosen.contrast.basis.name == form
