@@ -134,18 +134,13 @@ class Quantity:
     @classmethod
     def of(cls, z: Array, controls: Array, stack: Stacked, tried: Sequence[Contrast], rows: BoolArray) -> Quantity:
         """The quantity on some rows (n,) of the stack."""
-        known = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
+        known = tuple(t.take(rows) for t in identifiable(tried, controls))
         return cls(z[rows], controls[rows], stack, known, rows)
 
     @property
     def block(self) -> IntArray:
         """Block of pushes (n,)."""
         return self.stack.block[self.rows]
-
-    @property
-    def new(self) -> BoolArray:
-        """Which rows are new (n,)."""
-        return self.stack.new[self.rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +178,7 @@ def searched(quantity: Quantity, alpha: float, seed: int = 0) -> tuple[list[Chos
         best = _in_best_form(quantity, alike[0], same, base)
         chosen.append(Chosen(best, min(passed[id(t)] for t in same), _names(best, alike)))
         controls = np.column_stack([controls, best.values, best.shared])
-        remaining = [t for t in remaining if t.label != best.label and is_identifiable(t, controls)]
+        remaining = identifiable([t for t in remaining if t.label != best.label], controls)
     return chosen, tested, threshold
 
 
@@ -282,11 +277,23 @@ def along(stack: Stacked, mechanism: str | None, covariate: str, basis: DriverBa
     return Contrast(mechanism, covariate, basis, own, shared, on)
 
 
-def is_identifiable(each: Contrast, controls: Array) -> bool:
-    """Whether no column is collinear with the controls (n, m) and the shared columns."""
-    residualizer = Residualizer(np.column_stack([controls, each.shared]))
-    size, residual = (np.sum(values**2, axis=0) for values in (each.values, residualizer(each.values)))
-    return bool(np.all(residual > COLLINEAR * size) and np.all(size > 0.0))
+def identifiable(tried: Sequence[Contrast], controls: Array) -> list[Contrast]:
+    """Those of which no column is collinear with the controls (n, m) and the shared columns."""
+    kept = []
+    for each, clear in _cleared(tried, controls):
+        before, after = (np.sum(values**2, axis=0) for values in (each.values, clear(each.values)))
+        if np.all(after > COLLINEAR * before) and np.all(before > 0.0):
+            kept.append(each)
+    return kept
+
+
+def _cleared(tried: Sequence[Contrast], controls: Array) -> list[tuple[Contrast, Residualizer]]:
+    """Each with what regresses the controls and its shared columns out; many share the same."""
+    known: dict[bytes, Residualizer] = {}
+    for each in tried:
+        if (key := each.shared.tobytes()) not in known:
+            known[key] = Residualizer(np.column_stack([controls, each.shared]))
+    return [(each, known[each.shared.tobytes()]) for each in tried]
 
 
 def _names(best: Contrast, alike: Sequence[Contrast]) -> tuple[str, ...]:
@@ -305,8 +312,8 @@ def _in_best_form(quantity: Quantity, best: Contrast, same: Sequence[Contrast], 
 
     def stepped(places: Sequence[float]) -> list[Contrast]:
         bases = [DriverBasis("step", (best.covariate,), place=place) for place in places]
-        every = [along(quantity.stack, *best.label, basis, best.on).take(quantity.rows) for basis in bases]
-        return [each for each in every if is_identifiable(each, controls)]
+        every = (along(quantity.stack, *best.label, basis, best.on) for basis in bases)
+        return identifiable([each.take(quantity.rows) for each in every], controls)
 
     if best.basis.name in ("linear", "quadratic"):
         steps = stepped(step_places(values))
@@ -347,15 +354,13 @@ def inliers(z: Array, columns: Array, controls: Array) -> BoolArray:
 
 def screen_contrasts(z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0) -> Screened:
     """Screen contrasts on z (n, k), with the controls and the columns shared with training regressed out."""
-    known: dict[bytes, tuple[Residualizer, ResidualBlocks]] = {}  # many share the same columns
+    blocks: dict[int, ResidualBlocks] = {}
     scores = []
-    for each in tried:
-        if (key := each.shared.tobytes()) not in known:
-            residualizer = Residualizer(np.column_stack([controls, each.shared]))
-            known[key] = residualizer, residualizer.blocks(z, block)
-        residualizer, blocks = known[key]
-        columns = Columns(residualizer(each.columns))
-        scores.append(columns.scores(blocks).turned(columns.unit))
+    for each, clear in _cleared(tried, controls):
+        if id(clear) not in blocks:
+            blocks[id(clear)] = clear.blocks(z, block)
+        columns = Columns(clear(each.columns))
+        scores.append(columns.scores(blocks[id(clear)]).turned(columns.unit))
     return screen(scores, seed)
 
 

@@ -151,7 +151,7 @@ def _sized(gap: Quantity, chosen: Sequence[Chosen], seed: int) -> tuple[ChannelE
     noise = robust_deviation(Residualizer(controls)(gap.z)[:, 0])
     errors = []
     for each, (values, draws) in zip(chosen, sizes(gap, chosen, seed), strict=True):
-        name, shift = str(each.contrast.mechanism), each.contrast.values[gap.new] @ values
+        name, shift = str(each.contrast.mechanism), each.contrast.values[gap.stack.new[gap.rows]] @ values
         if np.sqrt(np.mean(shift**2)) >= noise:
             rivals = (*ALIKE.get(name, ()), *(one for r in each.rivals for one in (r, *ALIKE.get(r, ()))))
             parameters = sized(PARAMETERS[name], values, draws)

@@ -34,7 +34,7 @@ from push_predictor.types import Array, IntArray
 
 TINY = 1e-12
 MOST = 9.0  # of a square, three standard deviations: guards against a few windows far off
-TRIED = (OUTPUTS, *((name,) for name in OUTPUTS))  # all outputs, then each
+TRIED = (np.ones(3), *np.eye(3))  # all outputs, then each
 NOTABLE = 1.2  # least factor: guards against a base that saw few pushes and misjudges its own noise a little
 
 
@@ -59,12 +59,12 @@ def variance_effects(
         own = np.zeros((len(z), (inputs := inputs_basis(model, evidence.table).columns).shape[1]))
         own[stack.new] = inputs
         stack = replace(stack, level=own)
-    tried = [along(stack, None, *pair, _on(outputs)) for pair in bases for outputs in TRIED]
+    tried = [along(stack, None, *pair, on) for pair in bases for on in TRIED]
     controls = inputs_basis(model, concatenate(stack.tables)).columns
     every = np.ones(len(z), dtype=np.bool_)
     noise = Quantity.of(_bounded_squares(z), controls, stack, tried, every)
     chosen, tested, threshold = searched(noise, alpha, seed)
-    logarithms = Quantity.of(np.log(z**2 + TINY), np.ones((len(z), 1)), stack, tried, every)
+    logarithms = replace(noise, z=np.log(z**2 + TINY), controls=np.ones((len(z), 1)))
     effects = tuple(
         replace(effect, outputs=tuple(name for name, on in zip(OUTPUTS, each.contrast.on, strict=True) if on))
         for each, effect in zip(
@@ -95,8 +95,3 @@ def _bounded_squares(residual: Array) -> Array:
     """Squares (n, 3) in units of each output's robust variance, at most MOST."""
     unit = MAD_TO_SD * np.median(np.abs(residual), axis=0)
     return np.asarray(np.minimum((residual / np.maximum(unit, TINY)) ** 2, MOST))
-
-
-def _on(outputs: tuple[str, ...]) -> Array:
-    """Which outputs (3,) an effect concerns."""
-    return np.array([float(name in outputs) for name in OUTPUTS])
