@@ -33,7 +33,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidates_of, confounded
 from push_predictor.residuals.evidence.inputs_basis import controls_for, inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.selection.gate import Gate, Seen
 from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.screening import Columns, screen
 
@@ -108,6 +108,19 @@ def test_a_property_that_the_rig_had_in_training_too_does_not_pass(one_sided: Pu
     uncompared = replace(again.baseline, inputs=replace(again.baseline.inputs, learnt=False))
     alone = replace(again, baseline=uncompared).screened(again.evidence.z)
     assert alone.p_value.min() <= ALPHA and not alone.unchanged
+
+
+def test_what_lies_in_the_nuisance_of_a_candidate_changes_no_score() -> None:
+    table = pushes(COUNT, 3)
+    since = {**table.covariates, "time_since_contact": np.tile([0.0, 0.2], COUNT)}
+    evidence = seen(EXACT, replace(table, covariates=since))
+    found = gate_of(EXACT, evidence, ["elapsed_time"], baseline=baseline(EXACT), mechanisms=FOUR[:2])
+    c = next(c for c in found.candidates if c.kind == "constant" and c.nuisance is not None)
+    assert c.nuisance is not None
+    moved = evidence.z + 50.0 * c.nuisance[:, 0].reshape(evidence.z.shape)
+    apart = [Seen(found.inputs, z, evidence.block) for z in (evidence.z, moved)]
+    first, second = (each.scores(c, each.columns(c)).rows for each in apart)
+    np.testing.assert_allclose(first, second, atol=1e-8)
 
 
 def test_the_opposite_of_that_property_passes(one_sided: PushModel) -> None:
