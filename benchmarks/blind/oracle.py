@@ -11,17 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.report.tables import paired_difference
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.drivers import standard_basis, two_dimensional
 from push_predictor.residuals.evidence.loading import load_evidence
-from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.standardised import evidence_of, held_out_rows
 from push_predictor.residuals.extension.extended_model import extend, refit_base
-from push_predictor.residuals.extension.held_out_gain import gain, held_out_gain
+from push_predictor.residuals.extension.held_out_gain import compared, held_out_gain
+from push_predictor.types import Array
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -41,6 +44,14 @@ def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> 
     after = extend(refit, evidence, [candidate(evidence, *true_term(effect, analysis)) for effect in effects])
     traced = held_out_gain(model, refit, after, analysis, rest)
     return {**vars(gain(refit, after, rest)[1]), "traced": vars(traced.nlpd)}
+
+
+def gain(
+    refit: PushModel, after: PushModel, held_out: PushTable, training_mean: Array | None = None
+) -> tuple[Estimate, Estimate]:
+    """After minus refit in NMSE and in NLPD; training_mean (3,): the reference of the NMSE, the refit's if None."""
+    mean = refit.training_mean if training_mean is None else training_mean
+    return paired_difference(*(compared(model, held_out, mean) for model in (refit, after)))
 
 
 def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, str, DriverBasis]:

@@ -29,10 +29,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate, candidates_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.loading import cut_again
-from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of, held_out_rows
+from push_predictor.residuals.selection.gate import Baseline, Gate, baseline_of
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.types import Array

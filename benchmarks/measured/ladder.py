@@ -36,8 +36,7 @@ from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import different_supports
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
-from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.standardised import evidence_of, held_out_rows
 from push_predictor.residuals.extension.extended_model import extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import compared
 from push_predictor.residuals.outcome import Trace

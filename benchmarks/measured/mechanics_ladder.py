@@ -33,7 +33,7 @@ from push_predictor.models.train_mechanics import fit_rows, predictor_about
 from push_predictor.recordings.load import different_supports
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.loading import LoadedData
-from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.evidence.standardised import digest_of, held_out_rows
 from push_predictor.residuals.extension.held_out_gain import compared
 from push_predictor.types import Array
 

@@ -126,7 +126,7 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     write_whole(task.folder / VERDICT, f"{text}\n".encode())
     if trace.extended is not None:
         save_model(trace.extended, task.folder / EXTENDED)
-    sentences = [*answer(trace)[:2], rivals(trace), worth(trace), *_report(task.folder / REPORT, trace)]
+    sentences = [*answer(trace), rivals(trace), worth(trace), *_report(task.folder / REPORT, trace)]
     sentences += [f"Warning: {_for_client(text, task)}" for text in warnings]
     return Traced(text, " ".join(filter(None, sentences)), None if trace.extended is None else trace.extended.needs)
 

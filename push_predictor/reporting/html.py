@@ -133,11 +133,6 @@ def answer(sentences: Sequence[str], verdict: str) -> str:
     return _part("answer", sentences, verdict)
 
 
-def details(summary: str, content: str) -> str:
-    """A part that is hidden until the reader opens it."""
-    return _part("details", summary, content)
-
-
 def joined(parts: Sequence[str]) -> str:
     """Parts as one, for `details`."""
     return _part("joined", parts)

@@ -15,12 +15,12 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import GROSS, NOTHING_FOUND, ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.measurement import correct, measurement_errors
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
-from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
+from push_predictor.residuals.channels.sensor_zero import zero_shift
+from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.channels.wrench import wrench_effects
 from push_predictor.residuals.evidence.loading import cut_again
-from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.question import Question, unseen
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, evidence_of, held_out_rows
+from push_predictor.residuals.question import SHARES, Question, unseen
 from push_predictor.watch import Watch, no_watch
 
 # Share of the windows, or of the mean squared residual, from which an error of the force sensor does harm. The mean
@@ -29,67 +29,84 @@ HARMLESS = 0.02
 BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
 
 
-def search_all(question: Question, watch: Watch = no_watch) -> Searched:
-    """What is found on each channel, before a model is extended or a held-out push is opened; watch: see `trace`."""
-    model, analysis, seed = question.model, question.windows, question.seed
-    watch("measurement", 0.1)
-    measured = measurement_errors(analysis, model.training, question.loaded.rig, question.share("measurement"), seed)
-    if measured is not None and measured.effects:
-        corrected = _corrected(question, measured)
-        if _explains_residuals(question, corrected):
-            return Searched(measured, NO_MOTION, NOTHING_FOUND, corrected)
-    watch("motion", 0.15)
-    motion = motion_effects(
-        model, question.evidence, question.share("motion"), question.covariates, seed, inside=question.inside
-    )
-    watch("force", 0.6)
-    known = analysis.take(question.inside)  # faster pushes need more force, and training does not show how much
-    forces = wrench_effects(known, model.training, question.evidence.mechanics, question.share("wrench"), seed)
-    bias = _bias_of(forces)
-    if bias is None:
-        return Searched(measured, motion, forces)
-    corrected = _corrected(question, ChannelFinding((bias,), forces.tested))
-    if not _changes(question, corrected):
-        return Searched(measured, motion, _without_bias(forces), harmless=(bias,))
-    first = forces.effects[0].mechanism == WRENCH_BIAS if forces.effects else not motion.variance
-    return Searched(measured, motion, forces, corrected if first and not motion.terms else None)
-
-
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """What was found on each channel, before anything is opened that was held out.
+    """What was found on each channel, before anything is opened that was held out; p values are family-wise.
 
-    measured: None if the windows do not determine measurement errors. corrected: None, or the measurement error that is
-    the verdict. harmless: errors that change neither windows nor residuals.
+    measured: None if the windows do not determine measurement errors. zero: a bias of the force sensor. corrected:
+    None, or the measurement error that is the verdict. harmless: errors that change neither windows nor residuals.
     """
 
     measured: ChannelFinding | None
-    motion: MotionFinding
-    forces: ChannelFinding
+    motion: MotionFinding = NO_MOTION
+    noise: ChannelFinding = NOTHING_FOUND
+    forces: ChannelFinding = NOTHING_FOUND
+    zero: ChannelFinding = NOTHING_FOUND
     corrected: Corrected | None = None
     harmless: tuple[ChannelEffect, ...] = ()
+
+
+def search_all(question: Question, watch: Watch = no_watch) -> Searched:
+    """What is found on each channel, before a model is extended or a held-out push is opened; watch: see `trace`."""
+    training, seed, evidence = question.model.training, question.seed, question.evidence
+    watch("measurement", 0.1)
+    level = question.share("measurement")
+    measured = measurement_errors(question.windows, training, question.loaded.rig, level, seed)
+    measured = None if measured is None else measured.family_wise(SHARES["measurement"])
+    if measured is not None and measured.effects:
+        corrected = _corrected(question, measured.effects)
+        if _explains_residuals(question, corrected):
+            return Searched(measured, corrected=corrected)
+    watch("motion", 0.15)
+    motion = motion_effects(
+        question.model, evidence, question.share("mean"), question.covariates, seed, inside=question.inside
+    ).family_wise(SHARES["mean"])
+    noise = _noise(question, motion)
+    watch("force", 0.6)
+    known = question.windows.take(question.inside)  # faster pushes need more force; training does not show how much
+    forces = wrench_effects(known, training, evidence.mechanics, question.share("force"), seed)
+    zero = zero_shift(known, training, question.share("zero")).family_wise(SHARES["zero"])
+    found = Searched(measured, motion, noise, forces.family_wise(SHARES["force"]), zero)
+    if not zero.effects:
+        return found
+    corrected = _corrected(question, zero.effects)
+    if not _changes(question, corrected):
+        return replace(found, zero=replace(zero, effects=()), harmless=zero.effects)
+    alone = not (motion.terms or noise.effects or forces.effects)
+    return replace(found, corrected=corrected if alone else None)
+
+
+def _noise(question: Question, motion: MotionFinding) -> ChannelFinding:
+    """Effects on the noise of what the motion's leave, in the windows among the inputs of training."""
+    inside = question.inside
+    evidence, z = question.evidence.take(inside), motion.unexplained[inside]
+    if len(evidence.table.pushes) < FEWEST_PUSHES:
+        return NOTHING_FOUND
+    share, names, training = question.share("noise"), question.covariates, motion.training
+    found = variance_effects(question.model, evidence, z, share, question.seed, names=names, training=training)
+    return found.family_wise(SHARES["noise"])
 
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
     """Measurement errors, and the same pushes cut again from corrected streams; None without streams."""
 
-    finding: ChannelFinding
+    errors: tuple[ChannelEffect, ...]
     evidence: Evidence | None
     held_out: PushTable | None
 
 
-def _corrected(question: Question, measured: ChannelFinding) -> Corrected:
+def _corrected(question: Question, errors: tuple[ChannelEffect, ...]) -> Corrected:
     """The windows of the recordings after all corrections."""
     if question.loaded.recordings is None:
-        return Corrected(measured, None, None)
+        return Corrected(errors, None, None)
     recordings = list(question.loaded.recordings)
-    for error in measured.effects:
-        recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
+    for error in errors:
+        recordings = [correct(recording, str(error.mechanism), error.values) for recording in recordings]
     again = cut_again(recordings, question.loaded.rig, window_options(question.model))
     table = unseen(question.deployed, again)
     held = held_out_rows(table)
-    return Corrected(measured, evidence_of(question.model, table.take(~held)), table.take(held))
+    return Corrected(errors, evidence_of(question.model, table.take(~held)), table.take(held))
 
 
 def _explains_residuals(question: Question, corrected: Corrected) -> bool:
@@ -107,16 +124,6 @@ def _explains_residuals(question: Question, corrected: Corrected) -> bool:
 def _excess(evidence: Evidence) -> float:
     """Mean excess of the squared standardised residuals over 1; a square counts at most that of a gross error."""
     return float(np.mean(np.minimum(evidence.z**2, GROSS**2))) - 1.0
-
-
-def _bias_of(forces: ChannelFinding) -> ChannelEffect | None:
-    """A bias of the force sensor: a measurement error, though it is found on the wrench channel."""
-    found = (each for each in (*forces.effects, forces.zero) if each is not None and each.mechanism == WRENCH_BIAS)
-    return next(found, None)
-
-
-def _without_bias(forces: ChannelFinding) -> ChannelFinding:
-    return replace(forces, effects=tuple(e for e in forces.effects if e.mechanism != WRENCH_BIAS), zero=None)
 
 
 def _changes(question: Question, corrected: Corrected) -> bool:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
@@ -86,20 +86,25 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
-class Harmless:
-    """A finding that changes neither windows nor predictions: no verdict, but its size is reported."""
-
-    mechanism: str
-    parameter: Sized
-
-
-@dataclass(frozen=True)
 class Tested:
     """A candidate that was tried, with its family-wise p value."""
 
     mechanism: str | None
     covariate: str
     p_value: float
+
+
+def best_of(labels: Sequence[tuple[str | None, str]], p_values: Sequence[float]) -> tuple[Tested, ...]:
+    """Every mechanism with every covariate once, in its best basis, smallest p first."""
+    best: dict[tuple[str | None, str], float] = {}
+    for label, p in zip(labels, p_values, strict=True):
+        best[label] = min(p, best.get(label, 1.0))
+    return tuple(Tested(*label, p) for label, p in sorted(best.items(), key=lambda item: item[1]))
+
+
+def in_trace(tested: Sequence[Tested], share: float) -> tuple[Tested, ...]:
+    """Candidates of one channel with p values of the whole trace; share: of alpha, that the channel may spend."""
+    return tuple(replace(one, p_value=min(1.0, one.p_value / share)) for one in tested)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,7 @@ class Trace:
     remaining: tuple[str | None, str] | None
     alpha: float
     input_shift: tuple[ShiftedInput, ...] = ()
-    harmless: tuple[Harmless, ...] = ()
+    harmless: tuple[FoundEffect, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
     @cached_property
@@ -192,20 +197,10 @@ class Trace:
         return [replace(comparison, model=name) for name, comparison in shown]
 
     def __repr__(self) -> str:
-        effects = [
-            f"  {effect.mechanism or 'unknown mechanism'}, depends on {effect.covariate}, p = {effect.p_value:.2g}"
-            for effect in self.effects
-        ]
-        gain, pushes = self.gain_nlpd, len(self.held_out.table.pushes)
-        interval = f"{gain.value:+.3f} ({gain.low:+.3f} to {gain.high:+.3f})"
-        return "\n".join(
-            [
-                f"Trace of {self.model.name!r}: verdict {self.verdict}",
-                *(effects or ["  no effect found"]),
-                f"  NLPD after less {self.gain_over} on {pushes} held-out pushes: {interval}",
-                f"  extended model: {'yes' if self.extended else 'no'}",
-            ]
-        )
+        """Verdict, effects and whether there is an extended model."""
+        found = [f"{effect.mechanism or 'unknown mechanism'} by {effect.covariate}" for effect in self.effects]
+        extended = "extended" if self.extended else "unchanged"
+        return f"Trace of {self.model.name!r}: {self.verdict} ({', '.join(found) or 'no effect'}), model {extended}"
 
 
 def size_of(effect: Effect, table: PushTable) -> Sized | None:
@@ -259,7 +254,9 @@ def trace_json(trace: Trace) -> dict[str, Any]:
     held_out = trace.held_out
     return {
         "verdict": trace.verdict,
-        "input_shift": [_shift(shift) for shift in trace.input_shift],
+        "input_shift": [
+            {**vars(each), "training": list(each.training), "now": list(each.now)} for each in trace.input_shift
+        ],
         "effect_present": trace.verdict != "none",
         "channel": CHANNELS[trace.verdict],
         "kind": trace.kind,
@@ -268,7 +265,9 @@ def trace_json(trace: Trace) -> dict[str, Any]:
         "undecided": trace.undecided,
         "motion_model_changed": trace.extended is not None,
         "effects": [_effect(effect, trace.weak) for effect in trace.effects],
-        "harmless": [{"mechanism": each.mechanism, "parameter": vars(each.parameter)} for each in trace.harmless],
+        "harmless": [
+            {name: _effect(each, False)[name] for name in ("mechanism", "parameter")} for each in trace.harmless
+        ],
         "before": metrics_json(held_out.before),
         "refit": metrics_json(held_out.refit),
         "after": metrics_json(held_out.after),
@@ -306,13 +305,3 @@ def _strongest(trace: Trace) -> str | None:
         return None
     mechanism, covariate = trace.remaining
     return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
-
-
-def _shift(shift: ShiftedInput) -> dict[str, Any]:
-    return {
-        "covariate": shift.covariate,
-        "training": [float(end) for end in shift.training],
-        "now": [float(end) for end in shift.now],
-        "share_outside": float(shift.share_outside),
-        "share_unvisited": float(shift.share_unvisited),
-    }

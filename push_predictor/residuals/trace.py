@@ -10,10 +10,12 @@ opened once, at the end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.offline import window_options
@@ -28,19 +30,18 @@ from push_predictor.recordings.topics import Topics
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
 from push_predictor.residuals.channels.clocks import NAMES, clock_errors, clock_notes
-from push_predictor.residuals.channels.contrast import ChannelEffect, ChannelFinding
+from push_predictor.residuals.channels.contrast import ChannelEffect
 from push_predictor.residuals.channels.motion import MotionFinding
-from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
 from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
-from push_predictor.residuals.evidence.split import digest_of
-from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.evidence.standardised import digest_of, evidence_of
 from push_predictor.residuals.extension.extended_model import along, by_the_clock, extend, refit_base
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain, held_out_windows
-from push_predictor.residuals.outcome import FoundEffect, Harmless, HeldOut, Sized, Tested, Trace, Verdict, size_of
-from push_predictor.residuals.question import SHARES, Question
-from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
+from push_predictor.residuals.outcome import FoundEffect, HeldOut, Sized, Tested, Trace, Verdict, size_of
+from push_predictor.residuals.question import Question
+from push_predictor.residuals.reporting.notes import notes_of
+from push_predictor.types import Array
 from push_predictor.watch import Watch, no_watch
 
 if TYPE_CHECKING:
@@ -96,12 +97,40 @@ def trace(
     """
     question = Question.of(model, loaded, alpha, covariates, seed)
     found = search_all(question, watch)
-    if found.corrected is not None:
-        return _of_measurement(question, found.corrected, (CUT_AGAIN if found.corrected.evidence else NO_STREAMS,))
-    if clocks and (found.motion.terms or found.motion.variance or found.forces.effects):
-        return _of_measurement(question, Corrected(clock_errors(clocks), None, None), clock_notes(clocks))
+    if clocks and found.corrected is None and (found.motion.terms or found.noise.effects or found.forces.effects):
+        found = Searched(found.measured, corrected=Corrected(clock_errors(clocks), None, None))
     watch("extended model", 0.7)
-    return _of_motion(question, found, clock_notes(clocks))
+    motion, corrected = found.motion, found.corrected
+    extension = _extension(question, motion)
+    gain, refit = extension.gain, held_out_windows(extension.refit).calibrated()
+    after = question.model if corrected else extension.after or refit
+    verdict = _verdict(found, question.shifted)
+    equivalent, mechanisms = _rivals(verdict, found)
+    return Trace(
+        verdict=verdict,
+        kind="variance" if verdict == "variance" else "mean" if corrected or motion.terms else None,
+        model=question.deployed,
+        effects=_found_effects(verdict, question, found, extension.effects),
+        terms=extension.effects,
+        equivalent=equivalent,
+        mechanisms=mechanisms,
+        undecided=bool(equivalent or (corrected and mechanisms)),
+        analysis=question.windows,
+        residual=question.evidence.z,
+        find_unexplained=lambda: _unexplained(question, corrected, after),
+        held_out=_held_out(question, refit, after, corrected.held_out if corrected else None),
+        gain_nmse=gain.nmse if gain else NO_GAIN,
+        gain_nlpd=gain.nlpd if gain else NO_GAIN,
+        gain_over=gain.reference if gain else "refit",
+        extended=extension.after if gain and gain.nlpd.high < 0.0 else None,
+        tested=_tested(found),
+        minimum_detectable=_minimum_detectable(found),
+        remaining=motion.remaining,
+        alpha=question.alpha,
+        input_shift=question.shifted,
+        harmless=_of_channel(found.harmless),
+        notes=(*clock_notes(clocks), *notes_of(question, found)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,86 +143,11 @@ class _Extension:
     gain: HeldOutGain | None
 
 
-# --- measurement ---------------------------------------------------------------------------------------------------
-
-
-def _of_measurement(question: Question, corrected: Corrected, notes: Sequence[str]) -> Trace:
-    """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
-    model, measured = question.model, corrected.finding
-    first = measured.effects[0]
-    refit = held_out_windows(refit_base(model, question.evidence.table)).calibrated()
-    return Trace(
-        verdict="measurement",
-        kind="mean",
-        model=question.deployed,
-        effects=_of_channel(measured.effects, "measurement"),
-        terms=(),
-        equivalent=(),
-        mechanisms=first.rivals,
-        undecided=bool(first.rivals),
-        analysis=question.windows,
-        residual=question.evidence.z,
-        find_unexplained=lambda: (corrected.evidence or question.evidence).z,
-        held_out=_held_out(question, refit, model, corrected.held_out or question.held_out),
-        gain_nmse=NO_GAIN,
-        gain_nlpd=NO_GAIN,
-        gain_over="refit",
-        extended=None,
-        tested=_family_wise(measured.tested, "measurement"),
-        minimum_detectable={},
-        remaining=None,
-        alpha=question.alpha,
-        input_shift=question.shifted,
-        notes=(*notes, *notes_of_data(question)),
-    )
-
-
-# --- motion, variance and wrench -----------------------------------------------------------------------------------
-
-
-def _of_motion(question: Question, found: Searched, notes: Sequence[str]) -> Trace:
-    motion, measured, forces = found.motion, found.measured, found.forces
-    extension = _extension(question, motion)
-    gain, after = extension.gain, extension.after or extension.refit
-    verdict = _verdict(motion, forces, question.shifted)
-    equivalent = _rival_covariates(forces) if verdict == "wrench_only" else motion.equivalent
-    tested = _family_wise(motion.tested, "motion"), _family_wise(forces.tested, "wrench")
-    return Trace(
-        verdict=verdict,
-        kind="mean" if motion.terms else "variance" if verdict == "variance" else None,
-        model=question.deployed,
-        effects=_found_effects(question, motion, forces, extension.effects),
-        terms=extension.effects,
-        equivalent=equivalent,
-        mechanisms=motion.mechanisms,
-        undecided=bool(equivalent),
-        analysis=question.windows,
-        residual=question.evidence.z,
-        find_unexplained=lambda: evidence_of(after, question.evidence.table).z,
-        held_out=_held_out(question, extension.refit, after, question.held_out),
-        gain_nmse=gain.nmse if gain else NO_GAIN,
-        gain_nlpd=gain.nlpd if gain else NO_GAIN,
-        gain_over=gain.reference if gain else "refit",
-        extended=extension.after if gain and gain.nlpd.high < 0.0 else None,
-        tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
-        minimum_detectable=motion.minimum_detectable,
-        remaining=motion.remaining,
-        alpha=question.alpha,
-        input_shift=question.shifted,
-        harmless=tuple(
-            Harmless(fault.mechanism, size.with_errors_of_mechanics())
-            for fault in found.harmless
-            for size in fault.parameters
-        ),
-        notes=(*notes, *notes_of(question, found), *notes_of_shift(question.shifted)),
-    )
-
-
 def _extension(question: Question, motion: MotionFinding) -> _Extension:
     """The refit, extended by the effects that it cannot learn in its own inputs."""
     model, evidence = question.model, question.evidence
     refit = refit_base(model, evidence.table)
-    candidates = [by_the_clock(term.term, evidence.table) for term in motion.terms if not term.own]
+    candidates = [by_the_clock(term, evidence.table) for term in motion.terms if not term.own]
     session = question.deployed.predictor.session.followed_by(question.loaded.session)
     after = extend(refit, evidence, candidates, session) if candidates else None
     added = iter(after.predictor.effects[-len(candidates) :] if after else ())
@@ -203,86 +157,99 @@ def _extension(question: Question, motion: MotionFinding) -> _Extension:
         for t in motion.terms
     )
     gain = held_out_gain(model, refit, after, evidence.table, question.held_out) if after else None
-    return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)
+    return _Extension(refit, after, effects, gain)
 
 
-def _verdict(motion: MotionFinding, forces: ChannelFinding, shifted: Sequence[ShiftedInput]) -> Verdict:
+def _verdict(found: Searched, shifted: Sequence[ShiftedInput]) -> Verdict:
     """The verdict: a mean effect, of the motion or else of the force, before one on the variance.
 
     A force that differs also bends tip and rod differently, which can look like noise that changed a little.
     """
-    if motion.terms:
-        if motion.terms[0].mechanism is None:
+    if found.corrected is not None:
+        return "measurement"
+    if found.motion.terms:
+        if found.motion.terms[0].mechanism is None:
             return "driver_only"
-        return "mechanism_only" if motion.equivalent else "effect"
-    if forces.effects:
+        return "mechanism_only" if found.motion.equivalent else "effect"
+    if found.forces.effects:
         return "wrench_only"
-    if motion.variance:
+    if found.noise.effects:
         return "variance"
     return "input_shift" if shifted else "none"
 
 
-def _rival_covariates(forces: ChannelFinding) -> tuple[str, ...]:
-    """Rivals of the covariate that the force depends on first."""
-    first = next(iter(forces.effects), None)
-    return () if first is None else tuple(name for name in first.rivals if name != WRENCH_BIAS)
+def _channel_effects(verdict: Verdict, found: Searched) -> tuple[ChannelEffect, ...]:
+    """The effects on the channel that the verdict is about, if that is not the mean motion."""
+    errors = found.corrected.errors if found.corrected else ()
+    of_channel = {"measurement": errors, "wrench_only": found.forces.effects, "variance": found.noise.effects}
+    return of_channel.get(verdict, ())
+
+
+def _rivals(verdict: Verdict, found: Searched) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Rivals of the first effect's covariate, and of its mechanism."""
+    of_channel = _channel_effects(verdict, found)
+    if not of_channel:
+        return found.motion.equivalent, found.motion.mechanisms
+    return ((), of_channel[0].rivals) if verdict == "measurement" else (of_channel[0].rivals, ())
 
 
 def _found_effects(
-    question: Question, motion: MotionFinding, forces: ChannelFinding, effects: Sequence[Effect]
+    verdict: Verdict, question: Question, found: Searched, effects: Sequence[Effect]
 ) -> tuple[FoundEffect, ...]:
-    """The effects on the channel that the verdict is about."""
-    if motion.terms:
-        return tuple(
-            FoundEffect(
-                term.mechanism,
-                SESSION if term.since_training else term.best.covariate,
-                term.outputs,
-                term.best.basis.name,
-                None if term.mechanism is None else size_of(effect, question.evidence.table),
-                _of_trace(term.p_value, "motion"),
-                term.share,
-                term.resembles,
-            )
-            for term, effect in zip(motion.terms, effects, strict=True)
-            if not term.part
+    """The effects of the JSON: of the mean motion, or one for each parameter of a channel's effects."""
+    of_motion = (
+        FoundEffect(
+            term.mechanism,
+            SESSION if term.since_training else term.best.covariate,
+            term.outputs,
+            term.best.basis.name,
+            None if term.mechanism is None else size_of(effect, question.evidence.table),
+            term.p_value,
+            term.share,
+            term.naming.resembles,
         )
-    if motion.variance and not forces.effects:
-        return tuple(
-            FoundEffect(None, s.covariate, s.outputs, s.basis.name, None, _of_trace(s.p_value, "motion"), 0.0)
-            for s in motion.variance
-        )
-    return _of_channel(forces.effects, "wrench")
+        for term, effect in zip(found.motion.terms, effects, strict=True)
+        if not term.part
+    )
+    return (*of_motion, *_of_channel(_channel_effects(verdict, found)))
 
 
-def _of_channel(effects: Sequence[ChannelEffect], channel: str) -> tuple[FoundEffect, ...]:
+def _of_channel(effects: Sequence[ChannelEffect]) -> tuple[FoundEffect, ...]:
     """One effect of the JSON for each parameter."""
     return tuple(
-        FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, channel), 0.0)
+        FoundEffect(e.mechanism, e.covariate, e.outputs, e.basis, parameter, e.p_value, 0.0)
         for e in effects
         for parameter in map(Sized.with_errors_of_mechanics, e.parameters)
     )
 
 
-# --- held-out pushes and levels ------------------------------------------------------------------------------------
+def _unexplained(question: Question, corrected: Corrected | None, after: PushModel) -> Array:
+    """Standardised residuals (n, 3) after the trace."""
+    if corrected:
+        return (corrected.evidence or question.evidence).z
+    return evidence_of(after, question.evidence.table).z
 
 
-def _held_out(question: Question, refit: PushModel, after: PushModel, held: PushTable) -> HeldOut:
-    """Held-out pushes by all three models; the last on `held`, which differs if the measurement was corrected."""
+def _held_out(question: Question, refit: PushModel, after: PushModel, again: PushTable | None) -> HeldOut:
+    """Held-out pushes by all three models; the last on those cut again, if the measurement was corrected."""
     mean, table = question.deployed.training_mean, question.held_out
     return HeldOut(
         table,
         compared(question.deployed, table, mean),
         compared(refit, table, mean),
-        compared(after, held, mean),
+        compared(after, table if again is None else again, mean),
         digest_of(table),
     )
 
 
-def _family_wise(tested: Sequence[Tested], channel: str) -> tuple[Tested, ...]:
-    return tuple(replace(one, p_value=_of_trace(one.p_value, channel)) for one in tested)
+def _tested(found: Searched) -> tuple[Tested, ...]:
+    measured = found.measured.tested if found.measured else ()
+    return (*found.motion.tested, *measured, *found.forces.tested, *found.zero.tested)
 
 
-def _of_trace(p_value: float, channel: str) -> float:
-    """A channel's p value as one of the whole trace: at most alpha exactly if it is at most the channel's share."""
-    return min(1.0, p_value / SHARES[channel])
+def _minimum_detectable(found: Searched) -> dict[str, Mapping[str, Any]]:
+    """By mechanism the smallest effect that would have been found, and the smallest factor on the noise."""
+    if not np.isfinite(found.noise.detectable):
+        return {**found.motion.minimum_detectable}
+    noise = {"value": found.noise.detectable, "unit": "times training", "covariate": SESSION}
+    return {**found.motion.minimum_detectable, "noise": noise}

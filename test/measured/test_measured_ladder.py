@@ -18,7 +18,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import different_supports
 from push_predictor.residuals.evidence.loading import LoadedData
-from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import held_out_rows
 from push_predictor.residuals.extension.held_out_gain import compared
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.trace import trace

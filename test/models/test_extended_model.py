@@ -17,6 +17,7 @@ import pytest
 import ros_harness as harness
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
 from hosted_nodes import hosted_node
+from made_up_traces import gain
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -44,7 +45,7 @@ from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend, refit_base
-from push_predictor.residuals.extension.held_out_gain import gain, held_out_windows
+from push_predictor.residuals.extension.held_out_gain import held_out_windows
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
 WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))

@@ -12,7 +12,7 @@ import pytest
 from made_up_traces import pushes
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.residuals.channels.wrench import MOST_NEAR, step_places_near
+from push_predictor.residuals.channels.contrast import MOST_NEAR, step_places_near
 from push_predictor.residuals.evidence.drivers import STEPS, forms_of, step_places
 
 TABLE = pushes(60, 2)

@@ -32,9 +32,10 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidates_of, confounded
 from push_predictor.residuals.evidence.inputs_basis import controls_for, inputs_basis
-from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.selection.gate import Gate, Seen
 from push_predictor.residuals.selection.power import minimum_detectable
-from push_predictor.residuals.selection.screening import Controlled, screen
+from push_predictor.residuals.selection.screening import Columns, screen
 
 ALPHA = 0.01
 OWN_SIDES = DriverBasis("constant"), 0.003, -0.002  # a centre of friction off the middle
@@ -104,8 +105,22 @@ def test_a_property_that_the_rig_had_in_training_too_does_not_pass(one_sided: Pu
     assert screened.p_value.min() > ALPHA
     unchanged = {again.candidates[k].label for k in screened.unchanged}
     assert ("centre_of_friction", "edge") in unchanged
-    alone = replace(again, baseline=None).screened(again.evidence.z)
+    uncompared = replace(again.baseline, inputs=replace(again.baseline.inputs, learnt=False))
+    alone = replace(again, baseline=uncompared).screened(again.evidence.z)
     assert alone.p_value.min() <= ALPHA and not alone.unchanged
+
+
+def test_what_lies_in_the_nuisance_of_a_candidate_changes_no_score() -> None:
+    table = pushes(COUNT, 3)
+    since = {**table.covariates, "time_since_contact": np.tile([0.0, 0.2], COUNT)}
+    evidence = seen(EXACT, replace(table, covariates=since))
+    found = gate_of(EXACT, evidence, ["elapsed_time"], baseline=baseline(EXACT), mechanisms=FOUR[:2])
+    c = next(c for c in found.candidates if c.kind == "constant" and c.nuisance is not None)
+    assert c.nuisance is not None
+    moved = evidence.z + 50.0 * c.nuisance[:, 0].reshape(evidence.z.shape)
+    apart = [Seen(found.inputs, z, evidence.block) for z in (evidence.z, moved)]
+    first, second = (each.scores(c, each.columns(c)).rows for each in apart)
+    np.testing.assert_allclose(first, second, atol=1e-8)
 
 
 def test_the_opposite_of_that_property_passes(one_sided: PushModel) -> None:
@@ -167,8 +182,9 @@ class TestFalseAlarms:
         drivers = [pushed / 40.0, pushed / 40.0 + 0.01 * walk, walk, walk**2, rng.normal(size=40)[pushed]]
         responses = [np.eye(3)[:, :1] * angle[:, None, None], np.eye(3) * (1.0 + angle[:, None, None])]
         columns = [response * driver[:, None, None] for response in responses for driver in drivers]
-        seen = Controlled.of(z, basis, pushed)
-        return float(screen([seen.unit_scores(c) for c in columns], seed).p_value.min())
+        residualizer = Residualizer(basis)
+        blocks, each = residualizer.blocks(z, pushed), [Columns(residualizer(c)) for c in columns]
+        return float(screen([c.scores(blocks).turned(c.unit) for c in each], seed).p_value.min())
 
     def test_the_gate_alone_decides_at_its_level(self) -> None:
         """A weak effect, at levels above and below its p value."""
@@ -201,7 +217,7 @@ class TestFalseAlarms:
         assert not searched(EXACT, table).terms
 
     def test_cross_validated_residuals_of_a_learned_base_are_calibrated(self) -> None:
-        deviation = baseline(learnt()).deviation
+        deviation = baseline(learnt()).evidence.z.std(axis=0)
         assert np.all((deviation > 0.85) & (deviation < 1.15))
 
     @pytest.mark.slow
@@ -209,10 +225,10 @@ class TestFalseAlarms:
         table = pushes(COUNT, 103)
         gate = gate_of(learnt(), seen(learnt(), table), DRIVERS, baseline=baseline(learnt()))
         sizes = minimum_detectable(search_with(learnt(), gate), gate.evidence, gate.inputs, 0.01, gate.baseline)
-        size = sizes["contact_friction"]["driven"]
+        size = sizes["contact_friction"]
         assert size["unit"] == "1"
         small, large = (
-            with_effect(table, "contact_friction", linear(table, size["covariate"]), share * size["value"])
+            with_effect(table, "contact_friction", DriverBasis("constant"), share * size["value"])
             for share in (0.2, 1.5)
         )
         assert not searched(learnt(), small).terms

@@ -93,7 +93,7 @@ def test_a_refinement_is_found_next_to_a_mechanism_of_the_library(deployed: Push
     by_angle = constant("friction_by_angle", 0.25)
     _, terms = found(deployed, pushes(COUNT, 7, LESS_FRICTION, by_angle))
     assert set(terms) == {"contact_friction", "friction_by_angle"}
-    assert all(term.term.naming.known for _, term in terms.values())
+    assert all(term.naming.known for _, term in terms.values())
     assert within_interval(terms["friction_by_angle"][0], by_angle)
 
 

@@ -20,8 +20,7 @@ from push_predictor.residuals.evidence.drivers import screening_bases
 from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.loading import LoadedData
-from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of
+from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of, held_out_rows
 from push_predictor.residuals.question import Question
 from push_predictor.types import Array
 

@@ -18,9 +18,10 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidates_of
 from push_predictor.residuals.channels.motion import motion_effects
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.gate import baseline_of
 from push_predictor.residuals.selection.search import SearchResult
 
 BLOCKS, ROWS = 20, 3  # a block
@@ -108,7 +109,8 @@ def test_covariates_that_vary_along_a_push_are_not_tried(deployed: PushModel) ->
     table = pushes(60, 3)
     local = dict.fromkeys(("contact_gap", "time_since_contact"), np.tile([0.0, 0.2, 0.4], 60))
     evidence = evidence_of(deployed, replace(table, covariates={**table.covariates, **local}))
-    assert not {*local} & {c.covariate for c in candidates_of(evidence)}
+    inputs = inputs_basis(deployed, evidence.table)
+    assert not {*local} & {c.covariate for c in candidates_of(evidence, None, inputs)}
 
 
 def test_one_sided_pushes_are_compared_with_training_pushes_on_this_side(deployed: PushModel) -> None:

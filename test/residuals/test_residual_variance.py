@@ -14,13 +14,21 @@ from square_session import COUNT, FOUR, MECHANICS, NOISE, RIG, baseline, learnt,
 
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.channels.contrast import ChannelEffect
 from push_predictor.residuals.channels.variance import variance_effects
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.types import Array
 
 
 @pytest.fixture(autouse=True)
 def a_library_of_four(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computing responses takes most of the time."""
     in_library(monkeypatch, *FOUR)
+
+
+def noise_of(evidence: Evidence, z: Array, alpha: float = 0.01) -> tuple[ChannelEffect, ...]:
+    """What differs from training, whatever the covariates."""
+    return variance_effects(learnt(), evidence, z, alpha, names=(), training=baseline(learnt()).evidence).effects
 
 
 def louder_to_the_right(n: int, seed: int) -> PushTable:
@@ -37,10 +45,10 @@ class TestVariance:
         louder = louder_to_the_right(COUNT, 400)
         found = searched(learnt(), louder)
         evidence = seen(learnt(), louder)
-        noise = variance_effects(learnt(), evidence, found.unexplained, 0.01, baseline=baseline(learnt()))
+        noise = variance_effects(learnt(), evidence, found.unexplained, 0.01, training=baseline(learnt()).evidence)
         assert not found.terms
-        assert noise.found[0].covariate == "slider_x"
-        assert noise.found[0].ratio > 2.0
+        assert noise.effects[0].covariate == "slider_x"
+        assert noise.effects[0].parameters[0].value > 2.0
 
     @pytest.mark.slow
     def test_variance_that_grew_with_the_covariate_in_training_too_is_not_reported(self) -> None:
@@ -48,29 +56,32 @@ class TestVariance:
             louder_to_the_right(COUNT, 403), RIG, "gp", name="uneven", options=TrainingOptions(mean="zero")
         )
         evidence = seen(model, louder_to_the_right(COUNT, 404))
-        assert not variance_effects(model, evidence, evidence.z, 0.01, baseline=baseline(model)).found
-        alone = variance_effects(model, evidence, evidence.z, 0.01).found
+        assert not variance_effects(model, evidence, evidence.z, 0.01, training=baseline(model).evidence).effects
+        alone = variance_effects(model, evidence, evidence.z, 0.01).effects
         assert [effect.covariate for effect in alone] == ["slider_x"]
 
     def test_variance_as_in_training_is_not_reported(self) -> None:
         table = pushes(COUNT, 401)
         evidence = seen(learnt(), table)
-        assert not variance_effects(learnt(), evidence, evidence.z, 0.01, baseline=baseline(learnt())).found
+        assert not variance_effects(learnt(), evidence, evidence.z, 0.01, training=baseline(learnt()).evidence).effects
 
-    @pytest.mark.parametrize(("noise", "low", "high"), [(2.0, 1.6, 2.5), (0.5, 0.5, 0.75)])
+    @pytest.mark.parametrize(("noise", "low", "high"), [(2.0, 1.6, 2.5), (0.5, 0.5, 0.8)])
     def test_larger_or_smaller_variance_than_in_training_is_reported_as_constant(
         self, noise: float, low: float, high: float
     ) -> None:
-        """The errors of the model itself do not fall with the noise."""
+        """Of all outputs; the errors of the model itself do not fall with the noise."""
         table = pushes(COUNT, 402, noise=noise * NOISE)
         evidence = seen(learnt(), table)
-        found = variance_effects(learnt(), evidence, evidence.z, 0.01, baseline=baseline(learnt())).found
-        assert found[0].covariate == "model_inputs" and low < found[0].ratio < high
+        found = variance_effects(learnt(), evidence, evidence.z, 0.01, training=baseline(learnt()).evidence).effects
+        assert (found[0].covariate, found[0].outputs) == ("model_inputs", ("dx", "dy", "dtheta"))
+        assert low < found[0].parameters[0].value < high
 
     def test_slightly_larger_variance_than_in_training_is_not_reported(self) -> None:
         evidence = seen(learnt(), pushes(COUNT, 401))
         noise = [
-            variance_effects(learnt(), evidence, scale * evidence.z, 0.9, names=(), baseline=baseline(learnt())).found
+            variance_effects(
+                learnt(), evidence, scale * evidence.z, 0.9, names=(), training=baseline(learnt()).evidence
+            ).effects
             for scale in (1.05, 1.5)
         ]
         assert not noise[0] and noise[1][0].covariate == "model_inputs"
@@ -79,11 +90,13 @@ class TestVariance:
         evidence = seen(learnt(), pushes(COUNT, 402, noise=2.0 * NOISE))
         z = evidence.z.copy()
         z[7] *= 300.0
-        noise = variance_effects(learnt(), evidence, z, 0.01, names=(), baseline=baseline(learnt())).found
+        noise = noise_of(evidence, z)
         assert [effect.covariate for effect in noise] == ["model_inputs"]
 
     def test_variance_of_one_output_is_reported_of_that_one(self) -> None:
         evidence = seen(learnt(), pushes(COUNT, 401))
         z = evidence.z * [1.0, 2.0, 1.0]
-        (effect,) = variance_effects(learnt(), evidence, z, 0.01, names=(), baseline=baseline(learnt())).found
+        (effect,) = variance_effects(
+            learnt(), evidence, z, 0.01, names=(), training=baseline(learnt()).evidence
+        ).effects
         assert effect.outputs == ("dy",)

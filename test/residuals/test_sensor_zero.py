@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.contrast import ChannelEffect
+from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect
 from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, zero_shift
 from push_predictor.residuals.evidence.drivers import screening_bases
 from push_predictor.types import Array
@@ -51,8 +51,7 @@ def without_zero(table: PushTable) -> PushTable:
 
 
 def found(windows: PushTable, baseline: PushTable | None) -> ChannelEffect:
-    shift = zero_shift(windows, baseline)
-    assert shift is not None
+    (shift,) = zero_shift(windows, baseline).effects
     return shift
 
 
@@ -110,11 +109,19 @@ def test_change_since_training_is_not_stated_if_training_lacks_the_zero() -> Non
 
 
 def test_tables_without_the_zero_or_with_few_pushes_give_none() -> None:
-    assert zero_shift(without_zero(made(1)), made(2)) is None
-    assert zero_shift(made(1, pushes=5), made(2)) is None
+    assert zero_shift(without_zero(made(1)), made(2)) == NOTHING_FOUND
+    assert zero_shift(made(1, pushes=5), made(2)) == NOTHING_FOUND
     table = made(1)
     table.covariates["free_force_y"][0] = np.nan
-    assert zero_shift(table, made(2)) is None
+    assert zero_shift(table, made(2)) == NOTHING_FOUND
+
+
+def test_a_change_is_an_effect_up_to_the_level_and_a_candidate_beyond() -> None:
+    biased, sound = made(1, (0.2, 0.0)), made(2)
+    for level, count in ((0.01, 1), (1e-30, 0)):
+        finding = zero_shift(biased, sound, level)
+        assert len(finding.effects) == count
+        assert [(t.mechanism, t.covariate) for t in finding.tested] == [("wrench_bias", "session")]
 
 
 def test_zero_is_not_tried_as_a_cause() -> None:

@@ -22,7 +22,7 @@ from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import evidence_of, whitened_response
-from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.gate import baseline_of
 from push_predictor.residuals.selection.screening import AT_ONCE, Scores, screen
 
 

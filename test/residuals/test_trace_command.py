@@ -139,7 +139,7 @@ def test_prints_verdict_worth_and_held_out_figures_without_json(
     text = capsys.readouterr().out
     assert text.startswith("Contact friction changes with elapsed time.\n")
     assert "\nContact friction changes with elapsed time. It shifts a window by 0." in text
-    assert "The motion model is extended." in text and extended.held_out.digest in text
+    assert "\nUse the extended model: on " in text and extended.held_out.digest in text
     for name in ("before", "refit", "after"):
         assert f"\n{name} " in text
 

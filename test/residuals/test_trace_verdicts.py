@@ -28,17 +28,15 @@ from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect, ChannelFinding
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, MotionTerm
-from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.evidence.input_shift import about_mechanics
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again, with_inputs
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace, trace_json
-from push_predictor.residuals.question import Question
-from push_predictor.residuals.reporting.notes import notes_of_data
+from push_predictor.residuals.question import SHARES, Question
+from push_predictor.residuals.reporting.notes import _of_data
 from push_predictor.residuals.reporting.page import write_trace_report
-from push_predictor.residuals.reporting.sentences import answer, worth
+from push_predictor.residuals.reporting.sentences import answer
 from push_predictor.residuals.selection.naming import Naming
-from push_predictor.residuals.selection.search import Term
 from push_predictor.residuals.trace import trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
@@ -112,20 +110,28 @@ def test_constant_bias_of_the_force_sensor_is_found_in_free_motion_and_changes_n
     assert any("has a bias of +0." in note and "do not depend on it" in note for note in found.notes)
 
 
+NOISE = ChannelEffect(None, "velocity", "linear", (), 0.0005, ("dwell_time",), ("dx",))
+
+
+def found_by_channel(patch: pytest.MonkeyPatch, **findings: Any) -> None:
+    """What the channels find: motion, noise, forces and the sensor's zero; nothing if not given."""
+    channels = {"motion": "motion_effects", "noise": "_noise", "forces": "wrench_effects", "zero": "zero_shift"}
+    for channel, name in channels.items():
+        nothing = NO_MOTION if channel == "motion" else NOTHING_FOUND
+        finding = findings.get(channel, nothing)
+        patch.setattr(f"push_predictor.residuals.channel_search.{name}", lambda *_, found=finding, **__: found)
+
+
 def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     lower = Sized("relative change of the force since training", -0.4, -0.42, -0.38, "1")
     effect = ChannelEffect("surface_friction", "model_inputs", "constant", (lower,), 0.0005, ())
-    noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
-    motion = replace(NO_MOTION, variance=(noise,), equivalent=("dwell_time",))
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: motion)
+    found_by_channel(monkeypatch, noise=ChannelFinding((NOISE,)))
     alone = trace(learnt(), faultless())
     assert (alone.verdict, alone.kind, alone.equivalent) == ("variance", "variance", ("dwell_time",))
-    monkeypatch.setattr(
-        "push_predictor.residuals.channel_search.wrench_effects", lambda *_: ChannelFinding((effect,), ())
-    )
+    found_by_channel(monkeypatch, noise=ChannelFinding((NOISE,)), forces=ChannelFinding((effect,)))
     both = trace(learnt(), faultless())
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
-    assert [e.mechanism for e in both.effects] == ["surface_friction"]
+    assert [(e.mechanism, e.p_value) for e in both.effects] == [("surface_friction", 0.0005 / SHARES["force"])]
     assert any("noise of the motion changed as well" in note and "speed" in note for note in both.notes)
 
 
@@ -143,11 +149,13 @@ def test_effect_that_only_resembles_a_mechanism_has_no_size_and_its_rest_is_no_s
         terms = (_term(slope, resembles="tilted_surface"), _term(rest, resembles=None))
         return replace(NO_MOTION, terms=terms)
 
+    found_by_channel(monkeypatch)
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", unnamed)
     found = trace(learnt(), faultless())
     assert (found.verdict, found.mechanisms) == ("driver_only", ())
     (effect,) = found.effects
     assert (effect.mechanism, effect.resembles, effect.parameter) == (None, "tilted_surface", None)
+    assert effect.p_value == 0.001 / SHARES["mean"] and sum(SHARES.values()) == pytest.approx(1.0)
     assert [term.mechanism for term in found.terms] == ["tilted_surface", None]
     json.dumps(trace_json(found))
     write_trace_report(tmp_path / "page.html", found)  # pairs effects with terms
@@ -157,7 +165,7 @@ def test_effect_that_only_resembles_a_mechanism_has_no_size_and_its_rest_is_no_s
 def _term(best: Candidate, resembles: str | None) -> MotionTerm:
     """A term without a name."""
     naming = Naming((best.covariate,), (None,), False, resembles)
-    return MotionTerm(Term(best, 0.001, 100.0, naming), 0.001, ("dx", "dy"), 0.1, False, False, resembles is None)
+    return MotionTerm(best, 0.001, 100.0, naming, ("dx", "dy"), 0.1, False, False, resembles is None)
 
 
 def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,9 +175,9 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     faster = np.isin(data.table.push_id, data.table.pushes[::2])
     inputs[faster, 0] *= 5.0
     shifted = replace(data, table=replace(data.table, inputs=inputs), recordings=None)
+    found_by_channel(monkeypatch)
     searched = "push_predictor.residuals.channel_search.wrench_effects"
     monkeypatch.setattr(searched, lambda table, *_: judged.append(table) or NOTHING_FOUND)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
     found = trace(learnt(), shifted)
     assert "velocity" in [each.covariate for each in found.input_shift]
     assert 0 < len(judged[0]) < len(found.analysis)
@@ -180,27 +188,25 @@ def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytes
     """The model was trained there, too. About the other sides the new pushes show nothing."""
     data = faultless()
     one_side = replace(data, table=data.table.take(data.table.inputs[:, 1] < 0.35), recordings=None)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: NOTHING_FOUND)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
+    found_by_channel(monkeypatch)
     found = trace(learnt(), one_side)
     assert [each.covariate for each in found.input_shift] == ["contact"]
     assert found.verdict == "input_shift" and found.extended is None
     assert not any("Not tested" in note for note in found.notes)
     assert answer(found)[2].startswith("Keep the deployed model, and push in the rest of its range")
-    assert "Push in the rest of training's range" in worth(found)
 
 
-def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
-    zero = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
-    found = ChannelFinding((), (), ChannelEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
-    noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: found)
-    monkeypatch.setattr(
-        "push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: replace(NO_MOTION, variance=(noise,))
-    )
+@pytest.mark.parametrize(
+    ("moved", "words"), [(0.0, "do not depend on it"), (1e-3, "Zero the sensor, and record again")]
+)
+def test_zero_of_the_sensor_is_only_noted_next_to_another_change(
+    monkeypatch: pytest.MonkeyPatch, moved: float, words: str
+) -> None:
+    found_by_channel(monkeypatch, zero=pulled(), noise=ChannelFinding((NOISE,)))
+    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(moved))
     traced = trace(learnt(), faultless())
     assert traced.verdict == "variance"
-    assert any("+0.5 N along x" in note for note in traced.notes)
+    assert any("+0.5 N along x" in note and words in note for note in traced.notes)
 
 
 @pytest.mark.parametrize(("moved", "verdict"), [(0.0, "none"), (1e-3, "measurement")])
@@ -208,8 +214,7 @@ def test_force_bias_is_a_measurement_error_only_if_its_correction_changes_the_wi
     monkeypatch: pytest.MonkeyPatch, moved: float, verdict: str
 ) -> None:
     """moved: by what the correction of the force would change the inputs of the windows, rad."""
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: pulled())
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
+    found_by_channel(monkeypatch, zero=pulled())
     monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(moved))
     result = trace_json(trace(learnt(), faultless()))
     harmful = verdict == "measurement"
@@ -222,23 +227,21 @@ def test_force_bias_is_a_measurement_error_only_if_its_correction_changes_the_wi
 def test_correction_of_the_force_does_harm_from_two_per_cent_of_the_windows(
     monkeypatch: pytest.MonkeyPatch, share: float, harmful: bool
 ) -> None:
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: pulled())
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
+    found_by_channel(monkeypatch, zero=pulled())
     monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(1e-9, share))
     assert (trace(learnt(), faultless()).verdict == "measurement") == harmful
 
 
 def test_force_bias_of_a_push_table_is_harmless_for_nothing_can_be_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: pulled())
-    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
+    found_by_channel(monkeypatch, zero=pulled())
     found = trace(learnt(), replace(faultless(), recordings=None))
     assert found.verdict == "none" and len(found.harmless) == 2
 
 
 def pulled() -> ChannelFinding:
-    """A bias of the force sensor during contact."""
+    """A bias of the force sensor."""
     pulls = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
-    return ChannelFinding((ChannelEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ()),), ())
+    return ChannelFinding((ChannelEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005),))
 
 
 def turned(angle: float, share: float = 1.0) -> Callable[..., PushTable]:
@@ -278,7 +281,7 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
     assert result["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
     refit, before = (sum(result[model]["nlpd"].values()) for model in ("refit", "before"))
     assert refit < before
-    assert "Retraining on the new pushes fixes this." in worth(found)
+    assert answer(found)[2].startswith("Retrain the model on the new pushes: that is enough")
 
 
 def test_a_covariate_that_varies_along_a_push_is_rejected_by_name() -> None:
@@ -319,7 +322,7 @@ def test_pushes_that_the_model_was_trained_on_are_not_judged() -> None:
     question = Question.of(model, both)
     assert question.trained == len(model.training.pushes)
     assert not {*question.windows.pushes, *question.held_out.pushes} & {*model.training.pushes}
-    assert f"trained on {question.trained} of the pushes" in " ".join(notes_of_data(question))
+    assert f"trained on {question.trained} of the pushes" in " ".join(_of_data(question))
     textbook = train_model(model.training, model.rig, "analytical", name="textbook")
     assert Question.of(textbook, both).trained == 0  # its mean was fitted to none
     with pytest.raises(RequestError, match=r"pushes: 0 .*that a learned model was not trained on"):

@@ -15,8 +15,7 @@ from push_predictor.residuals.candidates.candidate import candidates_of
 from push_predictor.residuals.channels.motion import _rows
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.selection.gate import Baseline, Gate, baseline_of
 from push_predictor.residuals.selection.search import SearchResult, search
 
 FEW = ("contact_friction", "pressure_spread", "tilted_surface")
@@ -47,5 +46,4 @@ def gate_of(
 
 def search_with(model: PushModel, gate: Gate) -> SearchResult:
     """The search behind a gate, with the rows that a trace of this model takes."""
-    assert gate.baseline is not None
     return search(gate, _rows(model, gate.evidence, gate.baseline, gate.inputs))

@@ -24,7 +24,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.selection.baseline import Baseline, baseline_of
+from push_predictor.residuals.selection.gate import Baseline, baseline_of
 from push_predictor.residuals.selection.search import SearchResult
 
 COUNT, WINDOWS = 100, 2  # pushes of a session, as few as have blocks enough (FEWEST_BLOCKS); windows of a push

@@ -104,24 +104,25 @@ def candidate(evidence: Evidence, mechanism: str | None, covariate: str, basis: 
     return Candidate(mechanism, covariate, basis, whitened_response(evidence, mechanism), values)
 
 
-def candidates_of(
-    evidence: Evidence, names: Sequence[str] | None = None, inputs: InputsBasis | None = None
-) -> list[Candidate]:
+def candidates_of(evidence: Evidence, names: Sequence[str] | None, inputs: InputsBasis) -> list[Candidate]:
     """Every mechanism whose needs are recorded, and the generic polynomial, with every covariate and with none.
 
     names: covariates to try, all that vary if None. inputs: a constant effect that differs between sides which the base
     folds gets the covariate "edge". Confounded covariates are skipped.
     """
-    skipped = set() if inputs is None else set(confounded(evidence, names, inputs))
+    skipped = set(confounded(evidence, names, inputs))
     bases = [(CONSTANT, DriverBasis("constant"))]
     bases += [pair for pair in screening_bases(evidence.table, names) if pair[0] not in skipped]
-    own_sides = inputs is not None and inputs.learnt and not inputs.folds
+    own_sides = inputs.learnt and not inputs.folds
     found = [
         replace(each, own=each.covariate == SIDES and own_sides)
         for mechanism in usable(evidence)
         for each in _of_mechanism(evidence, mechanism, bases, inputs)
     ]
-    return found if inputs is None else _with_nuisance(found, evidence, inputs)
+    responses = {c.mechanism: c.response for c in found}
+    mechanisms = [name for name in responses if name is not None]
+    nuisance = Nuisance(evidence, inputs, mechanisms, responses.__getitem__)
+    return [replace(c, nuisance=nuisance.of_change(*c.label, c.basis, c.kind)) for c in found]
 
 
 def confounded(evidence: Evidence, names: Sequence[str] | None, inputs: InputsBasis) -> list[str]:
@@ -160,7 +161,7 @@ def constant_refinements(evidence: Evidence) -> dict[str | None, str]:
 
 
 def _of_mechanism(
-    evidence: Evidence, mechanism: str | None, bases: Sequence[tuple[str, DriverBasis]], inputs: InputsBasis | None
+    evidence: Evidence, mechanism: str | None, bases: Sequence[tuple[str, DriverBasis]], inputs: InputsBasis
 ) -> list[Candidate]:
     """Candidates of one mechanism; all share one array of its response."""
     response = whitened_response(evidence, mechanism)
@@ -174,17 +175,10 @@ def _of_mechanism(
     return found
 
 
-def _with_nuisance(found: Sequence[Candidate], evidence: Evidence, inputs: InputsBasis) -> list[Candidate]:
-    responses = {c.mechanism: c.response for c in found}
-    mechanisms = [name for name in responses if name is not None]
-    nuisance = Nuisance(evidence, inputs, mechanisms, responses.__getitem__)
-    return [replace(c, nuisance=nuisance.of_change(*c.label, c.basis, c.kind)) for c in found]
-
-
-def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis | None) -> str:
+def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis) -> str:
     if headed(mechanism):
         return HEADED
-    if inputs is None or not inputs.folds:
+    if not inputs.folds:
         return CONSTANT
     outside = np.sum(Residualizer(inputs.columns)(response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
     return SIDES if outside > OUTSIDE else CONSTANT

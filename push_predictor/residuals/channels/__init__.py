@@ -3,5 +3,5 @@
 
 """Where an effect may lie: the measurement, the mean motion, its variance, the wrench.
 
-Import one module per channel; a channel imports no later step.
+Import one module per channel. All but the motion share the search of `contrast`; a channel imports no later step.
 """

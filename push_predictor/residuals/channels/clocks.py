@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from scipy.stats import norm
 
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.residuals.channels.contrast import ChannelEffect, ChannelFinding
+from push_predictor.residuals.channels.contrast import ChannelEffect
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.outcome import Sized
 
@@ -26,14 +26,14 @@ MEANING = {
 UNTRUSTED = "A clock that is off changes windows and forces: effects on them are not trusted, and no model is extended."
 
 
-def clock_errors(findings: Sequence[Finding]) -> ChannelFinding:
+def clock_errors(findings: Sequence[Finding]) -> tuple[ChannelEffect, ...]:
     """The clocks that are off, as measurement errors with their sizes."""
-    return ChannelFinding(tuple(map(_error, findings)), ())
+    return tuple(map(_error, findings))
 
 
 def clock_notes(findings: Sequence[Finding]) -> tuple[str, ...]:
     """What was found about clocks, and that nothing is learnt from it."""
-    return (*(f"{finding.text}" for finding in findings), UNTRUSTED) if findings else ()
+    return (*(finding.text for finding in findings), UNTRUSTED) if findings else ()
 
 
 def _error(finding: Finding) -> ChannelEffect:

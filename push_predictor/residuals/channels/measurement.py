@@ -19,9 +19,10 @@ moved to the robot's frame and clock, a tool offset is subtracted from the pushe
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
@@ -32,23 +33,21 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
     ChannelEffect,
     ChannelFinding,
+    Chosen,
     Contrast,
+    Quantity,
     Stacked,
-    best_and_rivals,
-    block_diagonal,
-    estimate_with_draws,
     inliers,
-    is_identifiable,
     robust_deviation,
-    screen_contrasts,
+    searched,
     sized,
+    sizes,
     stacked,
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.evidence.split import FEWEST_PUSHES
-from push_predictor.residuals.outcome import Tested
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES
+from push_predictor.types import Array
 
 NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")
 PARAMETERS = {
@@ -59,21 +58,6 @@ PARAMETERS = {
 ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
 MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
 CORNER = 0.002  # m; guards against a wrong normal: contacts closer to a corner may be on either side of it
-
-
-@dataclass(frozen=True, eq=False)
-class _Gap:
-    """The gap z (n, 1) m with its controls (n, m), blocks of pushes (n,), contrasts, and which rows are new (n,)."""
-
-    z: Array
-    controls: Array
-    block: IntArray
-    tried: tuple[Contrast, ...]
-    new: BoolArray
-
-    def take(self, rows: BoolArray) -> _Gap:
-        tried = tuple(each.take(rows) for each in self.tried)
-        return _Gap(self.z[rows], self.controls[rows], self.block[rows], tried, self.new[rows])
 
 
 def measurement_errors(
@@ -90,8 +74,8 @@ def measurement_errors(
     gap = _gap_of(both, rig.outline)
     if len(both.tables[-1].pushes) < FEWEST_PUSHES or not gap.tried:
         return None
-    gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.controls))
-    return _searched(gap, alpha, seed)
+    chosen, tested, _ = searched(gap, alpha, seed)
+    return ChannelFinding(_sized(gap, chosen, seed), tested)
 
 
 def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
@@ -109,19 +93,21 @@ def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
     }
 
 
-def _gap_of(both: Stacked, outline: Outline) -> _Gap:
-    controls = block_diagonal([_geometry(table, outline) for table in both.tables])
+def _gap_of(both: Stacked, outline: Outline) -> Quantity:
+    """The gap (n, 1) m; what geometry and errors do to it in training is a control."""
+    controls = block_diag(*(_geometry(table, outline) for table in both.tables))
     responses = [gap_responses(table, outline) for table in both.tables]
-    stack = {name: both.joined([r[name] for r in responses]) for name in PARAMETERS}
+    stack = {name: np.concatenate([r[name] for r in responses]) for name in PARAMETERS}
     if len(both.tables) > 1:
         controls = np.column_stack([controls, *stack.values()])
-    nothing = np.zeros((len(both.new), 0))
+    nothing, on = np.zeros((len(both.new), 0)), np.ones(1)
     tried = [
-        Contrast(name, CONSTANT, DriverBasis("constant"), (column * both.new[:, None])[:, None, :], nothing)
+        Contrast(name, CONSTANT, DriverBasis("constant"), column * both.new[:, None], nothing, on)
         for name, column in stack.items()
     ]
-    z = both.joined([table.covariates["contact_gap"] for table in both.tables])[:, None]
-    return _Gap(z, controls, both.block, tuple(each for each in tried if is_identifiable(each, controls)), both.new)
+    z = np.concatenate([table.covariates["contact_gap"] for table in both.tables])[:, None]
+    columns = np.concatenate([each.columns for each in tried], axis=2)
+    return Quantity.of(z, controls, both, tried, inliers(z, columns, controls))
 
 
 def _geometry(table: PushTable, outline: Outline) -> Array:
@@ -159,43 +145,17 @@ def _settled(table: PushTable) -> Array:
     return np.ones(len(table)) if since is None else (since >= SETTLED).astype(np.float64)
 
 
-def _searched(gap: _Gap, alpha: float, seed: int) -> ChannelFinding:
-    """Select errors one by one, strongest first, each with those before it regressed out."""
-    controls, remaining = gap.controls, list(gap.tried)
-    found: list[tuple[Contrast, float, tuple[str, ...]]] = []
-    tested: tuple[Tested, ...] = ()
-    while remaining:
-        p_values = screen_contrasts(gap.z, remaining, controls, gap.block, seed).p_value.tolist()
-        tested = tested or tuple(Tested(t.mechanism, CONSTANT, p) for t, p in zip(remaining, p_values, strict=True))
-        significant = {t.mechanism: p for t, p in zip(remaining, p_values, strict=True) if p <= alpha}
-        if not significant:
-            break
-        alike = best_and_rivals(gap.z, [t for t in remaining if t.mechanism in significant], controls, gap.block, seed)
-        best = alike[0]
-        found.append((best, significant[best.mechanism], _names(alike)))
-        controls = np.column_stack([controls, best.columns[:, 0]])
-        remaining = [t for t in remaining if t is not best and is_identifiable(t, controls)]
-    return ChannelFinding(_sized(gap, found, controls, seed) if found else (), tested)
-
-
-def _names(alike: Sequence[Contrast]) -> tuple[str, ...]:
-    names = [t.mechanism for t in alike]
-    return tuple(name for each in names for name in (each, *ALIKE.get(each, ())) if name != names[0])
-
-
-def _sized(
-    gap: _Gap, found: Sequence[tuple[Contrast, float, tuple[str, ...]]], controls: Array, seed: int
-) -> tuple[ChannelEffect, ...]:
-    """Joint estimates of all errors; those with a smaller effect than the noise of a single window are dropped."""
+def _sized(gap: Quantity, chosen: Sequence[Chosen], seed: int) -> tuple[ChannelEffect, ...]:
+    """The errors; those with a smaller effect than the noise of a single window are dropped."""
+    controls = np.column_stack([gap.controls, *(each.contrast.values for each in chosen)])
     noise = robust_deviation(Residualizer(controls)(gap.z)[:, 0])
-    nothing, columns = np.zeros((len(gap.z), 0)), np.concatenate([each.columns for each, _, _ in found], axis=2)
-    values, draws = estimate_with_draws(gap.z, columns, gap.controls, nothing, gap.block, seed)
-    errors, begin = [], 0
-    for each, p_value, rivals in found:
-        part = slice(begin, begin := begin + each.columns.shape[2])
-        if np.sqrt(np.mean((each.columns[gap.new, 0] @ values[part]) ** 2)) >= noise:
-            parameters = sized(PARAMETERS[each.mechanism], values[part], draws[:, part])
-            errors.append(ChannelEffect(each.mechanism, CONSTANT, "constant", parameters, p_value, rivals))
+    errors = []
+    for each, (values, draws) in zip(chosen, sizes(gap, chosen, seed), strict=True):
+        name, shift = str(each.contrast.mechanism), each.contrast.values[gap.stack.new[gap.rows]] @ values
+        if np.sqrt(np.mean(shift**2)) >= noise:
+            rivals = (*ALIKE.get(name, ()), *(one for r in each.rivals for one in (r, *ALIKE.get(r, ()))))
+            parameters = sized(PARAMETERS[name], values, draws)
+            errors.append(ChannelEffect(name, CONSTANT, "constant", parameters, each.p_value, rivals))
     return tuple(errors)
 
 
@@ -226,12 +186,8 @@ def _rotation(recording: Recording, turn: float) -> Recording:
     return replace(recording, slider=replace(slider, x=place[:, 0], y=place[:, 1], heading=heading))
 
 
-def _shift(recording: Recording, x: float, y: float) -> Recording:
-    return replace(recording, slider=_moved(recording.slider, -x, -y))
-
-
-def _tool(recording: Recording, x: float, y: float) -> Recording:
-    return replace(recording, pusher=_moved(recording.pusher, -x, -y))
+def _moved(stream: PoseStream, x: float, y: float) -> PoseStream:
+    return replace(stream, x=stream.x - x, y=stream.y - y)
 
 
 def _bias(recording: Recording, x: float, y: float) -> Recording:
@@ -241,14 +197,10 @@ def _bias(recording: Recording, x: float, y: float) -> Recording:
     return replace(recording, wrench=replace(wrench, fx=wrench.fx - x, fy=wrench.fy - y))
 
 
-def _moved(stream: PoseStream, x: float, y: float) -> PoseStream:
-    return replace(stream, x=stream.x + x, y=stream.y + y)
-
-
 CORRECTIONS: dict[str, Callable[..., Recording]] = {
     "clock_offset": _clock,
     "frame_rotation": _rotation,
-    "frame_shift": _shift,
-    "tool_offset": _tool,
+    "frame_shift": lambda recording, x, y: replace(recording, slider=_moved(recording.slider, x, y)),
+    "tool_offset": lambda recording, x, y: replace(recording, pusher=_moved(recording.pusher, x, y)),
     "wrench_bias": _bias,
 }

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,26 +18,22 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, concatenate
 from push_predictor.residuals.candidates.candidate import SPEED, Candidate, candidate, candidates_of, confounded
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
-from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
+from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
-from push_predictor.residuals.evidence.split import FEWEST_PUSHES
-from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.outcome import Tested
-from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.gate import Gate
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence
+from push_predictor.residuals.outcome import Tested, best_of, in_trace
+from push_predictor.residuals.selection.gate import Baseline, Gate, baseline_of
 from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED, REJECTED
 from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
-VARIANCE_SHARE = 0.25  # of the motion's alpha
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
 
 @dataclass(frozen=True, eq=False)
-class MotionTerm:
+class MotionTerm(Term):
     """A term of the search, judged as a part of the model.
 
     outputs: those that it shifts. share: of the sum of squares of the standardised residual. own: whether it lies in
@@ -45,28 +41,11 @@ class MotionTerm:
     training. part: whether it is what the fit of a larger one leaves, rather than an effect.
     """
 
-    term: Term
-    p_value: float
     outputs: tuple[str, ...]
     share: float
     own: bool
     since_training: bool
     part: bool
-
-    @property
-    def best(self) -> Candidate:
-        """Mechanism, covariate and form."""
-        return self.term.best
-
-    @property
-    def mechanism(self) -> str | None:
-        """See Term."""
-        return self.term.mechanism
-
-    @property
-    def resembles(self) -> str | None:
-        """The mechanism that comes closest, where none fits."""
-        return self.term.naming.resembles
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,25 +54,29 @@ class MotionFinding:
 
     terms: the largest gain first, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
     and of its mechanism.
-    deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
-    effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
-    confounded: covariates that were not tried, because the inputs explain them. remaining: the strongest
-    significant candidate after all terms.
+    unchanged: effects that the base lacks, but lacked in training as much, strongest first. confounded: covariates that
+    were not tried, because the inputs explain them. remaining: the strongest significant candidate after all terms.
+    unexplained (n, 3): the standardised residuals minus the terms. training: evidence of the training windows.
     """
 
     terms: tuple[MotionTerm, ...]
     equivalent: tuple[str, ...]
     mechanisms: tuple[str, ...]
     tested: tuple[Tested, ...]
-    deviation: Array | None
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: Label | None
-    variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
+    unexplained: Array = field(default_factory=lambda: np.empty((0, 3)))
+    training: Evidence | None = None
+
+    def family_wise(self, share: float) -> MotionFinding:
+        """The same with p values of the whole trace; share: of alpha, that the search may spend."""
+        terms = tuple(replace(term, p_value=min(1.0, term.p_value / share)) for term in self.terms)
+        return replace(self, terms=terms, tested=in_trace(self.tested, share))
 
 
-NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), ())
+NO_MOTION = MotionFinding((), (), (), (), {}, None, (), ())
 
 
 def motion_effects(
@@ -107,34 +90,29 @@ def motion_effects(
 ) -> MotionFinding:
     """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None.
 
-    inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: its noise is not
-    judged, and an error that depends on the inputs alone is no effect.
+    inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: an error that
+    depends on the inputs alone is no effect.
     """
     inputs = inputs_basis(model, evidence.table)
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
-    share = (1.0 - VARIANCE_SHARE) * alpha
-    known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    candidates = tuple(c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean())))
+    known = 1.0 if inside is None else float(inside.mean())
+    candidates = tuple(c for c in candidates_of(evidence, names, inputs) if _separable(c, known))
     if not candidates:
         raise RequestError("covariate", ", ".join(names or ()), "one that the inputs do not change, as they shifted")
-    found = search(Gate(evidence, candidates, inputs, share, seed, baseline), _rows(model, evidence, baseline, inputs))
-    spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
+    found = search(Gate(evidence, candidates, inputs, alpha, seed, baseline), _rows(model, evidence, baseline, inputs))
     terms = _judged(found, evidence, inputs, baseline)
-    first = terms[0].term if terms else None
+    first = terms[0] if terms else None
     return MotionFinding(
         terms=terms,
-        equivalent=first.naming.covariates[1:] if first else spread.rivals,
+        equivalent=first.naming.covariates[1:] if first else (),
         mechanisms=tuple(name for name in first.naming.mechanisms[1:] if name is not None) if first else (),
-        tested=_tested(found),
-        deviation=baseline.deviation if inputs.learnt else None,
-        minimum_detectable={
-            **minimum_detectable(found, evidence, inputs, share, baseline),
-            **_detectable_noise(spread),
-        },
-        remaining=_remaining(found, share),
-        variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in spread.found),
+        tested=best_of([c.label for c in found.candidates], found.first.p_value.tolist()),
+        minimum_detectable=minimum_detectable(found, evidence, inputs, alpha, baseline),
+        remaining=_remaining(found, alpha),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
+        unexplained=found.unexplained,
+        training=baseline.evidence,
     )
 
 
@@ -154,8 +132,10 @@ def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseli
     changed = _changed(found, inputs, baseline)
     terms = [
         MotionTerm(
-            term,
-            _of_motion(term.p_value),
+            term.best,
+            term.p_value,
+            term.gain,
+            term.naming,
             _outputs(fit.columns[:, :, part] @ fit.coefficients[part]),
             explained * gain / max(sum(gains), np.finfo(float).tiny),
             inputs.absorbs and term.best.kind == "constant",
@@ -203,12 +183,6 @@ def _differ(one: Effect, other: Effect) -> bool:
     return bool(chdtrc(len(change), square) <= REJECTED)
 
 
-def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
-    if not np.isfinite(spread.detectable):
-        return {}
-    return {"noise": {"value": spread.detectable, "unit": "times training", "covariate": SESSION}}
-
-
 def _separable(candidate: Candidate, inside: float) -> bool:
     """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs.
 
@@ -220,33 +194,6 @@ def _separable(candidate: Candidate, inside: float) -> bool:
     if candidate.mechanism is None or candidate.basis.is_constant:
         return False
     return candidate.covariate != SPEED or inside >= MOSTLY
-
-
-def _spread(
-    model: PushModel,
-    evidence: Evidence,
-    z: Array,
-    alpha: float,
-    names: Sequence[str] | None,
-    seed: int,
-    baseline: Baseline,
-) -> VarianceFinding:
-    if len(evidence.table.pushes) < FEWEST_PUSHES:
-        return VarianceFinding()
-    return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
-
-
-def _tested(found: SearchResult) -> tuple[Tested, ...]:
-    """Every mechanism with every covariate once, in its best basis, smallest p first."""
-    best: dict[Label, float] = {}
-    for tried, p in zip(found.candidates, found.first.p_value.tolist(), strict=True):
-        best[tried.label] = min(p, best.get(tried.label, 1.0))
-    return tuple(Tested(*label, _of_motion(p)) for label, p in sorted(best.items(), key=lambda item: item[1]))
-
-
-def _of_motion(p_value: float) -> float:
-    """A p value of the search on the mean as one of the motion, which tests the variance too."""
-    return min(1.0, p_value / (1.0 - VARIANCE_SHARE))
 
 
 def _remaining(found: SearchResult, alpha: float) -> Label | None:

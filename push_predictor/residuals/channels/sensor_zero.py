@@ -12,16 +12,15 @@ may drift by as much. Over hundreds of pushes the means are exact, so this alone
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.contrast import ChannelEffect
-from push_predictor.residuals.evidence.drivers import CONSTANT, SENSOR_ZERO
-from push_predictor.residuals.evidence.split import FEWEST_PUSHES
-from push_predictor.residuals.evidence.standardised import push_order
-from push_predictor.residuals.outcome import Sized
+from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect, ChannelFinding
+from push_predictor.residuals.evidence.drivers import CONSTANT, SENSOR_ZERO, SESSION
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, push_order
+from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.types import Array
 
 BETWEEN_SESSIONS = 0.02  # N, standard deviation of the zero of a sound sensor, per axis
@@ -32,23 +31,25 @@ WRENCH_BIAS = "wrench_bias"
 BIAS = (("force read too much along x", "N"), ("force read too much along y", "N"))  # its parameters
 
 
-def zero_shift(windows: PushTable, baseline: PushTable | None) -> ChannelEffect | None:
+def zero_shift(windows: PushTable, baseline: PushTable | None, alpha: float = 1.0) -> ChannelFinding:
     """The most significant change of the zero, by chance with probability p_value as large anywhere.
 
     Its covariate is model_inputs if it is constant since training, push_index for a step within the session.
-    None if no push recorded it, or too few. A change since training is tried if the baseline has the zero, too.
+    Nothing if no push recorded it, or too few. A change since training is tried if the baseline has the zero, too.
     """
     now, before = _zeros(windows), None if baseline is None else _zeros(baseline)
     if now is None:
-        return None
+        return NOTHING_FOUND
     places = np.unique(np.linspace(0, len(now), PLACES + 2).astype(int)[1:-1])
     steps = [_Change(PROGRESS, "step", now[:k], now[k:], 1, 2 * len(places)) for k in places if _enough(now, int(k))]
     tried = steps if before is None else [_Change(CONSTANT, "constant", before, now, 2, 2), *steps]
     if not tried:
-        return None
+        return NOTHING_FOUND
     best = max(tried, key=lambda change: change.log_evidence)
     shown = best if best.basis == "constant" else _placed(best, now)
-    return ChannelEffect(WRENCH_BIAS, best.covariate, best.basis, shown.parameters(), best.p_value)
+    effect = ChannelEffect(WRENCH_BIAS, best.covariate, best.basis, shown.parameters(), best.p_value)
+    since = Tested(WRENCH_BIAS, SESSION if best.covariate == CONSTANT else best.covariate, best.p_value)
+    return ChannelFinding((effect,) if best.p_value <= alpha else (), (since,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +109,9 @@ def _enough(zeros: Array, place: int) -> bool:
 
 
 def _placed(step: _Change, zeros: Array) -> _Change:
-    """The step at the push that divides the zeros (p, 2) into the most uniform parts."""
-    places = [k for k in range(1, len(zeros)) if _enough(zeros, k)]
-    scatter = [float(sum(len(part) * part.var(axis=0).sum() for part in (zeros[:k], zeros[k:]))) for k in places]
-    place = places[int(np.argmin(scatter))]
-    return _Change(step.covariate, step.basis, zeros[:place], zeros[place:], step.sessions, step.alternatives)
+    """The step at the push between those before and after which the zeros (p, 2) differ most surely."""
+    places = (k for k in range(1, len(zeros)) if _enough(zeros, k))
+    return max((replace(step, before=zeros[:k], after=zeros[k:]) for k in places), key=lambda each: each.log_evidence)
 
 
 def _of_mean(zeros: Array) -> Array:

@@ -1,10 +1,14 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Standardised residuals: what a deployed model fails to explain, in units of its own predicted deviation."""
+"""Standardised residuals: what a deployed model fails to explain, in units of its own predicted deviation.
+
+And the parts of a table: pushes that are held out to the end, and blocks of neighbours.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,6 +22,11 @@ from push_predictor.models.pushes import Push
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
+FEWEST_PUSHES = 12  # of a table, or of a part of one, that anything is concluded from
+HELD_OUT_BLOCK = 10  # pushes
+FEWEST_HELD_OUT = 9  # guards against few pushes that all lie in analysis: their blocks are smaller
+EVERY = 3  # one block in so many is held out
+RULE = f"every third block of up to {HELD_OUT_BLOCK} successive pushes is held out"
 BLOCK = 4  # neighbouring pushes may share disturbances that no covariate records
 ACCURACY_OF_FITS = 3e-3  # relative, of displacements
 MOST_FITTED = 600  # windows of a fit that compares candidates
@@ -106,6 +115,22 @@ def blocks_of(table: PushTable) -> IntArray:
     order = push_order(table)
     count = int(order.max()) + 1 if len(order) else 0
     return np.asarray(order // max(1, min(BLOCK, count // FEWEST_BLOCKS)))
+
+
+def held_out_rows(table: PushTable) -> BoolArray:
+    """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session."""
+    order = push_order(table)
+    count = int(order.max()) + 1 if len(order) else 0
+    block = max(1, min(HELD_OUT_BLOCK, count // FEWEST_HELD_OUT))
+    return np.asarray((order // block) % EVERY == EVERY - 1)
+
+
+def digest_of(table: PushTable) -> str:
+    """SHA-256 of a table's inputs, durations and outcomes, in hexadecimal."""
+    digest = hashlib.sha256()
+    for column in (table.inputs, table.duration, table.outcomes):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()
 
 
 def whitener_of(covariance: Array) -> Array:

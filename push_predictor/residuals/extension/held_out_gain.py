@@ -60,18 +60,6 @@ def held_out_gain(
     return max(found, key=lambda each: each.nlpd.high)
 
 
-def gain(
-    refit: PushModel, after: PushModel, held_out: PushTable, training_mean: Array | None = None
-) -> tuple[Estimate, Estimate]:
-    """After minus refit in NMSE and in NLPD, with 95 % intervals from a paired bootstrap of pushes.
-
-    training_mean (3,): the reference of the NMSE; the refit's if None.
-    """
-    reference = refit.training_mean if training_mean is None else training_mean
-    first, second = (new_windows(model, held_out).compared(reference) for model in (refit, after))
-    return _difference(first, second, total_nmse), _difference(first, second, total_nlpd)
-
-
 def compared(model: PushModel, table: PushTable, training_mean: Array) -> Comparison:
     """A model's predictions of a table; the NMSE is relative to this mean outcome (3,)."""
     return replace(compare(model, table), training_mean=training_mean)

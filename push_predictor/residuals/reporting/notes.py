@@ -9,8 +9,6 @@ from collections.abc import Sequence
 
 from push_predictor.residuals.channel_search import Searched
 from push_predictor.residuals.channels.motion import MotionFinding
-from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Sized
 from push_predictor.residuals.question import Question
 from push_predictor.residuals.reporting.phrases import (
@@ -35,30 +33,23 @@ NOT_JUDGED = "The measurement could not be checked for errors: these windows con
 
 def notes_of(question: Question, found: Searched) -> tuple[str, ...]:
     """Notes on the data, and on what was found or not tried in addition to the verdict."""
-    return (*notes_of_data(question), *_of_motion(found.motion), *_of_other_channels(found))
+    if found.corrected is not None:
+        corrected = [CUT_AGAIN] if found.corrected.evidence is not None else []
+        return (*corrected, *([NO_STREAMS] if question.loaded.recordings is None else []), *_of_data(question))
+    not_tried = [NOT_TRIED] if any(shift.extrapolates for shift in question.shifted) else []
+    return (*_of_data(question), *_of_motion(found.motion), *_of_other_channels(found), *not_tried)
 
 
-def notes_of_data(question: Question) -> tuple[str, ...]:
-    """How the pushes were split, and which pushes and covariates were dropped."""
+def _of_data(question: Question) -> tuple[str, ...]:
+    """Which pushes and covariates were dropped."""
     dropped = question.loaded.dropped
     covariates = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in dropped.items())
     known = f"The model was trained on {question.trained} of the pushes: they are not judged."
-    return (f"Split: {RULE}. Windows of one push stay together.", *[known] * bool(question.trained), *covariates)
-
-
-def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:
-    """What was not tried because the inputs extrapolate."""
-    return (NOT_TRIED,) if any(shift.extrapolates for shift in shifted) else ()
+    return (*[known] * bool(question.trained), *covariates)
 
 
 def _of_motion(motion: MotionFinding) -> list[str]:
     notes = []
-    if motion.deviation is not None:
-        values = ", ".join(f"{value:.2f}" for value in motion.deviation)
-        notes.append(
-            f"On held-out training pushes the standardised residuals of dx, dy and dtheta have standard deviations "
-            f"{values}; a calibrated model has 1."
-        )
     if own := [effect_phrase(term.mechanism, term.best.covariate) for term in motion.terms if term.own]:
         notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
     if left := [effect_phrase(t.mechanism, t.best.covariate) for t in motion.terms if t.part]:
@@ -86,10 +77,9 @@ def _of_other_channels(found: Searched) -> list[str]:
     if measured is None:
         notes.append(NOT_JUDGED)
     notes += [f"{_bias(fault.parameters)} The windows and predictions do not depend on it." for fault in found.harmless]
-    if forces.zero is not None:
-        notes.append(f"{_bias(forces.zero.parameters)} Zero the sensor, and record again.")
-    if motion.variance and forces.effects and not motion.terms:
-        covariates = listed([covariate_phrase(effect.covariate) for effect in motion.variance])
+    notes += [f"{_bias(fault.parameters)} Zero the sensor, and record again." for fault in found.zero.effects]
+    if found.noise.effects and forces.effects and not motion.terms:
+        covariates = listed([covariate_phrase(effect.covariate) for effect in found.noise.effects])
         notes.append(f"The noise of the motion changed as well; it depends on {covariates}.")
     if motion.terms and forces.effects:
         effects = listed([effect_phrase(e.mechanism, e.covariate) for e in forces.effects])

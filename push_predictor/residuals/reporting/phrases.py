@@ -40,11 +40,6 @@ def mechanism_phrase(mechanism: str | None) -> str:
     return MECHANISMS[mechanism].noun if mechanism in MECHANISMS else OTHERS.get(mechanism, mechanism.replace("_", " "))
 
 
-def moved_noun(mechanism: str | None) -> str:
-    """What changes if a mechanism acts: a noun phrase to begin a sentence with."""
-    return "the slider's motion" if mechanism is None else mechanism_phrase(mechanism)
-
-
 def covariate_phrase(covariate: str) -> str:
     """A covariate in words; a recorded topic by its name."""
     if covariate.startswith("topic:"):
@@ -63,35 +58,19 @@ def effect_phrase(mechanism: str | None, covariate: str) -> str:
 def step_phrase(covariate: str, place: float) -> str:
     """Where or when a step sets in, to follow a verb."""
     if covariate == "elapsed_time":
-        return f"{place_of_step(covariate, place)} into the session"
+        return f"{place:.0f} s into the session"
     if covariate == "push_index":
-        return f"after {place_of_step(covariate, place)}"
+        return f"after push {np.floor(place):.0f}"
     if covariate == "slid_distance":
         return f"after {number(place, 3)} m of sliding"
-    return f"where {covariate_phrase(covariate)} exceeds {place_of_step(covariate, place)}"
-
-
-def place_of_step(covariate: str, place: float) -> str:
-    """The place of a step with its unit, to follow "before" or "after"."""
-    if covariate == "elapsed_time":
-        return f"{place:.0f} s"
-    if covariate == "push_index":
-        return f"push {np.floor(place):.0f}"
-    if covariate == "slid_distance":
-        return f"{number(place, 3)} m slid"
     factor, unit = shown_unit_of(covariate)
-    return f"{number(factor * place, 3)} {unit}".rstrip()
+    return f"where {covariate_phrase(covariate)} exceeds {number(factor * place, 3)} {unit}".rstrip()
 
 
 def listed(phrases: Sequence[str]) -> str:
     """Phrases as a list in a sentence."""
     *first, last = phrases
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def label(phrase: str) -> str:
-    """A phrase as the label of an axis: without its article, capitalised."""
-    return capitalised(bare(phrase))
 
 
 def bare(phrase: str) -> str:
@@ -104,21 +83,10 @@ def capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def unit_of(covariate: str) -> str:
-    """The unit of a covariate, empty if none is known."""
-    return UNITS.get(covariate, "")
-
-
 def shown_unit_of(covariate: str) -> tuple[float, str]:
     """The factor to, and the name of, the unit in which pictures and sentences show a covariate."""
     known = COVARIATES.get(covariate)
-    return known.shown if known and known.shown else (1.0, unit_of(covariate))
-
-
-def with_unit(covariate: str) -> str:
-    """A covariate with its unit, for the axis of a picture or the head of a table."""
-    unit, phrase = unit_of(covariate), label(covariate_phrase(covariate))
-    return f"{phrase} ({unit})" if unit else phrase
+    return known.shown if known and known.shown else (1.0, UNITS.get(covariate, ""))
 
 
 # --- numbers with unit, 95 % interval and a minus sign ----------------------------------------------------------------
@@ -142,13 +110,6 @@ def interval(value: Estimate, unit: str = "", p_value: float | None = None, word
     parts += [] if p_value is None else [f"p = {p_text(p_value)}"]
     text = " ".join(filter(None, [_shown(value.value, value), unit, word]))
     return f"{text} ({', '.join(parts)})" if parts else text
-
-
-def interval_cell(value: Estimate, unit: str = "") -> str:
-    """A number with its unit over its 95 % interval, for the cell of a table."""
-    text = f"{_shown(value.value, value)} {unit}".strip()
-    known = bool(np.isfinite([value.low, value.high]).all())
-    return f"{text}\n[{_shown(value.low, value)}, {_shown(value.high, value)}]" if known else text
 
 
 def p_text(p_value: float) -> str:

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import Any
 
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.metrics import cell
 from push_predictor.evaluation.push_scores import push_scores
-from push_predictor.evaluation.validation import Comparison, metrics_json
+from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
 from push_predictor.reporting.html import NOTHING, number
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
@@ -22,12 +20,16 @@ from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting import phrases as say
 from push_predictor.residuals.reporting.phrases import effect_phrase
-from push_predictor.residuals.reporting.sizes import detectable, effect_size, largest_ratio, noise_ratios, parameter
+from push_predictor.residuals.reporting.sizes import detectable, effect_size, parameter
 
 MOST_NAMES = 3  # rivals that one sentence lists
 MOST_TIMES = 100.0  # as many pushes; an estimate of more is none
 UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
-REST = "Push in the rest of training's range"
+ACTIONS = {
+    "none": "Keep the deployed model: no action is needed",
+    "wrench_only": "Keep the motion model: only what uses the force needs the new value",
+    "variance": "Retrain the model on the new pushes, so that it predicts the new noise",
+}
 REMEDIES = {
     "clock_offset": "Synchronise the clocks of tracker and robot",
     "frame_rotation": "Calibrate the tracker's frame again",
@@ -80,10 +82,14 @@ def evidence(trace: Trace) -> str:
 
 
 def worth(trace: Trace) -> str:
-    """What the finding means for the motion model, with the gain on held-out pushes, and how many would settle it."""
-    if not trace.terms:
-        return f"The motion model stays unchanged{_unchanged(trace)}"
+    """The gain on held-out pushes, and how many would settle it; empty if nothing could be gained."""
     gain, pushes = trace.confirming_gain, _held_out_pushes(trace)
+    if trace.verdict == "measurement" and not np.array_equal(trace.held_out.before.mean, trace.held_out.after.mean):
+        values = (float(total_nlpd(push_scores(c).totals())[0]) for c in (trace.held_out.before, trace.held_out.after))
+        change = " to ".join(map(number, values))
+        return f"With corrected streams the model's negative log density goes from {change} nats per window."
+    if not trace.terms:
+        return ""
     if trace.relearnt:
         text = f"On {pushes} retraining changes the squared error (total NMSE) by {say.interval(gain)}."
     else:
@@ -93,7 +99,7 @@ def worth(trace: Trace) -> str:
             f"On {pushes} {effects} the negative log density by {say.interval(gain, 'nats per window')}. "
             f"The reference is the model {reference} without the effect."
         )
-    return f"{_decision(trace)} {text} Below zero is better.{_needed_pushes(trace)}"
+    return f"{text} Below zero is better.{_needed_pushes(trace)}"
 
 
 def shift_sentence(shift: ShiftedInput) -> str:
@@ -134,7 +140,7 @@ def _claim(trace: Trace, index: int) -> str:
 def _moves(trace: Trace, index: int) -> str:
     """Subject and verb for a known mechanism, by the basis of its dependence."""
     effect = trace.effects[index]
-    noun = say.moved_noun(effect.mechanism)
+    noun = say.mechanism_phrase(effect.mechanism)
     if effect.covariate in UNDRIVEN or (effect.basis == "constant" and effect.covariate in UNVARIED):
         trained = trace.model.kind != "analytical" or trace.verdict == "wrench_only"  # the force is not part of a model
         return f"{noun} differs from {'training' if trained else 'the model'}"
@@ -173,10 +179,8 @@ def _size(trace: Trace) -> str:
         more = len(trace.input_shift) - 1
         also = f"; {say.count(more, 'further input has', 'further inputs have')} shifted as well" if more else ""
         return f"{_share_clause(trace.input_shift[0])}{also}"
-    if trace.verdict == "measurement":
+    if not trace.terms:
         return f"the {say.listed([parameter(e) for e in trace.effects[:2] if e.parameter] or ['size is unknown'])}"
-    if trace.verdict == "variance":
-        return largest_ratio(trace)
     return f"it {effect_size(trace, 0)}"
 
 
@@ -184,15 +188,11 @@ def _size(trace: Trace) -> str:
 
 
 def _action(trace: Trace) -> str:
-    if trace.verdict == "none":
-        return "Keep the deployed model: no action is needed"
-    if trace.verdict == "wrench_only":
-        return "Keep the motion model: only what uses the force needs the new value"
+    if trace.verdict in ACTIONS:
+        return ACTIONS[trace.verdict]
     if trace.verdict == "measurement":
         remedy = REMEDIES.get(str(trace.effects[0].mechanism), "Correct the measurement")
         return f"{remedy}, then record and trace again: the motion model stays as it is"
-    if trace.verdict == "variance":
-        return "Retrain the model on the new pushes, so that it predicts the new noise"
     if trace.verdict == "input_shift":
         if trace.input_shift[0].extrapolates:
             return "Train on pushes in the new range, then trace again: outside its range a model extrapolates"
@@ -212,16 +212,14 @@ def _model(trace: Trace) -> tuple[str, str]:
     held, pushes = trace.held_out, _held_out_pushes(trace)
     if trace.extended is not None:
         return "Use the extended model", f"on {pushes} {_improvement(trace)}"
+    if not np.isfinite(trace.confirming_gain.high):
+        return "Keep the deployed model", "there are too few pushes for an interval"
     if trace.relearnt and not trace.weak:
         return "Retrain the model on the new pushes", "that is enough, and no extension is needed"
     if not trace.relearnt and _difference(held.before, held.refit).high < 0.0:
         return "Retrain the model on the new pushes", "that lowers the errors, and the extension adds nothing certain"
-    return "Keep the deployed model", f"on {pushes} {_do_not(trace)} improve the predictions beyond chance"
-
-
-def _do_not(trace: Trace) -> str:
     what = "retraining does" if trace.relearnt else "the effect does" if len(trace.effects) == 1 else "the effects do"
-    return f"{what} not"
+    return "Keep the deployed model", f"on {pushes} {what} not improve the predictions beyond chance"
 
 
 def _improvement(trace: Trace) -> str:
@@ -240,24 +238,18 @@ def _improvement(trace: Trace) -> str:
 
 def _evidence_of(trace: Trace, index: int) -> str:
     effect = trace.effects[index]
-    p_value = effect.p_value
+    size = f"The {parameter(effect, effect.p_value)}." if effect.parameter else ""
     if trace.verdict == "measurement":
-        return f"The {parameter(effect, p_value)}." if effect.parameter else "Its size is unknown."
+        return size or "Its size is unknown."
     claim = _claim(trace, index)
     claim = f"In addition, {claim}" if index else say.capitalised(claim)
-    claim = claim if effect.parameter is not None else f"{claim} (p = {say.p_text(p_value)})"
-    if trace.verdict == "variance":
-        along = say.covariate_phrase(effect.covariate)
-        ratios = (
-            f" The noise of {name} is {say.interval(ratio)} times as large in the highest fifth of {along} as in the "
-            "lowest."
-            for name, ratio in noise_ratios(trace, effect).items()
-        )
-        return f"{claim}.{''.join(ratios)}"
+    claim = claim if size else f"{claim} (p = {say.p_text(effect.p_value)})"
+    if index >= len(trace.terms):
+        return f"{claim}. {size}".rstrip()
     share = effect.share_of_residual
     known = np.isfinite(share) and share > 0.0
     explains = f" It explains {100.0 * share:.0f} % of the squared residual." if known else ""
-    return f"{claim}. It {effect_size(trace, index, p_value)}.{explains}"
+    return f"{claim}. It {effect_size(trace, index, effect.p_value)}.{explains}"
 
 
 def _closest(trace: Trace) -> str:
@@ -271,37 +263,7 @@ def _closest(trace: Trace) -> str:
         return text
     depends = "" if closest.covariate in UNDRIVEN else f", depending on {say.covariate_phrase(closest.covariate)}"
     name = f"{say.mechanism_phrase(closest.mechanism)}{depends}"
-    text = f"{text} The closest candidate is {name}, with p = {say.p_text(closest.p_value)}."
-    if closest.p_value > trace.alpha:
-        return text
-    return f"{text} It is not significant: the level is divided among motion, force and measurement."
-
-
-def _unchanged(trace: Trace) -> str:
-    """Why the motion model stays unchanged without an effect on the mean motion, and what to do; from its full stop."""
-    if trace.verdict == "measurement":
-        before, after = trace.held_out.before, trace.held_out.after
-        again = ". Correct the measurement, then trace again."
-        if np.array_equal(before.mean, after.mean):
-            return again
-        values = " to ".join(number(float(total_nlpd(push_scores(c).totals())[0])) for c in (before, after))
-        return f"{again} With corrected streams the model's negative log density goes from {values} nats per window."
-    if trace.verdict == "input_shift":
-        new = trace.input_shift[0].extrapolates
-        return f". {'Train on pushes in the new range' if new else REST}, then trace again."
-    retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
-    return f": no effect on the mean motion was found.{retrain}"
-
-
-def _decision(trace: Trace) -> str:
-    if trace.extended is not None:
-        return "The motion model is extended."
-    if trace.relearnt and not trace.weak:
-        return "Retraining on the new pushes fixes this. No extension is needed."
-    if not np.isfinite(trace.confirming_gain.high):
-        return "The motion model stays unchanged: there are too few pushes for an interval."
-    score = "squared error" if trace.relearnt else "log density"
-    return f"The motion model stays unchanged: {_do_not(trace)} improve the {score} beyond chance."
+    return f"{text} The closest candidate is {name}, with p = {say.p_text(closest.p_value)}."
 
 
 def _needed_pushes(trace: Trace) -> str:
@@ -330,13 +292,16 @@ def rivals(trace: Trace) -> str:
     """The covariates and mechanisms that fit as well; empty without any."""
     found = []
     if trace.effects and grew_early(trace):
-        found.append("It was there from the first push, or it grew early in the session: these pushes do not decide.")
+        found.append("It was there from the first push, or it grew early in the session.")
     elif trace.equivalent:
         names = [say.covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)]
         found.append(f"{say.capitalised(say.listed(names))} fit equally well.")
     if trace.mechanisms:
         names = [say.mechanism_phrase(name) for name in trace.mechanisms]
         found.append(f"{say.capitalised(say.listed(names))} would explain these pushes as well.")
+    if found:
+        one = "The first fits best, but these data do not exclude the others."
+        found.append("These data do not decide." if trace.undecided else one)
     return " ".join(found)
 
 
@@ -368,22 +333,15 @@ def grew_early(trace: Trace) -> bool:
 def summary_lines(trace: Trace) -> list[str]:
     """The page's answer, its evidence, held-out figures and notes; plain ASCII."""
     details = filter(None, (evidence(trace), rivals(trace), *advice(trace), worth(trace)))
-    lines = [*answer(trace), "", *details, "", *_held_out(trace)]
+    held = f"Held out: {len(trace.held_out.table.pushes)} pushes, SHA-256 {trace.held_out.digest}"
+    lines = [*answer(trace), "", *details, "", held, *map(_scores, trace.comparisons)]
     if trace.remaining is not None:
         lines.append(f"Still significant after these effects: {effect_phrase(*trace.remaining)}.")
     lines += [f"Note: {note}" for note in trace.notes]
     return [line.replace("−", "-").replace(NOTHING, "-") for line in lines]
 
 
-def _held_out(trace: Trace) -> list[str]:
-    head = f"Held out: {len(trace.held_out.table.pushes)} pushes, SHA-256 {trace.held_out.digest}"
-    titles = f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact NLPD':>12s}{'90 % coverage, dx dy dtheta':>30s}"
-    return [head, titles, *map(_line, trace.comparisons)]
-
-
-def _line(comparison: Comparison) -> str:
-    metrics: dict[str, Any] = metrics_json(comparison)
-    exact = (metrics["exact_nlpd"] or {}).get("total")
-    coverage = metrics["coverage"]["0.9"] or {}
-    cells = [cell(metrics["nmse"]["total"], 9), cell(metrics["nlpd"]["total"], 10), cell(exact, 12)]
-    return f"{comparison.model:8s}{''.join(cells)}{''.join(cell(share, 10) for share in coverage.values())}"
+def _scores(comparison: Comparison) -> str:
+    totals = push_scores(comparison).totals()
+    squared, density = (float(figure(totals)[0]) for figure in (total_nmse, total_nlpd))
+    return f"{comparison.model:8s}NMSE {number(squared, 3)}, NLPD {number(density, 3)} nats per window"

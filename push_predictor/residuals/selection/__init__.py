@@ -3,5 +3,5 @@
 
 """Steps 6 to 8: the gate, the search, names, and the smallest detectable effect.
 
-Import `gate`, `search`, `power` and `baseline`; only `evidence` and `candidates` are imported here.
+Import `gate`, `search` and `power`; only `evidence` and `candidates` are imported here.
 """

@@ -10,13 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from push_predictor.models.mechanisms import mechanism_named
-from push_predictor.residuals.candidates.candidate import HEADED, SIDES, Candidate
-from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for
+from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis
 from push_predictor.residuals.evidence.residualizer import sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.baseline import Baseline, difference
-from push_predictor.residuals.selection.screening import TINY, Columns, Controlled, Scores, moments
+from push_predictor.residuals.selection.gate import Baseline, Seen, difference
+from push_predictor.residuals.selection.screening import TINY, Scores, moments
 from push_predictor.residuals.selection.search import SearchResult
 from push_predictor.types import Array, IntArray
 
@@ -24,51 +23,37 @@ QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
 
 
 def minimum_detectable(
-    found: SearchResult, evidence: Evidence, inputs: InputsBasis, alpha: float, baseline: Baseline | None = None
+    found: SearchResult, evidence: Evidence, inputs: InputsBasis, alpha: float, baseline: Baseline
 ) -> dict[str, Mapping[str, object]]:
     """By mechanism the size of a constant effect that is found with 80 % probability, its unit and covariate.
 
-    The size is that in the mechanism's least favourable direction. Under "driven" that along the strongest covariate,
-    per standard deviation of it. Sizes beyond what a rig can have are dropped: no plausible effect of that mechanism
-    could have been found.
+    The size is that in the mechanism's least favourable direction. Sizes beyond what a rig can have are dropped: no
+    plausible effect of that mechanism could have been found.
     """
-    ordered = sorted(zip(found.first.statistic, found.candidates, strict=True), key=lambda pair: -pair[0])
-    driven = [c for _, c in ordered if c.kind != "constant" and c.basis.name == "linear"]
-    strongest = driven[0].covariate if driven else None
-    chosen = [c for c in found.candidates if c.mechanism is not None and _is_reported(c, strongest)]
+    chosen = [c for c in found.candidates if c.mechanism is not None and c.basis.is_constant]
     threshold = found.first.threshold(alpha)
-    kinds = {c.kind for c in chosen}
-    seen = {kind: Controlled.of(found.unexplained, controls_for(kind, inputs), evidence.block) for kind in kinds}
+    seen = Seen(inputs, found.unexplained, evidence.block)
     entries: dict[str, Mapping[str, object]] = {}
     for c in chosen:
-        mechanism, value = mechanism_named(str(c.mechanism)), _size(c, seen[c.kind], threshold, baseline)
+        mechanism, value = mechanism_named(str(c.mechanism)), _size(c, seen, threshold, baseline)
         if not mechanism.plausible(np.array([[value]])):
             continue
-        entry = {"value": value, "unit": mechanism.parameters[0].unit, "covariate": c.covariate}
-        if mechanism.name in entries:
-            entry["per"] = f"standard deviation of {c.covariate}"
-            entry = {**entries[mechanism.name], "driven": entry}
-        entries[mechanism.name] = entry
+        entries[mechanism.name] = {"value": value, "unit": mechanism.parameters[0].unit, "covariate": c.covariate}
     return entries
 
 
-def _is_reported(candidate: Candidate, strongest: str | None) -> bool:
-    constant = candidate.basis.is_constant and candidate.covariate in (CONSTANT, HEADED, SIDES)
-    return constant or (candidate.covariate == strongest and candidate.basis.name == "linear")
-
-
-def _size(candidate: Candidate, seen: Controlled, threshold: float, baseline: Baseline | None) -> float:
+def _size(candidate: Candidate, seen: Seen, threshold: float, baseline: Baseline) -> float:
     """Norm of the coefficients, in units of the parameter, at which the power is 80 %."""
-    columns = Columns(seen.residualizer(candidate.columns))
-    raw = columns.scores(seen.blocks), columns.information
-    against = baseline is not None and (baseline.judges(candidate) or baseline.compares(candidate))
-    training = baseline.scores(candidate) if baseline is not None and against else None
+    columns = seen.columns(candidate)
+    raw = seen.scores(candidate, columns), columns.information
+    against = baseline.judges(candidate) or baseline.compares(candidate)
+    training = baseline.scores(candidate) if against else None
     scores = raw[0].turned(columns.unit) if training is None else difference(raw, training)
     informations = [raw[1]] if training is None else [raw[1], training[1]]
     spread = sum(np.linalg.pinv(a, rcond=TINY, hermitian=True) for a in informations)
     if not scores.rows.shape[1] or not np.any(spread):
         return float("nan")
-    length = _detectable_length(scores, threshold, _unevenness(columns.flat, seen.blocks.block))
+    length = _detectable_length(scores, threshold, _unevenness(columns.flat, seen.block))
     return length * float(np.sqrt(np.linalg.eigvalsh(spread)[-1]))
 
 

@@ -19,8 +19,8 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer, sums_by
-from push_predictor.types import Array, IntArray
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks, sums_by
+from push_predictor.types import Array
 
 DRAWS = 1999
 AT_ONCE = 32  # candidates whose draws are computed together: their table stays small
@@ -80,30 +80,6 @@ def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
         np.maximum(largest, _normal(drawn / unit, freedom).max(axis=1), out=largest)
     exceeded = np.sum(largest[None, :] >= statistic[:, None], axis=1)
     return Screened(statistic, (1.0 + exceeded) / (1.0 + DRAWS), largest)
-
-
-@dataclass(frozen=True, eq=False)
-class Controlled:
-    """Residuals with controls regressed out, once for all columns that are scored on them."""
-
-    residualizer: Residualizer
-    blocks: ResidualBlocks
-
-    @staticmethod
-    def of(z: Array, controls: Array, block: IntArray) -> Controlled:
-        """Residuals z (n, 3) with the controls (n, m) regressed out."""
-        residualizer = Residualizer(controls)
-        return Controlled(residualizer, residualizer.blocks(z, block))
-
-    def raw_scores(self, columns: Array) -> tuple[Scores, Array]:
-        """Scores of columns (n, 3, p) and their information, the controls regressed out of them too."""
-        own = Columns(self.residualizer(columns))
-        return own.scores(self.blocks), own.information
-
-    def unit_scores(self, columns: Array) -> Scores:
-        """Scores of columns (n, 3, p) in coordinates in which their information is the identity."""
-        own = Columns(self.residualizer(columns))
-        return own.scores(self.blocks).turned(own.unit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -216,9 +216,10 @@ class _Search:
 
     def _in_best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
         """The simplest form within a standard error of the best, and its gain, both to first order."""
-        if (base, (mechanism, covariate)) not in self.formed:
-            self.formed[base, (mechanism, covariate)] = self._best_form(base, mechanism, covariate)
-        return self.formed[base, (mechanism, covariate)]
+        key = base, (mechanism, covariate)
+        if key not in self.formed:
+            self.formed[key] = self._best_form(base, mechanism, covariate)
+        return self.formed[key]
 
     def _best_form(self, base: Fit, mechanism: str | None, covariate: str) -> tuple[float, Candidate]:
         forms = [DriverBasis("constant")] if self._constants.get(mechanism) == covariate else []

@@ -9,31 +9,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
 from push_predictor.reporting.chart import WIDE, Chart, Dots
+from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.channels import (
-    error_charts,
-    force_chart,
-    gap_chart,
-    input_chart,
-    noise_chart,
-    size_chart,
-)
 from push_predictor.residuals.reporting.figures.driver_basis import (
-    Rows,
     Strength,
     analysis_rows,
     basis_charts,
     strength_of,
+)
+from push_predictor.residuals.reporting.figures.pushes import (
+    error_charts,
+    force_chart,
+    gap_chart,
+    input_chart,
+    size_chart,
 )
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
     count,
     covariate_phrase,
     listed,
-    moved_noun,
+    mechanism_phrase,
 )
 
 BARS = "Bars: 95 % intervals from a bootstrap of pushes."
@@ -70,24 +68,18 @@ def error_figure(trace: Trace) -> list[str]:
     return [html.charts(error_charts(table, covariate, shown), caption)]
 
 
-def _basis_figure(trace: Trace, strength: Strength, rows: Rows) -> str:
+def _basis_figure(trace: Trace, strength: Strength, rows: Evidence) -> str:
     effect = strength.effect
-    name = capitalised(moved_noun(effect.mechanism))
+    name = capitalised(mechanism_phrase(effect.mechanism))
     covariates = listed([covariate_phrase(driver) for driver in effect.basis.drivers])
     data = (
         "Background: the fitted map. Dots: single pushes, in the colour of their own estimate."
         if len(effect.basis.drivers) > 1
-        else "Line: fitted, with its 95 % band. Points: estimated separately in each bin, from the residuals of the "
-        f"model and the other effects. {BARS} Grey dots: single pushes; those with too small a response are not shown."
+        else "Line: fitted, with its 95 % band. Grey dots: what single pushes show, from the residuals of the model "
+        f"and the other effects; those with too small a response are not shown. {MEANS}"
     )
-    caption = f"{name} against {covariates} ({effect.basis.name}). {data} {_data_words(trace)}"
+    caption = f"{name} against {covariates} ({effect.basis.name}). {data}"
     return html.charts(basis_charts(trace, strength, rows), caption)
-
-
-def _data_words(trace: Trace) -> str:
-    model = "extended" if trace.extended is not None else "deployed"
-    pushes = count(len(trace.analysis.pushes), "analysis push", "analysis pushes")
-    return f"Data: {pushes}, residuals of the {model} model."
 
 
 def key_figure(trace: Trace) -> list[str]:
@@ -107,14 +99,11 @@ def _charts(trace: Trace) -> tuple[list[Chart], str]:
         return _known(force_chart(trace)), FORCE
     if trace.verdict == "measurement":
         return _known(gap_chart(trace)), GAP
-    if trace.verdict == "variance":
-        return _known(noise_chart(trace)), SIZE
     if trace.verdict == "input_shift":
         return _known(*(input_chart(trace, shift.covariate) for shift in trace.input_shift)), INPUTS
     if trace.terms and trace.effects[0].mechanism is not None:
         return [_effect_chart(trace)], MAP if len(trace.terms[0].basis.drivers) > 1 else EFFECT
-    covariate = trace.effects[0].covariate if trace.effects else ""
-    return _known(size_chart(trace, covariate, list(range(len(OUTPUTS))))), SIZE
+    return _known(size_chart(trace)), SIZE
 
 
 def _effect_chart(trace: Trace) -> Chart:
