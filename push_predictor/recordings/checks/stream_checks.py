@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.flips import without_flips
 from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies
 from push_predictor.recordings.checks.quality import quality_findings
@@ -21,8 +21,11 @@ from push_predictor.recordings.checks.stamp_noise import regular_in_bursts, stam
 from push_predictor.recordings.checks.stamps import clocks_never_meet, stamps_of, unset_stamps
 from push_predictor.recordings.checks.stream_facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.units import stream_rates, stream_units
-from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.streams import Recording, taken
+from push_predictor.recordings.windows.continued import continued, continued_runs
 
+CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
+FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that has facts
 
 
@@ -43,9 +46,29 @@ def stream_stage(evidence: Evidence) -> Evidence:
         return evidence.found(found)
     if wrong_units := stream_units(sound, rig):
         return evidence.found([*found, *wrong_units])
+    lost, sound = _without_continued(sound)
+    found += lost
     facts, sound = _facts(sound)
     found += [*quality_findings(facts), *stamp_findings(recording)]
     return replace(evidence.found(found, sound), facts=facts)
+
+
+def _without_continued(recording: Recording) -> tuple[list[Finding], Recording]:
+    """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
+    found = list[Finding]()
+    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
+        runs = continued_runs(stream, name == "slider")
+        if len(runs) < FEWEST_RUNS:
+            continue
+        lost = continued(stream, name == "slider")
+        sentence = (
+            f"The {name}'s pose is continued on an exact line {len(runs)} times, without the noise of a measurement: "
+            f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
+        )
+        values = {"runs": Value(float(len(runs)), "1"), "share": Value(float(lost.mean()), "1")}
+        found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
+        recording = replace(recording, **{name: taken(stream, ~lost)})  # type: ignore[arg-type]
+    return found, recording
 
 
 def _facts(recording: Recording) -> tuple[dict[str, StreamFacts], Recording]:
