@@ -79,6 +79,14 @@ def test_an_axis_other_than_z_that_is_up_is_named(
     assert f"`--up={option}`" in finding.advice
 
 
+def test_a_slider_that_a_hand_lifts_at_times_shows_the_plane_of_the_pushes() -> None:
+    slider = bag(HEXAGON).slider
+    time = 1e-9 * (slider.stamp - slider.stamp[0])
+    lift = np.where(time % 10.0 < 2.0, 0.02 * (1.0 - np.cos(np.pi * time)), 0.0)
+    recording = replace(bag(HEXAGON), slider=replace(slider, x=slider.x + 0.5 * lift, z=slider.z + lift))
+    assert not {"world_up", "world_tilted"} & set(found(recording, rig_of(HEXAGON)))
+
+
 def test_a_body_frame_upside_down_is_no_world_upside_down() -> None:
     upside_down = slider_stream(bag(HEXAGON).slider.stamp, spatial_rows(bag(HEXAGON).slider, UPSIDE_DOWN))
     findings = found(replace(bag(HEXAGON), slider=upside_down), rig_of(HEXAGON))

@@ -13,9 +13,10 @@ import pytest
 from checked_bags import bag
 from synthetic import windows_of
 
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.force_timing import FEWEST, force_delay
+from push_predictor.recordings.windows.force_timing import FEWEST, UNSEEN, force_delay
 
 NAME = "ellipse_plywood"  # 15 pushes
 
@@ -108,14 +109,14 @@ def test_a_coarse_tracker_does_not_depose_the_force() -> None:
         off = rng.normal(0.0, 0.001, len(slider))
         return replace(recording, slider=replace(slider, x=slider.x + off, y=slider.y + off[::-1]))
 
-    finder = WindowFinder(bag(NAME).rig)  # type: ignore[arg-type]
+    finder = WindowFinder(require_rig(bag(NAME)))
     finder.find(noisy(delayed(bag(NAME), 0.12)))
     assert finder.force_touches == []
 
 
 def test_the_delay_of_the_force_is_measured() -> None:
     for seconds in (0.0, 0.08, -0.08):
-        finder = WindowFinder(bag(NAME).rig)  # type: ignore[arg-type]
+        finder = WindowFinder(require_rig(bag(NAME)))
         finder.find(delayed(bag(NAME), seconds))
         found = force_delay([delay for _, delay in finder.force_touches])
         assert found.value == pytest.approx(seconds, abs=0.015) and found.sd < 0.01
@@ -137,3 +138,32 @@ def test_the_delay_of_the_force_is_measured() -> None:
 )
 def test_a_force_is_apart_only_if_that_is_clear(delays: list[float], apart: bool) -> None:
     assert force_delay(delays).apart == apart
+
+
+def test_a_silent_force_costs_three_pushes_at_most() -> None:
+    sound, silent = (
+        {window.push_id for window in windows_of(recording)} for recording in (bag(NAME), scaled(bag(NAME), 0.0))
+    )
+    assert len(sound) - UNSEEN <= len(silent) < len(sound)
+
+
+@pytest.mark.parametrize(
+    "alter", [lambda recording: delayed(recording, 0.12), lambda recording: scaled(recording, 0.0)]
+)
+def test_windows_are_the_same_online(alter: Callable[[Recording], Recording]) -> None:
+    """In portions of half a second, the wrench last: the touches so far decide, however the samples arrive."""
+    recording = alter(bag(NAME))
+    finder = WindowFinder(require_rig(recording))
+    first, last = int(recording.slider.stamp[0]), int(recording.slider.stamp[-1])
+    found = []
+    for begin in range(first - 500_000_000, last + 500_000_000, 500_000_000):
+        for add, stream in (
+            (finder.add_slider, recording.slider),
+            (finder.add_pusher, recording.pusher),
+            (finder.add_wrench, wrench_of(recording)),
+        ):
+            add(taken(stream, (stream.stamp >= begin) & (stream.stamp < begin + 500_000_000)))
+        found += finder.take_ready()
+    found += finder.finish()
+    expected = windows_of(recording)
+    assert [(window.push_id, window.start) for window in found] == [(each.push_id, each.start) for each in expected]

@@ -54,6 +54,8 @@ class Bag:
         self.files = files
         self._described = described
         self._scratch = scratch  # contains decompressed files while the bag is in use
+        for topic, kind in self.topics.items():
+            self.set_type(topic, kind)  # where another file has the schema
 
     @property
     def storage(self) -> str:

@@ -76,8 +76,9 @@ def checked_recording(recording: Recording) -> CheckedData:
 
 
 def _with_hidden(found: Sequence[Finding], some: int, every: int) -> tuple[Finding, ...]:
-    """The findings, with the numbers of pushes that are found with a wrench that hides the others, and without it."""
-    hides = f" With this wrench, contact is found in {some} of {every} pushes. `--wrench-topic none` does without it."
+    """The findings about a useless wrench with the remedy, and with the numbers of pushes if it hides some."""
+    hides = f" With this wrench, contact is found in {some} of {every} pushes." if some < every else ""
+    hides += " `--wrench-topic none` does without it."
     return tuple(replace(each, advice=each.advice + hides) if each.name in HIDING else each for each in found)
 
 

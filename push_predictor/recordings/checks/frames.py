@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from push_predictor.geometry.frames import to_body
@@ -24,7 +22,6 @@ HELD = 0.01  # m: spread of the tip in the frame of a body fixed to it; clocks a
 COVERED = 95.0  # percentile of the spread
 TRAVEL = 5.0  # the tip travels so many times farther in the world
 AWAY = 0.3  # cosine between the tip's velocity and the direction away from the body
-OF_HEADINGS = ("heading_flips", "noise_slider")
 LEAST_SHARE = 0.1  # of the body's motion that no push explains, where the tip is near the outline
 
 
@@ -33,7 +30,7 @@ def frame_stage(evidence: Evidence) -> Evidence:
     recording, rig, motion = evidence.recording, evidence.rig, evidence.motion
     raised = up_findings(recording, rig)
     if any(finding.severity == "refused" for finding in raised):
-        return _without_headings(evidence).found(raised)
+        return evidence.found(raised)
     evidence = evidence.found(raised)
     if held := fixed_to_tip(motion, rig):
         return evidence.found([held])
@@ -41,15 +38,7 @@ def frame_stage(evidence: Evidence) -> Evidence:
     # A tip has a constant heading too: the exchange of topics explains more, and the geometry shows it.
     if oriented is not None and oriented.severity == "refused" and tip_follows(motion, recording, rig):
         return evidence
-    if oriented is not None and oriented.severity == "refused":
-        evidence = _without_headings(evidence)
     return evidence.found([oriented])
-
-
-def _without_headings(evidence: Evidence) -> Evidence:
-    """Without findings on headings, which wrong axes explain: a heading about a level axis means nothing."""
-    findings = tuple(finding for finding in evidence.findings if finding.name not in OF_HEADINGS)
-    return replace(evidence, findings=findings)
 
 
 def fixed_to_tip(motion: Motion | None, rig: Rig) -> Finding | None:

@@ -14,6 +14,7 @@ from typing import Any
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.flips import without_flips
+from push_predictor.recordings.checks.orientation import has_heading
 from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies
 from push_predictor.recordings.checks.quality import quality_findings
 from push_predictor.recordings.checks.session import in_order, of_one_body, repeated_samples
@@ -40,27 +41,28 @@ def stream_stage(evidence: Evidence) -> Evidence:
     found, sound = _jumps(recording)
     if any(finding.severity == "refused" for finding in found):
         return evidence.found(found)
-    flips, sound = without_flips(sound, rig.outline)
+    headed = has_heading(sound.slider)
+    flips, sound = without_flips(sound, rig.outline) if headed else (None, sound)
     found += [] if flips is None else [flips]
     if flips is not None and flips.severity == "refused":
         return evidence.found(found)
     if wrong_units := stream_units(sound, rig):
         return evidence.found([*found, *wrong_units])
-    lost, sound = _without_continued(sound)
+    lost, sound = _without_continued(sound, headed)
     found += lost
-    facts, sound = _facts(sound)
+    facts, sound = _facts(sound, headed)
     found += [*quality_findings(facts), *stamp_findings(recording)]
     return replace(evidence.found(found, sound), facts=facts)
 
 
-def _without_continued(recording: Recording) -> tuple[list[Finding], Recording]:
+def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:
     """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
     found = list[Finding]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        runs = continued_runs(stream, name == "slider")
+        runs = continued_runs(stream, headed and name == "slider")
         if len(runs) < FEWEST_RUNS:
             continue
-        lost = continued(stream, name == "slider")
+        lost = continued(stream, headed and name == "slider")
         sentence = (
             f"The {name}'s pose is continued on an exact line {len(runs)} times, without the noise of a measurement: "
             f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
@@ -71,12 +73,12 @@ def _without_continued(recording: Recording) -> tuple[list[Finding], Recording]:
     return found, recording
 
 
-def _facts(recording: Recording) -> tuple[dict[str, StreamFacts], Recording]:
-    """The facts of the streams of poses, and the recording as repaired."""
+def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
+    """The facts of the streams of poses, and the recording as repaired; headed: whether the slider has headings."""
     facts, repaired = dict[str, StreamFacts](), dict[str, Any]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
         if len(poses := regular_in_bursts(in_order(stream))) >= FEWEST:
-            facts[name], repaired[name] = pose_facts(poses, angle=name == "slider")
+            facts[name], repaired[name] = pose_facts(poses, angle=headed and name == "slider")
             if repaired[name] is stream:
                 del repaired[name]
     return facts, replace(recording, **repaired) if repaired else recording

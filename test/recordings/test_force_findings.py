@@ -1,0 +1,172 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Findings about the force of recordings whose wrench was altered as drivers and sensors do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checked_bags import bag, rig_of
+from mistakes import force_scaled, force_turned
+
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.streams import Recording, WrenchStream, taken
+
+NAME = "ellipse_plywood"  # 15 pushes at 20 to 50 mm/s
+ONE_SIDE = "square_abs_repeats"  # 80 short pushes
+
+
+def altered(name: str, alter: Callable[[WrenchStream], WrenchStream]) -> Recording:
+    recording = bag(name)
+    assert recording.wrench is not None
+    return replace(recording, wrench=alter(recording.wrench))
+
+
+def only(recording: Recording, name: str = NAME) -> Finding:
+    (finding,) = check_recording(recording, rig_of(name))
+    assert finding.severity == "warning"
+    return finding
+
+
+def late(seconds: float) -> Callable[[WrenchStream], WrenchStream]:
+    return lambda wrench: replace(wrench, stamp=wrench.stamp + round(1e9 * seconds))
+
+
+def biased(x: float, y: float) -> Callable[[WrenchStream], WrenchStream]:
+    return lambda wrench: replace(wrench, fx=wrench.fx + x, fy=wrench.fy + y)
+
+
+@pytest.mark.parametrize(("name", "seconds"), [(NAME, 0.12), (NAME, -0.12), (ONE_SIDE, 0.02)])
+def test_a_force_that_is_late_or_early_is_named_with_its_lag(name: str, seconds: float) -> None:
+    finding = only(altered(name, late(seconds)), name)
+    lag = finding.values["lag"]
+    assert finding.name == "wrench_lag" and lag.sd is not None
+    assert abs(lag.value - seconds) < 3.0 * lag.sd and lag.sd < 0.008
+    assert (" after " in finding.sentence) == (seconds > 0.0)
+
+
+def test_a_filter_is_a_lag() -> None:
+    """Two first-order low-passes at 3 Hz delay half of a step's height by 87 ms."""
+
+    def filtered(wrench: WrenchStream) -> WrenchStream:
+        step = 1e-9 * float(np.median(np.diff(wrench.stamp)))
+        share = 1.0 - np.exp(-2.0 * np.pi * 3.0 * step)
+        columns = {}
+        for axis in ("fx", "fy"):
+            values = getattr(wrench, axis)
+            for _ in range(2):
+                state, smooth = values[0], []
+                for value in values.tolist():
+                    state += share * (value - state)
+                    smooth.append(state)
+                values = np.array(smooth)
+            columns[axis] = values
+        return replace(wrench, **columns)
+
+    finding = only(altered(ONE_SIDE, filtered), ONE_SIDE)
+    assert finding.name == "wrench_lag" and 0.04 < finding.values["lag"].value < 0.1
+
+
+def test_a_clock_of_the_force_that_drifts_is_named_with_both_ends() -> None:
+    def drifting(wrench: WrenchStream) -> WrenchStream:
+        share = np.linspace(0.0, 1.0, len(wrench))
+        return replace(wrench, stamp=wrench.stamp + (0.12e9 * share).astype(np.int64))
+
+    assert "Its delay changes from" in only(altered(ONE_SIDE, drifting), ONE_SIDE).sentence
+
+
+@pytest.mark.parametrize("degrees", [12.0, 43.0, -137.0, 165.0])
+def test_the_angle_of_the_axes_is_named_with_its_sd(degrees: float) -> None:
+    finding = only(force_turned(bag(NAME), np.radians(degrees)))
+    turn = finding.values["turn"]
+    assert finding.name == "wrench_frame" and turn.sd is not None
+    assert abs(np.degrees(turn.value) - degrees) < 3.0 and np.degrees(turn.sd) < 3.0
+    assert ("counter-clockwise of" in finding.sentence) == (degrees > 0.0)
+    assert f"{abs(round(np.degrees(turn.value)))} degrees" in finding.advice and "--wrench-frame" in finding.advice
+
+
+def test_a_few_degrees_are_no_finding() -> None:
+    assert check_recording(force_turned(bag(NAME), np.radians(5.0)), rig_of(NAME)) == ()
+
+
+def test_axes_of_a_tip_of_constant_heading_are_named() -> None:
+    heading = np.radians(70.0)
+    turned = force_turned(bag(NAME), -heading)
+    pusher = replace(turned.pusher, heading=np.full(len(turned.pusher), heading))
+    assert "Use `--wrench-frame tip`" in only(replace(turned, pusher=pusher)).text.replace("use", "Use")
+
+
+def test_axes_that_turn_with_the_tip_are_named() -> None:
+    recording = bag(NAME)
+    assert recording.wrench is not None
+    heading = 0.3e-9 * (recording.pusher.stamp - recording.pusher.stamp[0])
+    turned = force_turned(recording, -np.interp(recording.wrench.stamp, recording.pusher.stamp, heading))
+    finding = only(replace(turned, pusher=replace(recording.pusher, heading=heading)))
+    assert finding.name == "wrench_frame" and "those of the tip" in finding.sentence
+
+
+def test_mirrored_axes_are_named() -> None:
+    finding = only(altered(NAME, lambda wrench: replace(wrench, fy=-wrench.fy)))
+    assert finding.name == "wrench_frame" and "are mirrored" in finding.sentence
+
+
+@pytest.mark.parametrize("bias", [(3.2, -2.4), (0.0, 1.5)])
+def test_a_zero_that_is_off_is_named_with_the_remedy(bias: tuple[float, float]) -> None:
+    finding = only(altered(NAME, biased(*bias)))
+    assert finding.name == "wrench_zero" and "--wrench-bias free_motion" in finding.advice
+    assert [finding.values[f"bias_{axis}"].value for axis in "xy"] == pytest.approx(bias, abs=0.05)
+
+
+def test_a_zero_that_is_off_hides_no_wrong_axes() -> None:
+    turned = force_turned(bag(NAME), np.radians(43.0))
+    assert turned.wrench is not None
+    both = replace(turned, wrench=biased(3.2, -2.4)(turned.wrench))
+    assert [each.name for each in check_recording(both, rig_of(NAME))] == ["wrench_zero", "wrench_frame"]
+
+
+def test_a_small_zero_is_no_finding() -> None:
+    assert check_recording(altered(NAME, biased(0.4, 0.0)), rig_of(NAME)) == ()
+
+
+@pytest.mark.parametrize(
+    ("alter", "where"),
+    [
+        (lambda wrench: taken(wrench, slice(len(wrench) // 3)), "it ends after"),
+        (lambda wrench: taken(wrench, slice(len(wrench) // 2, None)), "it begins"),
+        (lambda wrench: replace(wrench, fx=np.where(np.arange(len(wrench)) % 900 >= 450, np.nan, wrench.fx)), "NaN"),
+    ],
+    ids=["ends", "begins", "gaps"],
+)
+def test_a_force_that_is_missing_is_named(alter: Callable[[WrenchStream], WrenchStream], where: str) -> None:
+    finding = only(altered(NAME, alter))
+    assert finding.name == "wrench_missing" and where in finding.sentence
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_a_force_that_is_stuck_is_named(share: float) -> None:
+    def stuck(wrench: WrenchStream) -> WrenchStream:
+        first = int(share * len(wrench))
+        late = np.arange(len(wrench)) >= first
+        return replace(wrench, fx=np.where(late, 1.5, wrench.fx), fy=np.where(late, -0.5, wrench.fy))
+
+    finding = only(altered(NAME, stuck))
+    assert finding.name == "wrench_constant" and "(1.5, -0.5) N" in finding.sentence
+    assert finding.values["share"].value == pytest.approx(1.0 - share, abs=0.01)
+
+
+def test_a_rare_force_is_named() -> None:
+    finding = only(altered(NAME, lambda wrench: taken(wrench, slice(None, None, 5))))
+    assert finding.name == "wrench_rate" and finding.values["rate"].value == pytest.approx(10.0, rel=0.01)
+    assert check_recording(altered(NAME, lambda wrench: taken(wrench, slice(None, None, 2))), rig_of(NAME)) == ()
+
+
+def test_a_unit_is_named_without_a_known_friction() -> None:
+    rig = replace(rig_of(NAME), surface_friction=None)
+    (finding,) = check_recording(force_scaled(bag(NAME), 1.0 / 9.81), rig)
+    assert finding.name == "wrench_units" and "by 9.807 if they are in kgf" in finding.advice
+    assert check_recording(bag(NAME), rig) == ()
