@@ -77,10 +77,12 @@ def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], 
     """The facts of the streams of poses, and the recording as repaired; headed: whether the slider has headings."""
     facts, repaired = dict[str, StreamFacts](), dict[str, Any]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        if len(poses := regular_in_bursts(in_order(stream))) >= FEWEST:
-            facts[name], repaired[name] = pose_facts(poses, angle=headed and name == "slider")
-            if repaired[name] is stream:
-                del repaired[name]
+        if len(poses := in_order(stream)) < FEWEST:
+            continue
+        regular = regular_in_bursts(poses)
+        facts[name], sound = pose_facts(regular, angle=headed and name == "slider")
+        if sound is not regular or regular is not poses:  # others judge late samples: a clock that was set back
+            repaired[name] = sound
     return facts, replace(recording, **repaired) if repaired else recording
 
 
