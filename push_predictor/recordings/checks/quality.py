@@ -52,7 +52,7 @@ def _resolution(name: str, facts: StreamFacts) -> Finding | None:
 
 
 def _source(name: str, facts: StreamFacts) -> Finding | None:
-    if not facts.slower_source:
+    if facts.coarse or not facts.slower_source:
         return None
     rate = 1.0 / facts.source_period
     sentence = (

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.resolution import LEVER
+from push_predictor.recordings.windows.resolution import LEVER, Resolution
 from push_predictor.types import Array, BoolArray
 
 EXACT = 1e-8  # m off the line of the two poses before: rounding of a continued pose
@@ -25,7 +25,10 @@ LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
 def continued_runs(stream: PoseStream, angle: bool) -> list[slice]:
     """The runs of continued poses in a stream, by index; angle: whether its headings count."""
     columns = [stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])]
-    off, moves = _off_line(stream, np.column_stack(columns))
+    pose = np.column_stack(columns)
+    if not len(pose) or np.max(Resolution(pose.shape[1]).take(pose)[-1]) > NOISE:  # rounded poses may lie on a line
+        return []
+    off, moves = _off_line(stream, pose)
     marked = (off < EXACT) & moves
     edges = np.diff(np.concatenate([[0], marked.astype(np.int64), [0]]))
     begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
