@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from checked_bags import bag, found, rig_of
-from stream_faults import at_rate, flipped, held, in_bursts, lost, rounded, with_another
+from stream_faults import at_rate, extrapolated, flipped, held, in_bursts, lost, rounded, with_another
 
 from push_predictor.recordings.streams import PoseStream, Recording, joined
 from push_predictor.recordings.windows.bursts import burst_period, missing_in_bursts
+from push_predictor.recordings.windows.continued import continued
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.held import HeldPoses
@@ -204,6 +205,25 @@ def test_a_slow_source_republished_is_named_with_its_rate(
     assert finding.values["rate"].value == pytest.approx(rate, rel=0.05)
     again = find_windows(recording, rig_of(NAME))
     assert len(again) == pytest.approx(len(windows), rel=0.03) and worst(nearest(windows, again)) < 5e-4
+
+
+@pytest.mark.parametrize("name", ["slider", "pusher"])
+def test_poses_continued_by_a_tracker_are_cut(sound: Recording, windows: list[PushWindow], name: str) -> None:
+    stream = getattr(sound, name)
+    begins = in_push(windows, stream, every=8)
+    recording = replace(sound, **{name: extrapolated(stream, begins, 12)})
+    finding = found(recording, rig_of(NAME))[f"continued_poses_{name}"]
+    assert finding.severity == "warning" and finding.values["runs"].value == pytest.approx(len(begins), abs=1)
+    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
+    again = find_windows(recording, rig_of(NAME))
+    assert sum(any(w.start < end and w.end > begin for begin, end in spans) for w in again) <= 1
+
+
+def test_a_motion_on_a_line_without_noise_is_no_continued_one() -> None:
+    time = np.arange(300) * 0.01
+    x = 0.05 * np.clip(time - 1.0, 0.0, 1.0)
+    stream = PoseStream(np.rint(1e9 * time).astype(np.int64), x, 0.0 * x, 0.0 * x, 0.0 * x)
+    assert not continued(stream, angle=True).any()
 
 
 def test_a_body_at_rest_without_noise_keeps_its_poses() -> None:

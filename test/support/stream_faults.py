@@ -33,6 +33,17 @@ def lost(stream: PoseStream, begins: IntArray, samples: int) -> PoseStream:
     return replace(taken(stream, source), stamp=stream.stamp)
 
 
+def extrapolated(stream: PoseStream, begins: IntArray, samples: int) -> PoseStream:
+    """The motion of the three intervals before each of some indices, continued for so many samples."""
+    x, y, heading = stream.x.copy(), stream.y.copy(), np.unwrap(stream.heading)
+    for begin in begins.tolist():
+        rows = slice(begin, begin + samples)
+        share = (stream.stamp[rows] - stream.stamp[begin - 1]) / (stream.stamp[begin - 1] - stream.stamp[begin - 4])
+        for of in (x, y, heading):
+            of[rows] = of[begin - 1] + share * (of[begin - 1] - of[begin - 4])
+    return replace(stream, x=x, y=y, heading=heading)
+
+
 def rounded(stream: PoseStream, step: float, turn: float) -> PoseStream:
     """Positions in steps (m), headings in turns (rad)."""
     x, y, z = (np.round(of / step) * step for of in (stream.x, stream.y, stream.z))

@@ -19,7 +19,7 @@ WINDOW = WindowOptions().duration  # s
 TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
 FEWEST_SAMPLES = 3  # in a window: with two, one push in thirty loses a window
 ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
-SPEED_NOISE, TOO_NOISY = 0.003, 0.01  # m/s of the tip: twice the least speed; a slow push
+SPEED_NOISE, TOO_NOISY = 0.006, 0.01  # m/s of the tip: a third and half of those of a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
 FEWEST_HOLDS = 2
 LEVER = 0.05  # m of an outline from its centre
@@ -52,7 +52,7 @@ def _resolution(name: str, facts: StreamFacts) -> Finding | None:
 
 
 def _source(name: str, facts: StreamFacts) -> Finding | None:
-    if not facts.slower_source:
+    if facts.coarse or not facts.slower_source:
         return None
     rate = 1.0 / facts.source_period
     sentence = (

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.flips import without_flips
 from push_predictor.recordings.checks.orientation import has_heading
 from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies
@@ -22,8 +22,11 @@ from push_predictor.recordings.checks.stamp_noise import regular_in_bursts, stam
 from push_predictor.recordings.checks.stamps import clocks_never_meet, stamps_of, unset_stamps
 from push_predictor.recordings.checks.stream_facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.units import stream_rates, stream_units
-from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.streams import Recording, taken
+from push_predictor.recordings.windows.continued import continued, continued_runs
 
+CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
+FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that has facts
 
 
@@ -45,19 +48,41 @@ def stream_stage(evidence: Evidence) -> Evidence:
         return evidence.found(found)
     if wrong_units := stream_units(sound, rig):
         return evidence.found([*found, *wrong_units])
+    lost, sound = _without_continued(sound, headed)
+    found += lost
     facts, sound = _facts(sound, headed)
     found += [*quality_findings(facts), *stamp_findings(recording)]
     return replace(evidence.found(found, sound), facts=facts)
+
+
+def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:
+    """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
+    found = list[Finding]()
+    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
+        runs = continued_runs(stream, headed and name == "slider")
+        if len(runs) < FEWEST_RUNS:
+            continue
+        lost = continued(stream, headed and name == "slider")
+        sentence = (
+            f"The {name}'s pose is continued on an exact line {len(runs)} times, without the noise of a measurement: "
+            f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
+        )
+        values = {"runs": Value(float(len(runs)), "1"), "share": Value(float(lost.mean()), "1")}
+        found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
+        recording = replace(recording, **{name: taken(stream, ~lost)})  # type: ignore[arg-type]
+    return found, recording
 
 
 def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
     """The facts of the streams of poses, and the recording as repaired; headed: whether the slider has headings."""
     facts, repaired = dict[str, StreamFacts](), dict[str, Any]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        if len(poses := regular_in_bursts(in_order(stream))) >= FEWEST:
-            facts[name], repaired[name] = pose_facts(poses, angle=headed and name == "slider")
-            if repaired[name] is stream:
-                del repaired[name]
+        if len(poses := in_order(stream)) < FEWEST:
+            continue
+        regular = regular_in_bursts(poses)
+        facts[name], sound = pose_facts(regular, angle=headed and name == "slider")
+        if sound is not regular or regular is not poses:  # others judge late samples: a clock that was set back
+            repaired[name] = sound
     return facts, replace(recording, **repaired) if repaired else recording
 
 

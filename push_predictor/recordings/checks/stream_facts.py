@@ -19,7 +19,7 @@ from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
 
-LEAST_SHARE = 0.1  # of the poses in motion are repeats: the source is slower than its messages
+LEAST_SHARE = 1.0 / 6.0  # of the poses in motion are repeats: the source is slower than its messages
 MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
 FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is estimated
 AROUND = 25  # samples on either side that show whether a body moves: more than a slow source repeats a pose

@@ -21,6 +21,7 @@ import numpy as np
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
+from push_predictor.recordings.windows.continued import continued
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
 from push_predictor.recordings.windows.stream_faults import FAULTS
@@ -75,13 +76,17 @@ class WindowFinder:
         return self._earlier_touches + self._session.force_touches
 
     def find(self, recording: Recording) -> list[PushWindow]:
-        """All windows of a recording; see find_windows. A sample that it has twice, as in a loop, counts once."""
+        """All windows of a recording; see find_windows.
+
+        A sample that it has twice, as in a loop, counts once. Poses that the tracker continued are no samples.
+        """
         for name, stream in recording.scalars.items():
             self.add_scalar(name, stream)
         if recording.wrench is not None:
             self.add_wrench(taken(recording.wrench, ~repeated(recording.wrench)))
-        self.add_pusher(taken(recording.pusher, ~repeated(recording.pusher)))
-        self.add_slider(taken(recording.slider, ~repeated(recording.slider)))
+        slider, pusher = recording.slider, recording.pusher
+        self.add_pusher(taken(pusher, ~(repeated(pusher) | continued(pusher, angle=False))))
+        self.add_slider(taken(slider, ~(repeated(slider) | continued(slider, angle=True))))
         return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:

@@ -18,6 +18,7 @@ from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples
 from push_predictor.types import Array, BoolArray, IntArray
 
 SLOW = 0.015  # s between samples of a slow stream
+UNCERTAIN = 30e6  # ns between samples, from which a start or a stop between them matters more than their noise
 FINE = 10_000_000  # ns between the poses that are put in
 USUAL = 9  # intervals whose median is the usual one
 REST = 0.1  # of the velocity on the other side: a body with less of it rests, or turned back
@@ -98,8 +99,9 @@ class SlowPoses:
 def _knots(samples: OrderedSamples, rows: IntArray, angle: int | None) -> tuple[IntArray, IntArray, Array]:
     """Starts and stops before some samples: the sample's index, their stamps (ns) and values."""
     stamp, values = samples.stamp, samples.values
-    rows = rows[rows + 1 < len(stamp)]
     interval = np.diff(stamp).astype(np.float64)
+    rows = rows[rows + 1 < len(stamp)]
+    rows = rows[interval[rows - 1] > UNCERTAIN]
     velocity = np.diff(lengths(values, angle), axis=0) / interval[:, None]
     before, now, after = velocity[rows - 2], velocity[rows - 1], velocity[rows]
     stop, start = _share(now, before, after), _share(now, after, before)

@@ -1,0 +1,66 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses that a tracker did not measure, but continued with the last velocity while it did not see the body.
+
+They lie exactly on a line; poses measured with noise never do. A stream without noise, as of a simulation, is left as
+it is: a body may move on a line.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.windows.resolution import LEVER, Resolution
+from push_predictor.types import Array, BoolArray
+
+EXACT = 1e-8  # m off the line of the two poses before: rounding of a continued pose
+NOISE = 1e-5  # m off it, as the median of the BEFORE poses before a run: less may be a motion without noise
+BEFORE = 20
+SHORTEST = 4  # poses in a run: a coincidence of so many does not happen
+LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
+
+
+def continued_runs(stream: PoseStream, angle: bool) -> list[slice]:
+    """The runs of continued poses in a stream, by index; angle: whether its headings count."""
+    columns = [stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])]
+    pose = np.column_stack(columns)
+    if not len(pose) or np.max(Resolution(pose.shape[1]).take(pose)[-1]) > NOISE:  # rounded poses may lie on a line
+        return []
+    off, moves = _off_line(stream, pose)
+    marked = (off < EXACT) & moves
+    edges = np.diff(np.concatenate([[0], marked.astype(np.int64), [0]]))
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    # The first continued pose is off the line of the measured ones before.
+    return [
+        slice(begin - 1, end)
+        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
+        if end - begin >= SHORTEST and _noise(off, begin - 1) > NOISE
+    ]
+
+
+def continued(stream: PoseStream, angle: bool) -> BoolArray:
+    """Which poses (n,) of a stream are continued, not measured."""
+    found = np.zeros(len(stream), dtype=np.bool_)
+    for run in continued_runs(stream, angle):
+        found[run] = True
+    return found
+
+
+def _off_line(stream: PoseStream, pose: Array) -> tuple[Array, BoolArray]:
+    """The distance (n,) m of each pose (n, k) from the line of the two before, and whether it moves."""
+    off, moves = np.full(len(pose), np.inf), np.zeros(len(pose), dtype=np.bool_)
+    if len(pose) > 2:
+        step, interval = np.diff(pose, axis=0), np.diff(stream.stamp).astype(np.float64)[:, None]
+        ratio = interval[1:] / np.where(interval[:-1] == 0.0, np.nan, interval[:-1])
+        off[2:] = np.linalg.norm(step[1:] - step[:-1] * ratio, axis=1)
+        moves[2:] = np.linalg.norm(step[1:], axis=1) > LEAST
+    return np.where(np.isfinite(off), off, np.inf), moves
+
+
+def _noise(off: Array, first: int) -> float:
+    """The median distance (m) from the line of the poses before a run, 0 for too few."""
+    before = off[max(first - BEFORE, 0) : first]
+    before = before[np.isfinite(before)]
+    return float(np.median(before)) if len(before) >= BEFORE // 2 else 0.0
