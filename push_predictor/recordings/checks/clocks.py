@@ -145,7 +145,7 @@ def _drift(drift: Value) -> Finding:
 
 def _steps(steps: tuple[Step, ...]) -> Finding:
     stated = ", and ".join(
-        f"{step.time:.1f} s after the start {_clock(step)} by {_size(step.size)} (sd {1e3 * step.sd:.2g} ms)"
+        f"{_clock(step)} by {_size(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
         for step in steps
     )
     sentence = f"A clock was set during the recording: {stated}."
