@@ -28,7 +28,7 @@ STAGES = (loss_stage, stream_stage, frame_stage, clock_stage, geometry_stage, fo
 
 def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
     """The probable mistakes of a recording, none if it is sound."""
-    evidence = Evidence(recording, rig)
+    evidence = Evidence(recording, rig, recorded=recording)
     for stage in STAGES:
         evidence = stage(evidence)
         if evidence.refused:

@@ -74,7 +74,7 @@ def clock_stage(evidence: Evidence) -> Evidence:
     lags = push_lags(recording, rig)
     if lags is None or len(lags.lag) < FEWEST_PUSHES or lags.share < LEAST_SHARE:
         return evidence
-    course = course_of(lags, recording)
+    course = course_of(lags, recording, evidence.recorded or recording)
     if course.spread > CONSISTENT:
         return evidence
     if abs(course.lag.value) <= DOUBT * (course.lag.sd or 0.0) + LAG_ALLOWANCE:
@@ -86,8 +86,11 @@ def clock_stage(evidence: Evidence) -> Evidence:
     return replace(evidence.found(found, corrected if found else recording), synchronous=True)
 
 
-def course_of(lags: PushLags, recording: Recording) -> Course:
-    """The simplest course of the clocks that explains the lags of at least FEWEST_PUSHES pushes."""
+def course_of(lags: PushLags, recording: Recording, recorded: Recording) -> Course:
+    """The simplest course of the clocks that explains the lags of at least FEWEST_PUSHES pushes.
+
+    recorded: with the samples that the recording lacks, such as those after a clock was set back.
+    """
     ends = _split(lags.lag)
     parts = np.split(lags.lag, ends)
     drift, line = _line(lags)
@@ -102,7 +105,9 @@ def course_of(lags: PushLags, recording: Recording) -> Course:
     for k, end in enumerate(ends):
         size = float(np.median(parts[k + 1]) - np.median(parts[k]))
         sd = float(np.hypot(_sd(parts[k]), _sd(parts[k + 1])))
-        steps.append(_step(recording, size, sd, float(lags.time[end - 1]), float(lags.time[min(end, pushes - 1)])))
+        steps.append(
+            _step(recording, recorded, size, sd, float(lags.time[end - 1]), float(lags.time[min(end, pushes - 1)]))
+        )
     lag, spread = Value(float(np.median(parts[0])), "s", _sd(parts[0])), float(np.median(np.abs(apart)))
     return Course(lag, spread, tuple(steps))
 
@@ -145,7 +150,7 @@ def _drift(drift: Value) -> Finding:
 
 def _steps(steps: tuple[Step, ...]) -> Finding:
     stated = ", and ".join(
-        f"{step.time:.1f} s after the start {_clock(step)} by {_size(step.size)} (sd {1e3 * step.sd:.2g} ms)"
+        f"{_clock(step)} by {_size(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
         for step in steps
     )
     sentence = f"A clock was set during the recording: {stated}."
@@ -215,18 +220,19 @@ def _score(left: Array, parameters: int) -> float:
     return 2.0 * pushes * float(np.log(np.mean(np.abs(left)) + ROUNDING)) + parameters * float(np.log(pushes))
 
 
-def _step(recording: Recording, size: float, sd: float, after: float, before: float) -> Step:
-    """The step between two pushes (s): where the stamps of a stream jump by as much, else in the middle."""
+def _step(recording: Recording, recorded: Recording, size: float, sd: float, after: float, before: float) -> Step:
+    """The step between two pushes (s): where the recorded stamps of a stream jump by as much, else in the middle."""
     origin = int(recording.slider.stamp[0])
     names: tuple[tuple[Name, float], ...] = (("slider", 1.0), ("pusher", -1.0))
     for name, sign in names:
-        stream: PoseStream = getattr(recording, name)
-        time = 1e-9 * (stream.stamp - origin)
-        jump = np.diff(time)
+        stamp = getattr(recorded, name).stamp
+        time, jump = 1e-9 * (stamp - origin), 1e-9 * np.diff(stamp)
         near = (time[:-1] > after - abs(size)) & (time[:-1] < before + abs(size))
         near &= np.abs(jump - float(np.median(jump)) - sign * size) < SAME_STEP * abs(size)
         if near.any():
-            index = int(np.flatnonzero(near)[0]) + 1
-            return Step(size, sd, float(time[index - 1]), name, index, True)
+            last = int(np.flatnonzero(near)[0])  # with the clock before the step
+            stream: PoseStream = getattr(recording, name)
+            index = int(np.searchsorted(stream.stamp, stamp[last], side="right"))
+            return Step(size, sd, float(time[last]), name, index, True)
     index = int(np.searchsorted(recording.slider.stamp, origin + round(1e9 * 0.5 * (after + before))))
     return Step(size, sd, 0.5 * (after + before), "slider", index, False)

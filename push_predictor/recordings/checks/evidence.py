@@ -22,13 +22,15 @@ class Evidence:
 
     facts: of the streams "slider" and "pusher", where they have enough samples; empty before the stage of streams.
     A stage takes it and returns it with its own findings. It does not look for what an earlier finding explains.
-    synchronous: whether single pushes show that the accepted stamps of slider and tip are on one clock.
+    recorded: the recording as it was given, None if it is the same. synchronous: whether single pushes show that the
+    accepted stamps of slider and tip are on one clock.
     """
 
     recording: Recording
     rig: Rig
     findings: tuple[Finding, ...] = ()
     facts: Mapping[str, StreamFacts] = field(default_factory=dict)
+    recorded: Recording | None = None
     synchronous: bool = False
 
     @property
