@@ -13,18 +13,10 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 
-from push_predictor.errors import PushPredictorError
+from push_predictor.errors import RequestError
 
 NANOSECONDS = 1_000_000_000
 SECONDS_LIMIT = 2**31
-
-
-class MessageError(PushPredictorError):
-    """A message contains a value that is not accepted; the text names the field, the value and what is accepted."""
-
-    def __init__(self, field: str, value: object, accepted: str) -> None:
-        super().__init__(f"{field}: {value!r} is not accepted, give {accepted}")
-        self.field = field
 
 
 def stamp_to_ns(stamp: Any) -> int:
@@ -33,8 +25,8 @@ def stamp_to_ns(stamp: Any) -> int:
 
 
 def ns_to_stamp(nanoseconds: int) -> Time:
-    """The Time of integer nanoseconds. Raises MessageError outside the 32-bit seconds of the message."""
+    """The Time of integer nanoseconds. Raises RequestError outside the 32-bit seconds of the message."""
     sec, nanosec = divmod(int(nanoseconds), NANOSECONDS)
     if not -SECONDS_LIMIT <= sec < SECONDS_LIMIT:
-        raise MessageError("stamp", nanoseconds, "nanoseconds within 32-bit seconds")
+        raise RequestError("stamp", nanoseconds, "nanoseconds within 32-bit seconds")
     return Time(sec=sec, nanosec=nanosec)

@@ -14,12 +14,18 @@ from dataclasses import dataclass
 import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker
+from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters import ns_to_stamp
 from push_predictor.geometry.frames import to_world, wrap_angle
+from push_predictor.geometry.touch import covariance_in_world, displaced
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors.tails import Tails, half_widths, joint_radius
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
 
+LEVEL = 0.95
 CHI2_95_OF_TWO = 5.991464547107979  # -2 log(0.05): the 95 % quantile of chi-squared with two degrees of freedom
 NORMAL_95 = 1.959963984540054  # half-width of the 95 % interval of a normal variable, in standard deviations
 MAGNIFICATION = 20.0
@@ -87,6 +93,57 @@ class Sheet:
         return marker
 
 
+def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
+    """Pusher, push, outlines, 95 % ellipse, observed pose and label in frame_id; prediction: of n = 1.
+
+    The label is red if the outcome lies outside the 95 % region. The arrow of the push ends at the pusher's back; its
+    length has no meaning.
+    """
+    heading, start, end = window.push_heading, window.slider_start, window.slider_end
+    sheet, reach = Sheet(frame_id, window.end), rig.outline.reach
+    predicted = displaced(start[None], np.array([heading]), prediction.mean)[0]
+    wider = _wider(prediction.tails)
+    covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, np.array([heading]))[0]
+    tip, ahead = _tip(rig, window), np.array([np.cos(heading), np.sin(heading)])
+    back = tip - rig.pusher_radius * ahead
+    distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
+    label = (
+        f"{window.push_id}, window {window.index}\n"
+        f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {limit:.1f})\n"
+        f"ellipse and dial {MAGNIFICATION:.0f} times enlarged"
+    )
+    above = start[:2] + np.array([0.0, LABEL_PLACE * reach])
+    return MarkerArray(
+        markers=[
+            sheet.disc("pusher", tip, rig.pusher_radius, WHITE),
+            sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
+            *prediction_markers(sheet, rig.outline.vertices, start, predicted, covariance[:2, :2], end),
+            *magnified_markers(sheet, predicted, covariance, end, reach, heading),
+            sheet.text("label", above, label, RED if distance > limit else WHITE),
+        ]
+    )
+
+
+def error_in_sd(window: PushWindow, prediction: Prediction) -> float:
+    """The Mahalanobis distance of the outcome (dx, dy, dtheta) from the prediction (n = 1)."""
+    away = window.displacement - prediction.mean[0]
+    return float(np.sqrt(away @ np.linalg.solve(prediction.covariance[0], away)))
+
+
+def _wider(tails: Tails | None) -> Array:
+    """Factors (3,) on the sd of a Gaussian, which the markers draw, whose 95 % regions are those of the tails."""
+    plane = joint_radius(tails, LEVEL, 2) / joint_radius(None, LEVEL, 2)
+    turn = (half_widths(tails, LEVEL) / half_widths(None, LEVEL))[2]
+    return np.array([plane, plane, turn])
+
+
+def _tip(rig: Rig, window: PushWindow) -> Array:
+    """The pusher's centre (2,), m, at the window's start: of a disc that touches the outline at the contact."""
+    contact = np.array([window.contact])
+    centre = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
+    return np.asarray(to_world(centre, window.slider_start)[0])
+
+
 def prediction_markers(
     sheet: Sheet,
     rig_outline_vertices: Array,
@@ -108,19 +165,6 @@ def prediction_markers(
         sheet.line("predicted_ellipse", ellipse, BLUE, FINE_WIDTH),
         sheet.line("observed_outline", to_world(closed, observed_pose), ORANGE),
         sheet.ball("observed_centre", observed_pose, ORANGE),
-    ]
-
-
-def push_markers(sheet: Sheet, tip: Array, radius: float, heading: float) -> list[Marker]:
-    """The pusher as a disc, and an arrow that ends at its back and points in the push direction.
-
-    tip: (2,) centre of the disc, m; radius m; heading of the push, rad. The arrow's length has no meaning.
-    """
-    ahead = np.array([np.cos(heading), np.sin(heading)])
-    back = tip - radius * ahead
-    return [
-        sheet.disc("pusher", tip, radius, WHITE),
-        sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
     ]
 
 
@@ -147,11 +191,6 @@ def magnified_markers(
         sheet.line("magnified_heading", _band(centre, low, high, ahead, spread), BLUE),
         sheet.line("magnified_observed_heading", stroke, ORANGE),
     ]
-
-
-def label_marker(sheet: Sheet, text: str, centre: Array, reach: float, outside: bool) -> Marker:
-    """Text above a slider at centre (2,) whose outline has this reach (m); red if the outcome lies outside."""
-    return sheet.text("label", centre + np.array([0.0, LABEL_PLACE * reach]), text, RED if outside else WHITE)
 
 
 def confidence_ellipse(centre: Array, covariance: Array) -> Array:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from msg_adapters import MessageError, ns_to_stamp
+from msg_adapters import ns_to_stamp
+from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
@@ -19,13 +20,13 @@ def residual_to_message(
 ) -> PushResidual:
     """The message of a window and a model's prediction (3,), (3, 3) of it, made in or out of the model's domain.
 
-    frame_id: of the poses. standardised: L^-1 (observed - predicted), with L L' = covariance. Raises MessageError if
+    frame_id: of the poses. standardised: L^-1 (observed - predicted), with L L' = covariance. Raises RequestError if
     there is no such L.
     """
     try:
         factor = np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError:
-        raise MessageError("covariance", covariance.tolist(), "a positive definite matrix") from None
+        raise RequestError("covariance", covariance.tolist(), "a positive definite matrix") from None
     message = PushResidual(push_id=window.push_id, window=int(window.index), model=model, in_domain=bool(in_domain))
     message.header.stamp, message.header.frame_id = ns_to_stamp(window.end), frame_id
     message.velocity, message.contact, message.angle = map(float, (window.velocity, window.contact, window.angle))
@@ -43,10 +44,10 @@ def _flat(values: Array) -> Array:
 def alarm_to_message(state: AlarmState, model: str, stamp_ns: int, frame_id: str) -> PushAlarm:
     """The message of an alarm about a model. stamp_ns: end of the push at which it fired.
 
-    Raises MessageError if it has not fired.
+    Raises RequestError if it has not fired.
     """
     if state.fired_at is None or state.fired_after is None or state.fired_evidence is None or state.fired_by is None:
-        raise MessageError("alarm", state, "an alarm that has fired")
+        raise RequestError("alarm", state, "an alarm that has fired")
     message = PushAlarm(push_id=state.fired_at, pushes=state.fired_after, model=model, score=state.fired_by)
     message.header.stamp, message.header.frame_id = ns_to_stamp(stamp_ns), frame_id
     message.log10_evidence, message.false_alarm_rate = state.fired_evidence, state.false_alarm_rate

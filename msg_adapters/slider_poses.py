@@ -83,7 +83,7 @@ def fill_slider_response(
     """Write the slider's pose after a push of so many s, in the frame of the request.
 
     The covariance is that of x, y and the heading in the world's plane, and zero elsewhere. The stamp is the request's
-    plus the duration; a zero stamp (unknown time) stays zero. Raises MessageError for a time beyond 32-bit seconds.
+    plus the duration; a zero stamp (unknown time) stays zero. Raises RequestError for a time beyond 32-bit seconds.
     """
     answer = response.slider_after
     answer.header.frame_id = header.frame_id

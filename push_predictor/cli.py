@@ -19,6 +19,7 @@ from importlib import import_module
 
 from push_predictor import __version__
 from push_predictor.blas_threads import limit_process
+from push_predictor.commands.common.options import with_signed_axes
 from push_predictor.commands.common.output import check_json
 from push_predictor.errors import PushPredictorError
 
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # With a thousand rows a second thread gains little, and it is ten times slower if another process needs the core.
     limit_process()
     completing = "_ARGCOMPLETE" in os.environ  # set by the shell: argcomplete takes longer than the parser
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = with_signed_axes(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(words[:1] if words and words[0] in COMMANDS and not completing else COMMANDS)
     if completing:
         _complete(parser)

@@ -87,7 +87,7 @@ def compiled_modules() -> Finding:
 
 def ros_node() -> Finding:
     """Check that a node can be created, in a process of its own: a middleware may hang or crash."""
-    command = [sys.executable, "-m", "push_predictor.nodes.doctor_graph"]
+    command = [sys.executable, "-m", "push_predictor.nodes.network_security"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired:

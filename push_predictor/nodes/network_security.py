@@ -1,11 +1,16 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which machines can discover a node, and whether the security that the environment requests is available."""
+"""Which machines can discover a node, and whether the security that the environment requests is available.
+
+As a program, for `push_predictor doctor`: create a node, and print what it discovers.
+"""
 
 from __future__ import annotations
 
 import os
+import time
+from importlib import import_module
 
 from push_predictor.errors import PushPredictorError
 
@@ -14,6 +19,12 @@ ENABLE, STRATEGY = "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY"
 DISCOVERY = (RANGE, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY")  # any of them sets the range
 LIMITED = f"Other machines cannot discover this node. To allow it, export {RANGE}=SUBNET on all machines."
 SECURITY_PAGE = "docs/how_to/security.md"
+USED = (
+    "geometry_msgs.msg",
+    "visualization_msgs.msg",
+    "push_predictor_interfaces.srv",
+)  # of the packages that all nodes need
+PATIENCE = 1.0  # s to discover other nodes
 
 
 class SecurityError(PushPredictorError):
@@ -55,3 +66,30 @@ def security_hint() -> str:
     given = ", ".join(f"{name}={os.environ.get(name, '')}" for name in names)
     checks = "the middleware was built with DDS security, and that the keystore has an enclave for the node"
     return f"; security is requested ({given}). Check that {checks}; see {SECURITY_PAGE}"
+
+
+def main() -> None:
+    """Print the middleware, the domain and the other nodes. Raises what rclpy or the middleware raises."""
+    import rclpy
+    from rclpy.utilities import get_rmw_implementation_identifier
+
+    for name in USED:
+        import_module(name)
+    limited = limit_discovery()
+    require_security()
+    try:
+        rclpy.init(args=[])
+        node = rclpy.create_node("push_predictor_doctor")
+    except Exception as error:
+        raise SystemExit(f"{error}{security_hint()}") from None
+    time.sleep(PATIENCE)
+    names = sorted(f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces())
+    others = ", ".join(name for name in names if name != node.get_fully_qualified_name()) or "none"
+    reach = "on this machine" if limited else "in the discovery range of the environment"
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    print(f"{get_rmw_implementation_identifier()}, domain {domain}, other nodes {reach}: {others}")
+    rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

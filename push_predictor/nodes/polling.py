@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from time import time_ns
+from collections.abc import Callable, Iterator, Sequence
+from time import monotonic, time_ns
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -18,8 +17,12 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.parameters import given_value
 from push_predictor.nodes.qos import DEPTH, common_profile, message_class
+from push_predictor.nodes.runtime import of_rcl
+
+ONE_TYPE = "One type of publishers is accepted."
 
 
 class NoExecutor(CallbackGroup):
@@ -67,55 +70,90 @@ def take_request(service: Service) -> tuple[Any, Any]:
 
 
 class FollowingSubscription:
-    """A subscription that is made again when the type or QoS of its publishers changes.
+    """A subscription to the one type of a topic's publishers that fits, made again when their type or QoS changes.
 
-    It takes serialized messages, with the reliability that all publishers of the topic offer.
-    depth: of its queue. earlier: also take what was sent before, if all publishers keep it. overridable: parameters
-    qos_overrides.TOPIC.subscription.* apply, and a reliability given there is kept. Call `publishers` and `follow` in
-    the executor's thread, one method at a time, and `taken` before `follow`. lost: messages that were overwritten
-    before they were taken, or sent while the subscription was made again.
+    It takes serialized messages, with the reliability that all these publishers offer.
+    unfit: called with a type, returns why it does not fit, '' if it does. first: the type to subscribe to before there
+    is a publisher, '' for none. depth: of its queue. earlier: also take what was sent before, if all publishers keep
+    it. overridable: parameters qos_overrides.TOPIC.subscription.* apply, and a reliability given there is kept.
+    Call `look` in the executor's thread, `taken` before it, and one method at a time.
+
+    name: of the topic after remapping. offered: the publishers, of any type, at the last look. problem: why they cannot
+    be subscribed to, '' if they can. kind: the type of the subscription, '' without one. heard: when the last message
+    came, or the last publisher. lost: messages that were overwritten before they were taken, or sent while the
+    subscription was made again.
     """
 
     def __init__(
-        self, node: Node, topic: str, depth: int = DEPTH, *, earlier: bool = True, overridable: bool = False
+        self,
+        node: Node,
+        topic: str,
+        unfit: Callable[[str], str],
+        depth: int = DEPTH,
+        *,
+        first: str = "",
+        earlier: bool = True,
+        overridable: bool = False,
     ) -> None:
         self._node, self._topic, self._group = node, topic, NoExecutor()
+        self._unfit, self._first = unfit, first
         self._depth, self._earlier = depth, earlier
-        self.name = node.resolve_topic_name(topic)  # after remapping
+        self.name = node.resolve_topic_name(topic)
+        self.offered: list[TopicEndpointInfo] = []
+        self.problem = ""
+        self.heard = monotonic()
         self.lost = 0
         self._overriding = _overriding(node, self.name) if overridable else None
         self._subscription: Subscription | None = None
-        self._profile: tuple[Any, ...] | None = None
+        self._profile: tuple[Any, ...] = ("",)
         self._last: int | None = None  # number of the last message
         self._alone = True  # whether there was at most one publisher at the last look
         self._since = 0  # when their number changed, ns
+
+    @property
+    def kind(self) -> str:
+        """See the class."""
+        return str(self._profile[0])
+
+    @property
+    def kinds(self) -> list[str]:
+        """The types of the publishers."""
+        return sorted({publisher.topic_type for publisher in self.offered})
 
     @property
     def reliability(self) -> ReliabilityPolicy | None:
         """That of the subscription, None without one."""
         return self._subscription.qos_profile.reliability if self._subscription is not None else None
 
-    def publishers(self) -> list[TopicEndpointInfo]:
-        """The present publishers of the topic, of any type."""
-        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
-        if (alone := len(found) <= 1) != self._alone:
+    def look(self) -> None:
+        """Subscribe as the present publishers offer the topic; stay subscribed when they have left."""
+        if not self.offered:
+            self.heard = monotonic()
+        self.offered = self._node.get_publishers_info_by_topic(self._topic)
+        if (alone := len(self.offered) <= 1) != self._alone:
             self._alone, self._last, self._since = alone, None, time_ns()
-        return found
+        kinds = self.kinds or ([self._first] if self._first and not self.kind else [])
+        unfit = {kind: self._unfit(kind) for kind in kinds}
+        fitting = [kind for kind, why in unfit.items() if not why]
+        if len(fitting) == 1:
+            self.problem = self._follow(fitting[0], [each for each in self.offered if each.topic_type == fitting[0]])
+        else:
+            self.problem = next(filter(None, unfit.values()), ONE_TYPE if unfit else "")
 
-    def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        """Subscribe to this type as these publishers offer it, reliable without any.
-
-        Raises PushPredictorError if the type is not installed.
-        """
+    def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> str:
+        """Subscribe to a type as these publishers offer it, reliable without any; returns why it is not possible."""
         offered = [publisher.qos_profile for publisher in publishers]
         profile = common_profile(offered, self._depth, self._earlier)
         wanted = kind, profile.durability, profile.reliability
         if wanted == self._profile:
-            return
-        found = message_class(kind)
+            return ""
+        try:
+            found = message_class(kind)
+        except PushPredictorError as error:
+            return f"{error}."
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
-            self._subscription, self._profile = None, None
+            self._subscription, self._profile = None, ("",)
         try:
             self._subscription = self._node.create_subscription(
                 found,
@@ -126,15 +164,19 @@ class FollowingSubscription:
                 qos_overriding_options=self._overriding,
                 raw=True,
             )
-        except rclpy_implementation.RCLError:
-            return  # another stream still has one of another type. Try again at the next call
+        except RuntimeError as error:
+            if not of_rcl(error):
+                raise
+            return ""  # another stream still has one of another type. Try again at the next look
         self._profile = wanted
+        return ""
 
     def taken(self) -> Iterator[Taken]:
         """The arrived messages."""
         if self._subscription is None:
             return
         for message in take_all(self._subscription):
+            self.heard = monotonic()
             self._note_loss(message)
             yield message
 

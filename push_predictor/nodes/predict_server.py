@@ -25,23 +25,21 @@ from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, qos_profile_system_default
+from rclpy.service import Service
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
-from msg_adapters.predictions import refuse
-from push_predictor.error_codes import ErrorCode, error_code
-from push_predictor.errors import InactiveError, PushPredictorError, RequestError
-from push_predictor.models.push_model import PushModel
+from push_predictor.errors import InactiveError, RequestError
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameter_tables import PREDICT_SERVER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.runtime import run
-from push_predictor.nodes.server.guarded_action import GuardedAction
+from push_predictor.nodes.runtime import refusal, run
+from push_predictor.nodes.server.actions import GuardedAction, TraceAction
 from push_predictor.nodes.server.services import (
     RequestFrames,
     handle_list_models,
@@ -54,7 +52,6 @@ from push_predictor.nodes.server.services import (
 )
 from push_predictor.nodes.server.status import NO_MODEL, RequestStatistics, server_status
 from push_predictor.nodes.server.threaded_service import ThreadedService
-from push_predictor.nodes.server.trace_action import TraceAction
 from push_predictor.resources import SHIPPED
 from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.srv import (
@@ -100,7 +97,7 @@ class PredictServer(LifecycleNode):
         self._introspect(self.value("introspection"))
         check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))
         self._actions = [
-            TraceAction(self, self._deployed, alpha, check, self._check_loaded).action,
+            TraceAction(self, lambda name: self._registry.get(name).model, alpha, check, self._check_loaded),
             GuardedAction(self, SuggestPushes, "suggest_pushes", self._suggest, check, check),
         ]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -222,9 +219,7 @@ class PredictServer(LifecycleNode):
         self._on_load, self._on_list = self._guarded(self._load), self._guarded(handle_list_models)
         self._push_service = ThreadedService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
         self._long_services = [
-            self.create_service(
-                kind, name, callback, qos_profile=SERVICE_QOS, callback_group=MutuallyExclusiveCallbackGroup()
-            )
+            self._offer(kind, name, callback, MutuallyExclusiveCallbackGroup())
             for kind, name, callback in (
                 (PredictPushBatch, "predict_push_batch", self._prediction(batch)),
                 (RolloutPushes, "rollout_pushes", self._prediction(rollout)),
@@ -232,14 +227,14 @@ class PredictServer(LifecycleNode):
             )
         ]
         self._short_services = [
-            self.create_service(kind, name, callback, qos_profile=SERVICE_QOS)
-            for kind, name, callback in (
-                (PredictSliderPose, "predict_slider_pose", self._prediction(pose)),
-                (ListModels, "list_models", self._on_list),
-            )
+            self._offer(PredictSliderPose, "predict_slider_pose", self._prediction(pose)),
+            self._offer(ListModels, "list_models", self._on_list),
         ]
         self._loaded: Callable[[], None] = lambda: None
         self._use_loaded = self.create_guard_condition(lambda: self._loaded())
+
+    def _offer(self, kind: Any, name: str, callback: Any, group: CallbackGroup | None = None) -> Service:
+        return self.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 
     def _load(self, registry: ModelRegistry, request: Any, response: Any) -> None:
         """Load a model and take it into use. Raises PushPredictorError."""
@@ -302,7 +297,9 @@ class PredictServer(LifecycleNode):
         """The callback of a service that predicts while the node is active, and is counted."""
 
         def active(registry: ModelRegistry, request: Any, response: Any) -> None:
-            (handler if self._state == "active" else self._refuse_inactive)(registry, request, response)
+            if self._state != "active":
+                raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
+            handler(registry, request, response)
 
         answer = self._guarded(active)
 
@@ -316,39 +313,27 @@ class PredictServer(LifecycleNode):
 
     def _check_active(self) -> None:
         """Raise InactiveError when the node ends or is not active; long requests call it between their parts."""
-        if self._closing.is_set():
-            raise InactiveError("the node ends")
-        if self._state != "active":
-            raise InactiveError(f"the node is {self._state}")
+        self._check_state("active")
 
     def _check_loaded(self) -> None:
         """Raise InactiveError when the node ends or its models are unloaded."""
+        self._check_state("active", "inactive")
+
+    def _check_state(self, *accepted: str) -> None:
         if self._closing.is_set():
             raise InactiveError("the node ends")
-        if self._state in ("unconfigured", "finalized"):
-            raise InactiveError(f"the node is {self._state} now")
-
-    def _refuse_inactive(self, registry: ModelRegistry, request: Any, response: Any) -> None:
-        raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
-
-    def _deployed(self, name: str) -> PushModel:
-        """The model to be traced. Raises RequestError."""
-        return self._registry.get(name).model
+        if self._state not in accepted:
+            raise InactiveError(f"the node is {self._state}")
 
     def _guarded(self, handler: Handler) -> Callable[[Any, Any], Any]:
-        """The callback of a service; every exception becomes a refusal: one that left it would end the node."""
+        """The callback of a service; every exception becomes a refusal."""
 
         def callback(request: Any, response: Any) -> Any:
             try:
                 handler(self._registry, request, response)
                 return response
-            except PushPredictorError as error:
-                reason, code = str(error), error_code(error)
-                self.get_logger().warning(f"refused: {reason}", throttle_duration_sec=1.0)
             except Exception as error:
-                reason, code = f"internal error, see the log of the node: {error!r}", ErrorCode.INTERNAL_ERROR
-                self.get_logger().error(traceback.format_exc())
-            return refuse(response, reason, code)
+                return refusal(error, response, self.get_logger())
 
         return callback
 

@@ -13,6 +13,7 @@ if __name__ == "__main__":  # before the other imports: they take half a second,
     sys.exit(entry.push_recorder())
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -22,15 +23,14 @@ from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_topic_name import validate_topic_name
 
 from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.polling import FollowingSubscription
-from push_predictor.nodes.qos import DEEPEST, common_profile
+from push_predictor.nodes.polling import ONE_TYPE, FollowingSubscription
+from push_predictor.nodes.qos import DEEPEST, common_profile, message_class
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.live_recording import LiveRecording
@@ -103,7 +103,8 @@ class RecorderSubscriptions:
 
     def __init__(self, node: Node, recording: LiveRecording) -> None:
         self._node, self._recording = node, recording
-        self._topics = {topic.name: FollowingSubscription(node, topic.name, DEEPEST) for topic in recording.wanted}
+        names = [topic.name for topic in recording.wanted]
+        self._topics = {name: FollowingSubscription(node, name, partial(self._unfit, name), DEEPEST) for name in names}
         self._looked = 0.0
 
     def look(self) -> None:
@@ -132,23 +133,23 @@ class RecorderSubscriptions:
 
     def _follow(self, name: str, reader: FollowingSubscription) -> str:
         """Subscribe to a topic as it is published now; returns why that is not possible, '' if it is."""
-        publishers = reader.publishers()
-        kinds = sorted({publisher.topic_type for publisher in publishers})
+        reader.look()
+        self._recording.set_published(name, bool(reader.offered))
+        if reader.kind and not self._recording.type_of(name):
+            self._recording.add_topic(_description(name, reader))
+        if reader.problem == ONE_TYPE:
+            return f"{name} has publishers of the types {' and '.join(reader.kinds)}. One type is accepted."
+        return reader.problem
+
+    def _unfit(self, name: str, kind: str) -> str:
+        """Why messages of a type are not recorded, '' if they are."""
         known = self._recording.type_of(name)
-        self._recording.set_published(name, bool(kinds))
-        if not kinds:
-            return ""
-        if known and known not in kinds:
-            return f"{name} is now of type {kinds[0]}. Only its first type, {known}, is recorded."
-        if not known and len(kinds) > 1:
-            return f"{name} has publishers of the types {' and '.join(kinds)}. One type is accepted."
-        chosen = [publisher for publisher in publishers if publisher.topic_type == (known or kinds[0])]
+        if known not in ("", kind):
+            return f"{name} is now of type {kind}. Only its first type, {known}, is recorded."
         try:
-            reader.follow(known or kinds[0], chosen)
+            message_class(kind)
         except PushPredictorError as error:
             return f"{name} is not recorded: {error}."
-        if not known:
-            self._recording.add_topic(_description(name, chosen))
         return ""
 
     def _simulated_time(self) -> int | None:
@@ -158,11 +159,12 @@ class RecorderSubscriptions:
         return int(clock.now().nanoseconds) if simulated else None
 
 
-def _description(name: str, publishers: list[TopicEndpointInfo]) -> TopicInfo:
+def _description(name: str, reader: FollowingSubscription) -> TopicInfo:
+    publishers = [publisher for publisher in reader.offered if publisher.topic_type == reader.kind]
     profile = common_profile([publisher.qos_profile for publisher in publishers])
     return TopicInfo(
         name,
-        publishers[0].topic_type,
+        reader.kind,
         0,
         str(publishers[0].topic_type_hash),
         durability="transient_local" if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL else "volatile",

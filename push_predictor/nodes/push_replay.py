@@ -33,8 +33,8 @@ from push_predictor.errors import RecordingError, RequestError, RigError
 from push_predictor.nodes.parameter_tables import PUSH_REPLAY
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import CLOCK, KEPT, LATCHED
-from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.topics import ReplayTopics, check_filter, is_played, listed
+from push_predictor.nodes.replay_controls import ReplayControls
+from push_predictor.nodes.replay_topics import ReplayTopics, check_filter, is_played, listed
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.messages import RawMessage
@@ -87,7 +87,9 @@ class PushReplay(Node):
         self._checks = CheckProcess(values["strict"])
         self._player = self._make_player()
         self._check(bag)
-        self._start_reporting()
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
+        self.create_timer(1.0, self._report_regularly, clock=steady)
         ReplayControls(self, self._player)
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
@@ -187,7 +189,7 @@ class PushReplay(Node):
                 break
             if timeout and time.perf_counter_ns() - begin > timeout:
                 break
-            time.sleep(0.002)
+            self._ending.wait(0.01)
         self._acknowledged = self._topics.acknowledged()
 
     def _announce(self, state: str) -> None:
@@ -237,11 +239,6 @@ class PushReplay(Node):
             work()
         except BaseException as error:  # a dead thread must not look like a recording without messages
             self._stop.fail(error)
-
-    def _start_reporting(self) -> None:
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
-        self.create_timer(1.0, self._report_regularly, clock=steady)
 
     def _report(self) -> ReplayReport:
         return ReplayReport(

@@ -26,11 +26,9 @@ from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import run
 from push_predictor.nodes.validator.finish_service import FinishService
-from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.nodes.validator.publishers import ResultPublishers
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.results import ResultPublishers, ResultWriter
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
@@ -148,10 +146,10 @@ class PushValidator(Node):
             return
         # A recording gives the finder every stream from its beginning, so a run begins with all of them.
         if complete or self._closing or self._finish.requested:
-            output, scalars = self._writer.folder, self._sensors.scalar_names
+            output, scalars = self._writer.folder, list(self._sensors.decoder.scalars)
             if self._run is not None:
                 self._run.checks.check.stop()
-            self._sensors.begin(rig)
+            self._sensors.decoder.begin(rig)
             results = self._results.publish, self._world
             self._run = ValidationRun(rig, models, self._client, *results, self._alarm, output, scalars, self._strict)
             self._session.open(monotonic())
@@ -169,7 +167,7 @@ class PushValidator(Node):
         """Write the run once every answer is there or the patience is over."""
         if not self._session.answers_settled(monotonic(), self._client.open):
             return
-        ending.no_more_answers()
+        ending.pass_to_alarm(last=True)
         if not self._session.alarm_settled(monotonic(), self._alarm.busy):
             return
         self._client.forget()

@@ -9,6 +9,7 @@ import argparse
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeAlias
@@ -20,7 +21,9 @@ from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedEx
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from msg_adapters.predictions import refuse
 from push_predictor import __version__
+from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.network_security import LIMITED, limit_discovery, require_security, security_hint
 from push_predictor.online.child_process import kill_children
@@ -28,7 +31,7 @@ from push_predictor.online.child_process import kill_children
 TURN = 0.1  # s that the executor waits: Python handles a signal when it returns
 GRACE = 0.3  # s in which a start may still end after a signal
 LONGEST = 3.0  # s in which a callback of an executor with one thread may: less than a launch waits for
-_GRAPH_ERRORS = (RuntimeError, InvalidNamespaceException, InvalidNodeNameException)  # the first: base of those of rcl
+_NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException)
 MakeNode: TypeAlias = Callable[["Stop"], Any]
 
 
@@ -154,16 +157,20 @@ class Life:
         if error is None:
             return 0
         refused = isinstance(error, PushPredictorError)
-        if not refused and not (self._executor is None and _of_the_graph(error)):
+        of_the_graph = of_rcl(error) or isinstance(error, _NAME_ERRORS)
+        if not refused and not (self._executor is None and of_the_graph):
             raise error
         hint = "" if refused else security_hint()
         print(f"{self._name}: {one_line(error)}{hint}", file=sys.stderr)
         return 1
 
 
-def _of_the_graph(error: BaseException) -> bool:
-    """Whether rclpy or rcl refuses to start a node; any other RuntimeError is a bug, which needs its traceback."""
-    return isinstance(error, _GRAPH_ERRORS) and type(error).__module__.partition(".")[0] == rclpy.__name__
+def of_rcl(error: BaseException) -> bool:
+    """Whether rcl or the middleware refuses something; rclpy does not export the RuntimeError for it.
+
+    Any other RuntimeError is a bug, which needs its traceback.
+    """
+    return isinstance(error, RuntimeError) and type(error).__module__.partition(".")[0] == rclpy.__name__
 
 
 def _parse(name: str, args: Sequence[str] | None) -> None:
@@ -193,6 +200,20 @@ def _own_arguments(words: Sequence[str]) -> list[str]:
 def one_line(error: BaseException) -> str:
     """The message of an error without line breaks."""
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def refusal(error: Exception, response: Any, log: Any) -> Any:
+    """The response to a request that failed: its reason and error code. One that left its callback would end the node.
+
+    Logs an expected failure as a warning, once a second at most, any other with its traceback.
+    """
+    code, reason = error_code(error), one_line(error)
+    if code == ErrorCode.INTERNAL_ERROR:
+        log.error("".join(traceback.format_exception(error)))
+        reason = f"internal error, see the log of the node: {error!r}"
+    else:
+        log.warning(reason, throttle_duration_sec=1.0)
+    return refuse(response, reason, code)
 
 
 def _handle_signals(stop: Stop, life: Life) -> None:

@@ -49,7 +49,7 @@ class AlarmProcess:
     def __init__(self, rate: float, fire: Callable[[AlarmState, int], None]) -> None:
         self._rate, self._fire = rate, fire
         self._model: PushModel | None = None
-        self._child: Child | None = None
+        self._child = Child("alarm", _work)
         self._waiting: list[CompletedPush] = []
         self._asked = False
         self._run = 0
@@ -60,7 +60,7 @@ class AlarmProcess:
     @property
     def busy(self) -> bool:
         """Whether pushes are waiting to be scored."""
-        return bool(self._waiting or self._asked) and self._child is not None
+        return bool(self._waiting or self._asked)
 
     @property
     def json(self) -> dict[str, object]:
@@ -73,7 +73,7 @@ class AlarmProcess:
             return
         self.stop()
         self._model = model
-        self._child = Child("alarm", _work, model, self._rate)
+        self._child.start(model, self._rate)
         self._asked = True  # the process speaks first
 
     def begin(self) -> None:
@@ -83,16 +83,16 @@ class AlarmProcess:
 
     def add(self, push: CompletedPush) -> None:
         """Take a push of which every window was predicted or refused."""
-        if self._child is not None:
+        if self._child.started:
             self._waiting.append(push)
 
     def work(self) -> None:
         """Send the pushes that wait, take the replies."""
         try:
-            while self._child is not None and (reply := self._child.received()) is not None:
+            while (reply := self._child.received()) is not None:
                 self._asked = False
                 self._take(reply)
-            if self._child is not None and self._waiting and not self._asked:
+            if self._waiting and not self._asked:
                 self._child.send((self._run, self._waiting))
                 self._waiting, self._asked = [], True
         except (EOFError, OSError):
@@ -101,9 +101,8 @@ class AlarmProcess:
 
     def stop(self) -> None:
         """End the process."""
-        if self._child is not None:
-            self._child.stop()
-        self._child, self._asked, self._waiting = None, False, []
+        self._child.stop()
+        self._asked, self._waiting = False, []
 
     def _take(self, reply: _Reply) -> None:
         self.off = reply.off

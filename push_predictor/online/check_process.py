@@ -36,14 +36,14 @@ class CheckProcess:
 
     def __init__(self, strict: bool = False) -> None:
         self._failing = ("refused", "warning") if strict else ("refused",)
-        self._child: Child | None = None
+        self._child = Child("check", _check)
         self.findings: tuple[Finding, ...] = ()
         self.result, self.failure = PENDING, ""
 
     @property
     def busy(self) -> bool:
         """Whether a check runs."""
-        return self._child is not None
+        return self._child.started
 
     @property
     def failed(self) -> bool:
@@ -58,12 +58,12 @@ class CheckProcess:
     def start(self, data: Recording | Path, rig: Rig | None, topics: Topics = Topics()) -> None:
         """Check a recording, or that of a path and its topics, if no check runs. rig: None for the recorded one."""
         if not self.busy:
-            self._child = Child("check", _check, data, rig, topics)
+            self._child.start(data, rig, topics)
 
     def work(self) -> None:
         """Take the result if it is there."""
         try:
-            reply = None if self._child is None else self._child.received()
+            reply = self._child.received()
         except (EOFError, OSError):
             reply = "the process of the check ended"
         if reply is None:
@@ -82,9 +82,7 @@ class CheckProcess:
 
     def stop(self) -> None:
         """End the process."""
-        if self._child is not None:
-            self._child.stop()
-        self._child = None
+        self._child.stop()
 
 
 def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topics: Topics) -> None:

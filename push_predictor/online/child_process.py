@@ -15,46 +15,80 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
 
 NICENESS = 5  # samples and predictions come first; on a busy machine a lower priority would never be served
 
 
 class Child:
-    """A process that ends with this one and that no SIGINT reaches: the node ends it.
+    """A process that ends with this one and that no SIGINT reaches: the node ends it. It can be started again.
 
     work: called there with its end of a pipe and the arguments. Ctrl-C reaches the whole process group; a child that is
-    still importing would print a traceback.
+    still importing would print a traceback. process: the present one or the last, None before the first.
     """
 
-    def __init__(self, name: str, work: Callable[..., None], *arguments: Any) -> None:
+    def __init__(self, name: str, work: Callable[..., None]) -> None:
+        self._name, self._work = name, work
+        self._pipe: Connection | None = None
+        self.process: BaseProcess | None = None
+
+    @property
+    def started(self) -> bool:
+        """Whether it was started, and not stopped since."""
+        return self._pipe is not None
+
+    @property
+    def alive(self) -> bool:
+        """Whether it works."""
+        return self.process is not None and self.process.is_alive()
+
+    def status(self, patience: float = 0.0) -> int:
+        """That of the last process, negative for a signal that ended it; 0 if it does not end within so many s."""
+        if self.process is None:
+            return 0
+        self.process.join(patience)
+        return self.process.exitcode or 0
+
+    def start(self, *arguments: Any) -> None:
+        """Start a process, after the end of the present one."""
         import multiprocessing
         from multiprocessing import resource_tracker
 
-        self._pipe, theirs = multiprocessing.Pipe()
+        self.stop()
+        ours, theirs = multiprocessing.Pipe()
         context = multiprocessing.get_context("spawn")  # a fork would inherit the locks of the middleware's threads
-        self.process = context.Process(target=_begin, args=(work, theirs, *arguments), daemon=True, name=name)
+        work = (self._work, theirs, *arguments)
+        process = context.Process(target=_begin, args=work, daemon=True, name=self._name)
         resource_tracker.ensure_running()  # the start of its process would unblock the signal
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a child inherits it
         try:
             with _not_interrupted():
-                self.process.start()
+                process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         theirs.close()
+        self.process, self._pipe = process, ours
 
     def send(self, message: Any) -> None:
-        """Send a message. Raises OSError if the process has ended."""
+        """Send a message to the started process. Raises OSError if it has ended."""
+        assert self._pipe is not None
         self._pipe.send(message)
 
     def received(self, patience: float = 0.0) -> Any:
-        """The next message, None if none comes within so many s. Raises EOFError or OSError if the process ended."""
-        return self._pipe.recv() if self._pipe.poll(patience) else None
+        """The next message, None if none comes within so many s, and without a process.
+
+        Raises EOFError or OSError if the process has ended.
+        """
+        return self._pipe.recv() if self._pipe is not None and self._pipe.poll(patience) else None
 
     def stop(self, at_once: bool = False) -> None:
-        """End the process; at_once: by SIGKILL."""
+        """End the process, if there is one; at_once: by SIGKILL."""
+        if self._pipe is None or self.process is None:
+            return
         (self.process.kill if at_once else self.process.terminate)()
         self.process.join()
         self._pipe.close()
+        self._pipe = None
 
 
 @contextmanager

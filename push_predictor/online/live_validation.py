@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import re
+import signal
+import sys
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -15,7 +17,9 @@ from typing import NamedTuple, TypeAlias, overload
 
 import numpy as np
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, standardised
+from push_predictor.evaluation.offline import report_windows
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.tails import Tails, half_widths
@@ -94,6 +98,12 @@ class LiveValidation:
         numbers, mean, covariance, _ = self._answers[model].sorted()
         table = self.models[model].continued(windows_to_table(self.windows.take(numbers)))
         return comparison_of(self.models[model], table, mean, covariance)
+
+    def reported(self) -> tuple[list[PushModel], WindowRows, list[Comparison]]:
+        """What `write_report` takes: the models that have predicted the same windows as the main one."""
+        comparisons = [self.comparison(k) for k in range(len(self.models))]
+        whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
+        return [self.models[k] for k in whole], self.predicted(), [comparisons[k] for k in whole]
 
     def residuals(self) -> Iterator[Residual]:
         """Every prediction, in the order of the windows."""
@@ -224,6 +234,22 @@ class RunningScore:
             shares = (float(c) / self.windows if self.windows else None for c in covered)
             found |= {f"coverage {level} {name}": share for name, share in zip(OUTPUTS, shares, strict=True)}
         return found
+
+
+def write_report(
+    pipe: object,
+    models: list[PushModel],
+    windows: WindowRows,
+    comparisons: list[Comparison],
+    folder: Path,
+    alarm: Mapping[str, object] | None,
+) -> None:
+    """Write FOLDER/report.html; a Child runs this. alarm: of the main model, as in validation.json."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that unfinished files are removed
+    try:
+        report_windows(models, windows, comparisons, folder, "online validation", alarm=alarm)
+    except (PushPredictorError, OSError) as error:
+        sys.exit(f"report: {' '.join(str(error).split())}")
 
 
 def write_window_log(

@@ -9,17 +9,17 @@ every prediction to the journal of the residuals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.recordings.atomic import append_lines
+from push_predictor.recordings.atomic import append_lines, write_whole
 from push_predictor.recordings.rig import Rig, save_rig
-from push_predictor.recordings.table import COLUMNS, OUTPUTS, PushTable
-from push_predictor.recordings.table_file import rig_path, write_table
+from push_predictor.recordings.table import COLUMNS, OUTPUTS
+from push_predictor.recordings.table_file import rig_path
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
 
@@ -37,6 +37,7 @@ class WindowTable:
     def __init__(self, folder: Path, rig: Rig) -> None:
         self.path, self._rig = folder / TABLE, rig
         self._names: tuple[str, ...] | None = None
+        self.failure = ""  # why no more windows are saved, in words
         self.cut_off: Path | None = None  # folder that an earlier, interrupted validation was moved to
 
     def add(
@@ -44,30 +45,32 @@ class WindowTable:
     ) -> None:
         """Append windows; `before` are all those that are in the file.
 
-        first: first value of each scalar topic, which windows before it get, as when a recording is read. Raises
-        OSError that names the path.
+        first: first value of each scalar topic, which windows before it get, as when a recording is read; without one
+        NaN. A full disk does not end the measurement: see `failure`.
         """
-        if not windows:
+        if not windows or self.failure:
             return
         names = tuple(dict.fromkeys(name for window in windows for name in window.covariates))
         try:
             if self._names is None or not set(names) <= set(self._names):
                 self._begin(tuple(dict.fromkeys([*(self._names or ()), *names])), before, first)
-            self._append(windows, first)
+            append_lines(self.path, self._rows(windows, first))
         except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self.path)) from None
+            self.failure = f"Windows are no longer saved: {error}"
 
     def _begin(self, names: tuple[str, ...], before: Sequence[PushWindow], first: Mapping[str, float]) -> None:
         if self._names is None:
             self.cut_off = put_aside(self.path.parent)
             ResidualJournal(self.path.parent).begin()
         self._names = names
-        write_table(self.path, _table(before, names, first))
+        lines = [",".join([*COLUMNS, *names]), *self._rows(before, first)]
+        write_whole(self.path, (f"{line}\n".encode() for line in lines))
         save_rig(self._rig, rig_path(self.path))
 
-    def _append(self, windows: Sequence[PushWindow], first: Mapping[str, float]) -> None:
-        assert self._names is not None
-        append_lines(self.path, (",".join(_cells(window, self._names, first)) for window in windows))
+    def _rows(self, windows: Sequence[PushWindow], first: Mapping[str, float]) -> Iterator[str]:
+        for window in windows:
+            covariates = (window.covariates.get(name, first.get(name, np.nan)) for name in self._names or ())
+            yield ",".join([*_cells(window), *map(repr, map(float, covariates))])
 
 
 class ResidualJournal:
@@ -89,10 +92,8 @@ class ResidualJournal:
         """Append a prediction (3,), (3, 3). A full disk does not end the measurement: see `failure`."""
         if self.failure:
             return
-        inputs = (window.velocity, window.contact, window.angle, window.duration)
         cells = [
-            *map(repr, map(float, (*inputs, *window.displacement))),
-            window.push_id,
+            *_cells(window),
             *(_quoted(model), str(window.index), str(window.end)),
             *map(repr, (*mean.tolist(), *covariance.ravel().tolist())),
         ]
@@ -119,25 +120,10 @@ def put_aside(folder: Path) -> Path | None:
     return place
 
 
-def _table(windows: Sequence[PushWindow], names: Sequence[str], first: Mapping[str, float]) -> PushTable:
-    """The windows as rows with exactly these covariates; a missing one gets its first value, or NaN."""
-    return PushTable(
-        np.array([[w.velocity, w.contact, w.angle] for w in windows]).reshape(-1, 3),
-        np.array([w.duration for w in windows]),
-        np.array([w.displacement for w in windows]).reshape(-1, 3),
-        np.array([w.push_id for w in windows], dtype=np.str_),
-        {name: np.array([_value(w, name, first) for w in windows]) for name in names},
-    )
-
-
-def _cells(w: PushWindow, names: Sequence[str], first: Mapping[str, float]) -> list[str]:
-    numbers = [w.velocity, w.contact, w.angle, w.duration, *w.displacement.tolist()]
-    others = [_value(w, name, first) for name in names]
-    return [*map(repr, map(float, numbers)), w.push_id, *map(repr, others)]
-
-
-def _value(window: PushWindow, name: str, first: Mapping[str, float]) -> float:
-    return float(window.covariates.get(name, first.get(name, np.nan)))
+def _cells(w: PushWindow) -> list[str]:
+    """Those of COLUMNS."""
+    numbers = (w.velocity, w.contact, w.angle, w.duration, *w.displacement.tolist())
+    return [*map(repr, map(float, numbers)), w.push_id]
 
 
 def _quoted(text: str) -> str:

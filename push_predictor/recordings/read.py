@@ -37,7 +37,7 @@ __all__ = ["Topics", "read_recording", "recorded_rig", "require_rig"]
 
 STATED = 3  # losses that an error states
 FAULTS = {
-    NO_ELEMENT: "messages lack the chosen element",
+    NO_ELEMENT: "messages lack the chosen element, or their matrix is no pose",
     UNREADABLE: "messages are not readable CDR",
     NOT_FINITE: "samples contain NaN or infinity",
     NO_ORIENTATION: "samples have no orientation",

@@ -3,5 +3,5 @@
 
 """Replay of a recording without ROS: clock, player, range, options, and a report with the lateness.
 
-`nodes.replay` and `nodes.push_replay` add publishers and services; import anything from here.
+`nodes.push_replay` and its modules add publishers and services; import anything from here.
 """

@@ -14,6 +14,7 @@ import pytest
 from repository import REPOSITORY
 
 from push_predictor.cli import build_parser
+from push_predictor.commands.common.options import with_signed_axes
 
 
 def parsers(parser: argparse.ArgumentParser, words: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -79,3 +80,18 @@ def test_the_command_line_page_has_every_option_of_a_command(words: tuple[str, .
     options = {option for action in parser_of(words)._actions for option in action.option_strings}
     missing = [option for option in options - {"-h", "--help"} if not re.search(rf"`{option}\b(?!-)", known)]
     assert not missing
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["check", "a", "--up", "-z"], ["check", "a", "--up=-z"]),
+        (["--up", "y", "-z"], ["--up", "y", "-z"]),
+        (["--up", "slider=-x", "--up", "-x"], ["--up", "slider=-x", "--up=-x"]),
+        (["--up", "-h"], ["--up", "-h"]),
+        (["--up"], ["--up"]),
+    ],
+)
+def test_an_axis_with_a_minus_is_the_value_of_up(words: list[str], found: list[str]) -> None:
+    assert with_signed_axes(words) == found
+    assert build_parser().parse_args(["check", "a", *with_signed_axes(["--up", "-y"])]).up == "-y"

@@ -36,7 +36,7 @@ from push_predictor.cli import main as push_predictor
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.server_client import PredictionClient
 from push_predictor.online.window_table import put_aside
 from push_predictor.recordings import atomic
 from push_predictor.recordings.atomic import append_lines

@@ -19,7 +19,7 @@ from validator_bench import HEXAGON
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.server_client import PredictionClient
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.srv import PredictPush
 

@@ -24,8 +24,8 @@ from validator_bench import Status, hosting_validator
 from msg_adapters import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.online import stream_sync
-from push_predictor.online.stream_sync import LAGS, Samples, StreamSync
+from push_predictor.online import stream_health
+from push_predictor.online.stream_health import LAGS, Samples, StreamSync
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
@@ -195,7 +195,7 @@ def test_an_occasional_lag_is_not_a_clock_offset() -> None:
 
 def test_reports_a_sensor_that_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
+    monkeypatch.setattr(stream_health, "monotonic", lambda: now[0])
     sync = StreamSync()
     sync.note(portion(0, 0))
     now[0] += 3.0

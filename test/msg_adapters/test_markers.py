@@ -15,13 +15,20 @@ from scipy.stats import chi2, f, norm, t
 from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
-from msg_adapters.markers import CHI2_95_OF_TWO, MAGNIFICATION, NORMAL_95, Sheet, magnified_markers
+from msg_adapters.markers import (
+    CHI2_95_OF_TWO,
+    MAGNIFICATION,
+    NORMAL_95,
+    Sheet,
+    error_in_sd,
+    magnified_markers,
+    window_markers,
+)
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.tails import STEPS, Tails
-from push_predictor.nodes.validator.publishers import error_in_sd, window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from made_up_windows import made_up_windows
 from rclpy.serialization import deserialize_message, serialize_message
 
-from msg_adapters import MessageError, ns_to_stamp, stamp_to_ns
+from msg_adapters import ns_to_stamp, stamp_to_ns
 from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from msg_adapters.markers import Sheet, confidence_ellipse, prediction_markers
 from msg_adapters.predictions import (
@@ -33,7 +33,7 @@ from msg_adapters.predictions import (
 from msg_adapters.residuals import residual_to_message
 from msg_adapters.rigs import rig_from_message, rig_to_message
 from push_predictor.error_codes import ErrorCode
-from push_predictor.errors import RigError
+from push_predictor.errors import RequestError, RigError
 from push_predictor.geometry.frames import to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
@@ -59,7 +59,7 @@ def test_a_stamp_survives_to_the_nanosecond(nanoseconds):
 
 
 def test_rejects_a_stamp_beyond_32_bit_seconds():
-    with pytest.raises(MessageError, match="stamp"):
+    with pytest.raises(RequestError, match="stamp"):
         ns_to_stamp(2**31 * 10**9)
 
 
@@ -178,7 +178,7 @@ def test_a_residual_survives():
 
 
 def test_rejects_a_covariance_that_is_not_positive_definite():
-    with pytest.raises(MessageError, match=r"covariance.*positive definite"):
+    with pytest.raises(RequestError, match=r"covariance.*positive definite"):
         residual_of(np.diag([1.0, 1.0, -1.0]), np.ones(3))
 
 

@@ -25,7 +25,6 @@ from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 from synthetic import square_pushes
 
-from msg_adapters import MessageError
 from msg_adapters.slider_poses import FLAT, fill_slider_response, world_push, world_slider
 from push_predictor.errors import RequestError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
@@ -187,7 +186,7 @@ def test_an_unknown_time_stays_unknown() -> None:
 
 
 def test_rejects_a_time_beyond_32_bit_seconds() -> None:
-    with pytest.raises(MessageError, match="stamp"):
+    with pytest.raises(RequestError, match="stamp"):
         answered(slider_request(duration=1e10), SliderAfter(np.zeros(3), COVARIANCE, False))
 
 

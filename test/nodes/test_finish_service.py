@@ -47,7 +47,7 @@ def finish_service(service: Service, session: Session, missing: str = "") -> Fin
     node: Any = SimpleNamespace(create_service=service.create)
     models: Any = SimpleNamespace(missing=missing)
     rigs: Any = SimpleNamespace(missing="")
-    writer: Any = SimpleNamespace(folder=Path("result"), report=SimpleNamespace(busy=False, failed=False))
+    writer: Any = SimpleNamespace(folder=Path("result"), report=SimpleNamespace(alive=False, status=lambda: 0))
     return FinishService(node, session, models, rigs, writer)
 
 
@@ -83,18 +83,18 @@ def ended_run(session: Session, finish: FinishService) -> None:
 def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() -> None:
     service, session = Service(), Session(last_answers=30.0, report=True)
     finish = finish_service(service, session)
-    report: Any = finish._writer.report  # a fake, where `busy` is no property
+    report: Any = finish._writer.report  # a fake, where `alive` is no property
     service.call("first")
     ended_run(session, finish)
     session.written()
-    report.busy = True
+    report.alive = True
     finish.answer()
     assert not service.responses and not finish.requested, "nobody waits for the end of the next run"
     session.open(0.2)
     assert not session.drain_if_due(0.3, finish.requested, rig_changed=False)
     finish.answer()
     assert not service.responses
-    report.busy = False
+    report.alive = False
     finish.answer()
     finish.answer()
     assert [caller for caller, _ in service.responses] == ["first"]
@@ -107,7 +107,7 @@ def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
     service, session = Service(), Session(last_answers=30.0, report=True)
     finish = finish_service(service, session)
     report: Any = finish._writer.report
-    report.busy = True
+    report.alive = True
     for caller in ("first", "second"):
         service.call(caller)
         ended_run(session, finish)
@@ -117,7 +117,7 @@ def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
     finish.work()
     finish.answer()
     assert not service.responses
-    report.busy = False
+    report.alive = False
     finish.answer()
     assert sorted(caller for caller, _ in service.responses) == ["first", "second", "third"]
 
@@ -126,14 +126,14 @@ def test_a_caller_gets_the_failure_of_its_own_run() -> None:
     service, session = Service(), Session(last_answers=30.0, report=False)
     finish = finish_service(service, session)
     report: Any = finish._writer.report
-    report.busy = True
+    report.alive = True
     service.call("caller")
     ended_run(session, finish)
     session.failed("disk full")
     finish.answer()
     session.drain_if_due(0.2, finish_requested=True, rig_changed=False)
     session.written()
-    report.busy = False
+    report.alive = False
     finish.answer()
     assert [(r.success, r.message) for _, r in service.responses] == [(False, "disk full")]
 
@@ -175,8 +175,8 @@ def test_the_end_of_the_node_answers_those_who_wait_for_a_report() -> None:
     service, session = Service(), Session(last_answers=30.0, report=True)
     finish = finish_service(service, session)
     writer: Any = finish._writer
-    writer.report.busy = True
-    writer.close = lambda: vars(writer.report).update(busy=False, failed=True)
+    writer.report.alive = True
+    writer.close = lambda: vars(writer.report).update(alive=False, status=lambda: 1)
     service.call("caller")
     ended_run(session, finish)
     session.written()

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which messages a subscription that follows its publishers counts as lost."""
+"""A subscription that follows its publishers: which messages it counts as lost, and which types it refuses."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ import pytest
 pytest.importorskip("rclpy")
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.nodes import polling
 from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.nodes.validator import live_streams
+from push_predictor.nodes.validator.live_streams import TransformTopics
+from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 
 
 class Topic:
@@ -25,12 +29,12 @@ class Topic:
         self._waiting: list[Taken] = []
         node: Any = SimpleNamespace(
             resolve_topic_name=str,
-            get_publishers_info_by_topic=lambda _: [None] * self.publishers,
+            get_publishers_info_by_topic=lambda _: [SimpleNamespace(topic_type="of another type")] * self.publishers,
             count_publishers=lambda _: self.publishers,
         )
         monkeypatch.setattr(polling, "take_all", self._take_all)
         monkeypatch.setattr(polling, "time_ns", lambda: self._now)
-        self.subscription = FollowingSubscription(node, "/slider/pose")
+        self.subscription = FollowingSubscription(node, "/slider/pose", str)
         self.subscription._subscription = node
 
     def _take_all(self, _: object) -> list[Taken]:
@@ -47,7 +51,7 @@ class Topic:
         """The node looks at the publishers, of which there are this many."""
         self._now += 1
         self.publishers = publishers
-        self.subscription.publishers()
+        self.subscription.look()
 
     def lost(self) -> int:
         list(self.subscription.taken())
@@ -112,6 +116,19 @@ def test_no_message_is_lost_when_another_publisher_comes_between_two_looks(topic
     assert topic.lost() == 0
 
 
+def test_a_topic_was_heard_with_its_last_message_or_publisher(topic: Topic, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [10.0]
+    monkeypatch.setattr(polling, "monotonic", lambda: now[0])
+    topic.look(0)
+    now[0] = 20.0
+    topic.look(1)
+    now[0] = 30.0
+    topic.look(1)
+    assert topic.subscription.heard == 20.0, "when its publisher came"
+    topic.send(1)
+    assert topic.lost() == 0 and topic.subscription.heard == 30.0
+
+
 def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hidden() -> None:
     """As while another stream of the node still has a subscription of another type."""
     outcomes: list[Any] = [rclpy_implementation.RCLError("incompatible type"), RuntimeError("a bug"), SimpleNamespace()]
@@ -121,11 +138,25 @@ def test_a_subscription_that_rcl_refuses_is_tried_again_and_no_other_error_is_hi
             raise outcome
         return outcome
 
-    node: Any = SimpleNamespace(resolve_topic_name=str, create_subscription=create)
-    subscription = FollowingSubscription(node, "/slider/pose")
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+    node: Any = SimpleNamespace(
+        resolve_topic_name=str, create_subscription=create, get_publishers_info_by_topic=lambda _: []
+    )
+    subscription = FollowingSubscription(node, "/slider/pose", lambda kind: "", first="geometry_msgs/msg/PoseStamped")
+    subscription.look()
     with pytest.raises(RuntimeError, match="a bug"):
-        subscription.follow("geometry_msgs/msg/PoseStamped", [])
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
-    subscription.follow("geometry_msgs/msg/PoseStamped", [])
+        subscription.look()
+    subscription.look()
+    subscription.look()
     assert not outcomes, "once it exists, it is kept"
+
+
+def test_tf_without_its_message_package_is_refused_with_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_installed(kind: str) -> type:
+        raise PushPredictorError(f"type {kind} is not installed (No module named 'tf2_msgs')")
+
+    monkeypatch.setattr(live_streams, "message_class", not_installed)
+    monkeypatch.setattr(polling, "_overriding", lambda *_: None)
+    node: Any = SimpleNamespace(resolve_topic_name=str, get_publishers_info_by_topic=lambda _: [])
+    topics = TransformTopics(node, "/tf", TransformBuffer([]))
+    topics.look()
+    assert topics.problem == topics.refusal and "install ros-jazzy-tf2-msgs" in topics.problem

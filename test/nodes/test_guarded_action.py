@@ -12,8 +12,8 @@ import pytest
 from rclpy.action import GoalResponse
 
 from push_predictor.errors import InactiveError
-from push_predictor.nodes.server import guarded_action
-from push_predictor.nodes.server.guarded_action import GuardedAction
+from push_predictor.nodes.server import actions
+from push_predictor.nodes.server.actions import GuardedAction
 from push_predictor_interfaces.action import SuggestPushes
 
 
@@ -40,8 +40,8 @@ class Middleware:
 
 
 def action_of(middleware: Any, monkeypatch: pytest.MonkeyPatch, may_begin: Any = lambda: None) -> GuardedAction:
-    monkeypatch.setattr(guarded_action, "ActionServer", middleware.create)
-    monkeypatch.setattr(guarded_action, "SENDING", 0.0)
+    monkeypatch.setattr(actions, "ActionServer", middleware.create)
+    monkeypatch.setattr(actions, "SENDING", 0.0)
     result = SuggestPushes.Result(success=True)
     return GuardedAction(middleware, SuggestPushes, "suggest", lambda *_: result, may_begin, lambda: None)
 

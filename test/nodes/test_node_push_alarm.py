@@ -240,7 +240,7 @@ def test_too_few_training_pushes_turn_the_alarm_off_with_a_reason():
 def test_a_killed_alarm_process_does_not_end_the_node():
     alarm = AlarmProcess(0.01, lambda state, end: pytest.fail("it must not fire"))
     alarm.prepare(analytical(pushes=20))
-    assert alarm._child is not None
+    assert alarm._child.process is not None
     alarm._child.process.kill()
     assert wait_until(lambda: (alarm.work(), not alarm.busy)[1], 30.0)
     assert "ended" in alarm.off and alarm.json["fired"] is False

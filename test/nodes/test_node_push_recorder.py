@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -307,6 +308,15 @@ def test_two_types_at_once_are_named(tmp_path: Path) -> None:
         types = "std_msgs/msg/Float64 and std_msgs/msg/String"
         expected = f"/warmth has publishers of the types {types}. One type is accepted."
         assert listening.until(lambda: listening.problem("/warmth") == expected)
+
+
+def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
+    offered = [SimpleNamespace(topic_type="lab_msgs/msg/Warmth")]
+    node: Any = SimpleNamespace(resolve_topic_name=str, get_publishers_info_by_topic=lambda topic: offered)
+    recording = LiveRecording(tmp_path / "a", Topics("/a", "/b", "/c", ("/warmth",)), 0.0, with_wrench=False)
+    RecorderSubscriptions(node, recording).look()
+    problem = recording.progress(0.0).problems["/warmth"]
+    assert problem.startswith("/warmth is not recorded: type lab_msgs/msg/Warmth is not installed (")
 
 
 def test_with_simulated_time_messages_wait_for_the_clock_and_get_its_time(tmp_path: Path) -> None:

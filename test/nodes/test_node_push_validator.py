@@ -64,11 +64,11 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import push_validator
-from push_predictor.nodes.validator import publishers
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator import results
+from push_predictor.nodes.validator.results import ResultWriter
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online import session
-from push_predictor.online.stream_sync import Samples
+from push_predictor.online.stream_health import Samples
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
@@ -595,7 +595,7 @@ def test_the_log_names_a_report_that_the_end_interrupts():
     logged: list[str] = []
     writer = ResultWriter("", SimpleNamespace(warning=logged.append))
     stopped: list[bool] = []
-    writer.report = SimpleNamespace(busy=True, stop=lambda: stopped.append(True))
+    writer.report = SimpleNamespace(alive=True, stop=lambda: stopped.append(True))
     writer.close()
     assert stopped == [True] and "The report was interrupted" in logged[0]
 
@@ -603,11 +603,11 @@ def test_the_log_names_a_report_that_the_end_interrupts():
 def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyPatch):
     """Calls the class itself: without a subscriber nothing can be received."""
     made: list[Any] = []
-    monkeypatch.setattr(publishers, "window_markers", lambda *of_what: made.append(of_what))
+    monkeypatch.setattr(results, "window_markers", lambda *of_what: made.append(of_what))
     for subscribers in (0, 1):
         topic = SimpleNamespace(get_subscription_count=lambda count=subscribers: count, publish=lambda message: None)
         node = SimpleNamespace(create_publisher=lambda *of_what, topic=topic: topic, get_logger=lambda: None)
-        publishers.ResultPublishers(node, lambda: "world").publish("rig", 0, "window", "prediction", "residual")
+        results.ResultPublishers(node, lambda: "world").publish("rig", 0, "window", "prediction", "residual")
         assert len(made) == subscribers
 
 

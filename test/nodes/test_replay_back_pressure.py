@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from push_predictor.nodes.replay import topics
-from push_predictor.nodes.replay.topics import PARTS, PATIENCE, ReplayTopics
+from push_predictor.nodes import replay_topics
+from push_predictor.nodes.replay_topics import PARTS, PATIENCE, ReplayTopics
 from push_predictor.recordings.bag.messages import RawMessage
 
 TOPIC, OTHER = "/slider/pose", "/pusher/pose"
@@ -57,7 +57,7 @@ def replay(clock: Clock, since: float, *, ending: bool = False, **profile: Any) 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     found = Clock()
-    monkeypatch.setattr(topics, "time", found)
+    monkeypatch.setattr(replay_topics, "time", found)
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from push_predictor.nodes.replay.controls import ReplayControls
+from push_predictor.nodes.replay_controls import ReplayControls
 from push_predictor_interfaces import srv
 
 NAMES = {
@@ -41,7 +41,7 @@ class FakeNode:
         self.services[name] = (kind, callback)
 
     def get_logger(self) -> Any:
-        return SimpleNamespace(warning=self.logged.append, error=self.logged.append)
+        return SimpleNamespace(warning=lambda text, **_: self.logged.append(text), error=self.logged.append)
 
 
 class FakePlayer:

@@ -17,7 +17,8 @@ from push_predictor.nodes import runtime
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR
 from push_predictor.nodes.parameters import Param, native
 from push_predictor.nodes.push_replay import PushReplay
-from push_predictor.nodes.replay.topics import is_played
+from push_predictor.nodes.replay_topics import is_played
+from push_predictor.recordings.topics import KEYS
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,12 @@ def test_bad_parameter_ends_in_one_line_and_status_1(
     given = {"recording": second, **params} if params else {}
     line = refused_start(partial(runtime.run, "push_replay", PushReplay), monkeypatch, capfd, **given)
     assert line.startswith("push_replay: ") and text in line
+
+
+def test_every_node_that_reads_streams_has_a_parameter_for_each_option_of_topics() -> None:
+    recorder, replay, validator = ({p.name for p in each} for each in (PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR))
+    assert set(KEYS) <= recorder and set(KEYS) <= validator
+    assert set(KEYS) - {"wrench_bias", "covariate_topics"} <= replay
 
 
 @pytest.mark.parametrize("table", [PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR])

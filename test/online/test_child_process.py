@@ -27,12 +27,12 @@ def report(connection: Connection) -> None:
 def test_no_sigint_reaches_a_child_and_the_parent_still_gets_it() -> None:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     child = Child("report", report)
+    child.start()
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
-    assert child.process.daemon and child.process.name == "report"
+    assert child.process is not None and child.process.daemon and child.process.name == "report"
     assert child.received(60.0) == (True, False, os.environ["OPENBLAS_NUM_THREADS"])
     kill_children()
-    child.process.join(60.0)
-    assert child.process.exitcode == -signal.SIGKILL
+    assert child.status(60.0) == -signal.SIGKILL
     with pytest.raises(EOFError):
         child.received()
 
@@ -52,14 +52,15 @@ def test_an_alarm_during_the_start_of_a_child_waits_until_the_child_has_its_data
 
     spawn, before = util.spawnv_passfds, signal.signal(signal.SIGALRM, interrupt)
     try:
-        Child("report", report).stop()  # with it the process that multiprocessing starts once
+        child = Child("report", report)
+        child.start()  # with it the process that multiprocessing starts once
         monkeypatch.setattr(util, "spawnv_passfds", begun_when_the_alarm_comes)
         with pytest.raises(KeyboardInterrupt):
-            Child("report", report)
+            child.start()  # ends the first one
         assert signal.getsignal(signal.SIGALRM) is interrupt
     finally:
         signal.signal(signal.SIGALRM, before)
-    (child,) = multiprocessing.active_children()
+    (interrupted,) = multiprocessing.active_children()
     kill_children()
-    child.join(60.0)
+    interrupted.join(60.0)
     assert "Traceback" not in capfd.readouterr().err

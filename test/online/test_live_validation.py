@@ -248,3 +248,14 @@ def test_detects_a_model_of_another_slider_or_pusher(models: dict[str, PushModel
     assert "'rect1'" in rig_difference(models["gp"], circle) and "'ellip1'" in rig_difference(models["gp"], circle)
     thick = rig_difference(models["gp"], Rig("rect1", own.outline, 0.01, "abs", 0.8))
     assert "0.00475" in thick and "0.01" in thick
+
+
+def test_a_report_compares_the_models_that_predicted_the_windows_of_the_main_one(models: dict[str, PushModel]) -> None:
+    windows = made_up_windows(6, seed=2)
+    live = answered(models, windows)
+    assert [model.kind for model in live.reported()[0]] == ["gp", "analytical"]
+    number = live.add(windows[0])
+    live.record(0, number, predict(live.models[0], windows[0]))
+    live.refuse(1, number, "the covariate is missing")
+    kinds, shown, comparisons = live.reported()
+    assert [model.kind for model in kinds] == ["gp"] and len(shown) == len(comparisons[0].observed) == 7

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from push_predictor.online import report_process
+from push_predictor.online import live_validation
 
 FIRED = {"fired": True}
 
@@ -30,20 +30,20 @@ def handlers() -> Iterator[None]:
 @pytest.mark.usefixtures("handlers")
 def test_report_has_the_alarm_of_the_live_validation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
-    monkeypatch.setattr(report_process, "report_windows", lambda *_, **named: given.update(named))
-    report_process._write(None, [], None, [], tmp_path, FIRED)  # type: ignore[arg-type]  # what draws them is replaced
+    monkeypatch.setattr(live_validation, "report_windows", lambda *_, **named: given.update(named))
+    live_validation.write_report(None, [], live_validation.WindowRows(), [], tmp_path, FIRED)
     assert given == {"alarm": FIRED}
 
 
 @pytest.mark.ros
 @pytest.mark.parametrize(("alarm", "expected"), [(SimpleNamespace(json=FIRED), FIRED), (None, None)])
 def test_validator_passes_its_alarm_to_the_report(tmp_path: Path, alarm: Any, expected: object) -> None:
-    from push_predictor.nodes.validator.result_writer import ResultWriter
+    from push_predictor.nodes.validator.results import ResultWriter
 
     started: list[object] = []
-    live = SimpleNamespace(names=[], windows=[1], predicted=lambda: [1])
+    live = SimpleNamespace(names=[], windows=[1], predicted=lambda: [1], reported=lambda: ("reported",))
     run: Any = SimpleNamespace(validation=live, alarm=alarm, write=lambda folder: [folder / "validation.json"])
     writer = ResultWriter(str(tmp_path), SimpleNamespace(info=lambda text: None))
     writer.report = SimpleNamespace(start=lambda *arguments: started.extend(arguments))  # type: ignore[assignment]
     assert not writer.write(run, with_report=True)
-    assert started == [live, tmp_path, expected]
+    assert started == ["reported", tmp_path, expected]

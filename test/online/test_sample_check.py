@@ -18,7 +18,7 @@ from mistakes import force_turned, late, scaled
 from repository import REPOSITORY
 
 from push_predictor.online.check_process import FIRST, MOST, CheckProcess, SampleCheck
-from push_predictor.online.stream_sync import Samples
+from push_predictor.online.stream_health import Samples
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.replay.report import Delays, ReplayReport

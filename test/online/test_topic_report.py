@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_predictor.online.topic_report import ReportLog, TopicReport, stamp_figures
+from push_predictor.online.stream_health import ReportLog, TopicReport, stamp_figures
 
 SECOND = 1_000_000_000
 REPORT = TopicReport("slider", "/vicon/block", "geometry_msgs/msg/PoseStamped", "best effort", ("world",))

@@ -216,7 +216,8 @@ def test_recorded_windows_get_the_prediction_of_the_validator() -> None:
     tips = np.column_stack([recording.pusher.x, recording.pusher.y])
     pusher.extend(pusher.order.take(recording.pusher.stamp, tips, True), origin)
     for window, pose, spread, in_domain in zip(windows, poses, spreads, shown.in_domain, strict=True):
-        (place,), (velocity,) = pusher_motion(pusher, np.array([window.start - origin]) * NANOSECOND)
+        begin, end = (np.array([stamp - origin]) * NANOSECOND for stamp in (window.start, window.end))
+        (place,), (velocity,) = pusher_motion(pusher, begin, end)
         push = WorldPush(window.slider_start, place, velocity, window.duration, window.covariates)
         after = slider_after(tabulated, push)
         np.testing.assert_allclose(after.pose, pose, rtol=0.0, atol=1e-9)

@@ -30,8 +30,8 @@ from validator_bench import hosting_replay, hosting_validator
 from visualization_msgs.msg import Marker
 
 from docs.pictures.draw_rviz import as_fields, translated
+from msg_adapters.markers import window_markers
 from push_predictor.models.prediction import Prediction
-from push_predictor.nodes.validator.publishers import window_markers
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.windows.push_window import PushWindow
 

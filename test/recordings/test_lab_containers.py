@@ -191,7 +191,7 @@ def test_a_rig_in_the_metadata_of_a_db3_folder_is_read(tmp_path: Path) -> None:
 
 def test_a_damaged_name_in_the_tables_of_a_db3_file_is_refused_in_one_line(tmp_path: Path) -> None:
     path = db3_file(vicon_and_ur(), tmp_path / "lab")
-    before, found, after = path.read_bytes().rpartition(b"name TEXT NOT NULL,\n      type")
+    before, found, after = path.read_bytes().rpartition(b"KEY,\n      name TEXT NOT NULL,\n      type")
     assert found
     path.write_bytes(before + b"\xf1" + found[1:] + after)
     with pytest.raises(RecordingError, match="is not a readable sqlite3 bag of rosbag2"):

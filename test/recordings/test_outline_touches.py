@@ -16,7 +16,7 @@ from push_predictor.recordings.checks.geometry import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem
 
-CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06])
+CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06, 0.01, 0.002, -0.003])
 STEP = 1e-6
 NEAR_CORNERS = 0.02  # share of the tips whose nearest side changes within a step
 

@@ -181,9 +181,11 @@ def test_bags_compressed_by_rosbag2_are_decompressed(tmp_path: Path, recording: 
         topics = {name: writer.add_connection(name, kind, typestore=store) for name, kind in bag.topics.items()}
         for message in bag.messages():
             writer.write(topics[message.topic], message.log_time, message.data)
-    read = read_recording(tmp_path / "packed")
-    assert read.notes == ()
-    np.testing.assert_array_equal(read.slider.x, recording.slider.x)
+    for _ in range(2):
+        read = read_recording(tmp_path / "packed")
+        assert read.notes == ()
+        np.testing.assert_array_equal(read.slider.x, recording.slider.x)
+        (tmp_path / "packed" / "metadata.yaml").unlink(missing_ok=True)  # the bytes show the compression
     if mode == "FILE":
         (tmp_path / "packed" / "packed.mcap.zstd").write_bytes(b"no zstd")
         with pytest.raises(RecordingError, match=r"packed\.mcap\.zstd: cannot be decompressed"):

@@ -15,8 +15,8 @@ from replay_bags import stamped
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.nodes.validator.scalar_topics import DELAY, STALE, ClockHistory
-from push_predictor.online import stream_sync
-from push_predictor.online.stream_sync import StreamSync
+from push_predictor.online import stream_health
+from push_predictor.online.stream_health import StreamSync
 from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
@@ -247,7 +247,7 @@ def samples(recording: Recording, end: float, **named: float) -> Samples:
 
 def test_late_scalar_is_waited_for_a_limited_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
+    monkeypatch.setattr(stream_health, "monotonic", lambda: now[0])
     recording = translating_push(Push(0.5, 8.0))
     pace = StreamSync(["/warmth", "/absent"])
     pace.note(samples(recording, 1.0, warmth=0.9))

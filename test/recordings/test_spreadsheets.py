@@ -122,6 +122,8 @@ def test_the_columns_of_other_files_keep_their_names(tmp_path: Path) -> None:
         (b"time;x;y;z;heading\n1,5;2;3;4;5\n1.5;2;3;4;5\n", "line 2: column time is '1,5', give s .* with a decimal"),
         (b"time;x;y;z;heading\n1;2;3;4;5\n1;2,5;3.5;4;5\n", "line 3: column x is '2,5', give a number with a decimal"),
         (b"time;x;y;z;heading\n1;1.234,5;3;4;5\n", r"line 2: column x is '1\.234,5', give a number with a decimal"),
+        (b"time,x,y,z,heading\n0,5,1,2,3,4,5\n", "line 2: 7 cells, the header has 5; numbers with a decimal comma"),
+        (b"time,x,y,z,heading\n1,2,3,4\n", "line 2: 4 cells, the header has 5$"),
         (b"time;x;y;z\n1;2;3;4\n", "line 1: the header is 'time,x,y,z', give 'time,x,y,z,qx"),
         (b"time,x,y,z,heading,heading\n1,2,3,4,5,6\n", "line 1: the header is"),
         ("zeit;x;y;z;höhe\n1;2;3;4;5\n".encode("cp1252"), "cannot be read as CSV .it is not UTF-8 text; save"),

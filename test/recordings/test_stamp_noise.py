@@ -19,7 +19,7 @@ from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.online.topic_report import stamp_figures
+from push_predictor.online.stream_health import stamp_figures
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken

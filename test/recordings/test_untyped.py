@@ -137,3 +137,14 @@ def test_a_wrench_that_fits_no_type_is_a_loss_that_check_names(tmp_path: Path) -
 def test_a_quaternion_of_32_bits_is_one(tmp_path: Path) -> None:
     half = float(np.float32(np.sqrt(0.5)))
     assert told_type([message(**{"pose.orientation.w": half, "pose.orientation.z": half})], [POSE.name]) == POSE.name
+
+
+@pytest.mark.parametrize("untyped", [0, 1])
+def test_a_type_that_one_file_of_a_bag_has_is_that_of_the_others(tmp_path: Path, untyped: int) -> None:
+    for number in range(2):
+        lab = laboratory(short_recording(1.0, after=float(number)))
+        topics = list(lab.kinds) if number == untyped else []
+        write_without_schema(lab, tmp_path / f"part_{number}.mcap", *topics)
+    found = read_recording(tmp_path, topics=LABORATORY)
+    assert len(found.slider) == len(short().slider) and not found.losses
+    assert not any("without a schema" in note for note in found.notes)

@@ -16,6 +16,7 @@ from lab_bags import LATENCY, Lab, pose_rows, short_recording
 from test_lab_topics import assert_same_windows, original
 
 from push_predictor.errors import RecordingError, RequestError
+from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, turned
 from push_predictor.recordings.fields.up_axis import UP_AXES, bodies_z_up, wrenches_z_up, z_up
 from push_predictor.recordings.read import read_recording
@@ -200,12 +201,19 @@ def test_transforms_have_the_time_of_the_log_as_well(tmp_path: Path) -> None:
     assert not read_recording(tmp_path / "a.mcap", topics=Topics("/tf:block")).slider.stamp.any()
 
 
-def test_live_samples_have_the_time_of_receipt() -> None:
-    lab = zero_stamps("/slider/pose")
-    sent = [(stamp - 5, topic, data) for stamp, topic, data in lab.in_order()]
-    found = decoded(decoder_of(lab, Topics(stamp="log")), lab, in_portions(sent, 50), live=True)
-    assert found.slider.stamp.tolist() == [t for t, topic, _ in sent if topic == "/slider/pose"]
-    assert found.pusher.stamp.tolist() == [t for t, topic, _ in sent if topic == "/pusher/pose"]
+def test_live_samples_have_the_time_of_receipt_not_that_of_sending() -> None:
+    whole = short_recording(1.0)
+    lab, later = zero_stamps("/slider/pose"), 5_000_000
+    lab.transform("/tf", "world", "tip", whole.pusher.stamp, pose_rows(whole.pusher))
+    decoder = decoder_of(lab, Topics(pusher="/tf:tip", stamp="log"))
+    sent: dict[str, np.ndarray] = {}
+    for topic in lab.kinds:
+        own = [message for message in lab.in_order() if message[1] == topic]
+        sent[topic] = np.array([time for time, *_ in own])
+        decoder.put(Messages.of(topic, lab.kinds[topic], sent[topic], [data for *_, data in own]), sent[topic] + later)
+    found = decoder.take(last=True)
+    assert found.slider.stamp.tolist() == (sent["/slider/pose"] + later).tolist()
+    assert found.pusher.stamp.tolist() == (sent["/tf"] + later).tolist()
 
 
 def test_another_stamp_is_refused() -> None:

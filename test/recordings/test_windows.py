@@ -306,7 +306,7 @@ def test_lines_through_the_tip_give_its_place_and_velocity_between_samples() -> 
     tip = np.column_stack([0.03 * time, 0.1 - 0.02 * time, 0.0 * time])
     pusher.extend(pusher.order.take(np.rint(1e9 * time).astype(np.int64), tip, True), 0)
     begin = np.array([0.0413, 0.2001, 0.3])
-    place, velocity = pusher_motion(pusher, begin)
+    place, velocity = pusher_motion(pusher, begin, begin + 0.2)
     np.testing.assert_allclose(place, np.column_stack([0.03 * begin, 0.1 - 0.02 * begin]), atol=1e-12)
     np.testing.assert_allclose(velocity, np.tile([0.03, -0.02], (3, 1)), atol=1e-10)
 

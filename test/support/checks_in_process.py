@@ -16,14 +16,19 @@ from push_predictor.online import check_process
 class Here:
     """A Child that works at once, in this process."""
 
-    def __init__(self, name: str, work: Callable[..., None], *arguments: object) -> None:
-        self._sent: list[object] = []
-        work(SimpleNamespace(send=self._sent.append), *arguments)
+    def __init__(self, name: str, work: Callable[..., None]) -> None:
+        self._work, self._sent = work, list[object]()
+        self.started = False
+
+    def start(self, *arguments: object) -> None:
+        self._work(SimpleNamespace(send=self._sent.append), *arguments)
+        self.started = True
 
     def received(self) -> object:
-        return self._sent.pop(0)
+        return self._sent.pop(0) if self._sent else None
 
-    def stop(self) -> None: ...
+    def stop(self) -> None:
+        self.started = False
 
 
 @contextmanager

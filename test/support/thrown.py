@@ -70,7 +70,7 @@ OPTIONS = {
     "trace": ("--covariates", "--alpha", "--seed"),
     "validate": ("--false-alarm-rate",),
     "predict": ("--duration", "--covariate", "--json"),
-    "suggest": ("--count", "--travel", "--covariate"),
+    "suggest": ("--travel", "--covariate"),
     "rig": ("--tip-radius", "--mass", "--keep-origin"),
     "simulate": ("--speed", "--travel", "--seed"),
 }
@@ -120,7 +120,7 @@ class Thrower:
     def call(self, number: int) -> list[str]:
         """The arguments of a call; its files are written."""
         rng = np.random.default_rng(number)
-        command = str(rng.choice([*READING, *READING, "predict", "import", "simulate"]))
+        command = str(rng.choice([*READING, *READING, "predict", "import", "simulate", "report", "record"]))
         of_data = OPTIONS["of data"] if command in READING else ()
         words = self._positional(rng, command)
         if of_data and rng.random() < 0.6:
@@ -128,7 +128,7 @@ class Thrower:
             words += ["--rig", str(self._folder / "sound.yaml"), *_topics(rng)]
         for option in rng.permutation([*of_data, *OPTIONS.get(command, ())])[: rng.integers(4)].tolist():
             words += [option] if option in FLAGS else [option, self._value(rng, option)]
-        if command in ("train", "suggest", "rig", "import", "simulate"):
+        if command in ("train", "suggest", "rig", "import", "simulate", "report"):
             words += ["--out", str(self._folder / "out" / str(number))]
         return [command, *words]
 
@@ -138,8 +138,11 @@ class Thrower:
             "train": [data, "--kind", "analytical"],
             "info": [model if rng.random() < 0.3 else data],
             "check": [data],
-            "suggest": [model, *(["--matter", data] if rng.random() < 0.5 else [])],
+            "suggest": [model, "--count", "1", *(["--matter", data] if rng.random() < 0.5 else [])],
             "rig": ["--from", data] if rng.random() < 0.7 else [],
+            "report": ["validation", model, "--recording", data],
+            # The output exists, so that no recorder starts.
+            "record": ["--out", str(self._folder), *self._valued(rng, "--duration", "--up", "--wrench-bias")],
             "predict": [model, *self._valued(rng, "--velocity", "--angle"), "--contact", "0.1"],
             "import": [str(rng.choice(["mit", "mit-square", "mlab", "mcube", "rosbag1"])), data],
             "simulate": ["--shape", "rect1", "--surface", "abs", "--pushes", "0", *self._valued(rng, "--speed")],

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.topics import Topics
 
+SIGNED_AXES = ("-x", "-y", "-z")
 HELP_WIDTH = 100  # characters
 
 
@@ -137,6 +138,17 @@ def add_topics(parser: argparse.ArgumentParser, saves: bool = False) -> None:
     )
     if not saves:
         group.add_argument("--save-topics", action="store_true", help="save these options in NAME.recording.yaml")
+
+
+def with_signed_axes(words: Sequence[str]) -> list[str]:
+    """The words of a call with `--up -z` as `--up=-z`: the parser takes `-z` for an option."""
+    found: list[str] = []
+    for word in words:
+        if found[-1:] == ["--up"] and word in SIGNED_AXES:
+            found[-1] = f"--up={word}"
+        else:
+            found.append(word)
+    return found
 
 
 def topics_of(options: argparse.Namespace) -> Topics:

@@ -12,8 +12,8 @@ from std_srvs.srv import Trigger
 
 from push_predictor.nodes.polling import NoExecutor, not_called, take_request
 from push_predictor.nodes.rig_source import RigSource
-from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.results import ResultWriter
+from push_predictor.nodes.validator.server_client import ModelSource
 from push_predictor.online.session import Session, State
 
 
@@ -49,7 +49,7 @@ class FinishService:
 
     def answer(self) -> None:
         """Answer the callers for whom nothing is left to be done; call it each turn, after the session's step."""
-        draining, busy = self._session.state is State.DRAINING, self._writer.report.busy
+        draining, busy = self._session.state is State.DRAINING, self._writer.report.alive
         if self._served and self._failure is None and not draining:
             self._failure = self._session.failure
         if self._served and self._failure is not None and not busy:
@@ -65,7 +65,7 @@ class FinishService:
         output = self._writer.folder
         if problem := failure or self._models.missing or self._rigs.missing:
             return Trigger.Response(success=False, message=problem)
-        if self._writer.report.failed:
+        if self._writer.report.status():
             text = f"The result is in {output}. The report failed: see the log of the node."
             return Trigger.Response(success=False, message=text)
         if self._session.state is State.WAITING:

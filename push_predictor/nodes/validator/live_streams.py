@@ -11,12 +11,11 @@ from time import monotonic
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.polling import FollowingSubscription, Taken
-from push_predictor.nodes.qos import DEEPEST
-from push_predictor.online.topic_report import TopicReport, stamp_figures
+from push_predictor.nodes.qos import DEEPEST, message_class
+from push_predictor.online.stream_health import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.sources import STATIC
@@ -40,110 +39,70 @@ class TopicStream:
 
     def __init__(self, node: Node, own: TopicInput, earlier: bool = False) -> None:
         self.input = own
-        topic = own.source.topic
-        self._subscription = FollowingSubscription(node, topic, DEEPEST, earlier=earlier, overridable=not earlier)
-        self.name = self._subscription.name + own.source.text[len(topic) :]  # after remapping, for people
-        self.refusals: dict[str, str] = {}  # by type
-        self._offered: list[tuple[str, ReliabilityPolicy]] = []  # type and reliability of each publisher
-        self._heard = monotonic()  # when the last message came, or the last publisher
-        if own.target.type and not own.source.field:
-            self._follow(own.target.type, [])
+        topic, first = own.source.topic, "" if own.source.field else own.target.type
+        self.subscription = FollowingSubscription(
+            node, topic, self._unfit, DEEPEST, first=first, earlier=earlier, overridable=not earlier
+        )
+        self.name = self.subscription.name + own.source.text[len(topic) :]  # after remapping, for people
+        self._known: dict[str, str] = {}  # why a type does not fit, '' if it does
 
     @property
     def lost(self) -> int:
         """How many messages were overwritten or missed."""
-        return self._subscription.lost
-
-    @property
-    def kinds(self) -> list[str]:
-        """The types of the publishers."""
-        return sorted({kind for kind, _ in self._offered})
-
-    @property
-    def refused(self) -> bool:
-        """Whether there are publishers, but not of one type that fits."""
-        return bool(self._offered) and len(self._usable()) != 1
-
-    @property
-    def refusal(self) -> str:
-        """Why the types of the publishers do not fit."""
-        return next(iter(filter(None, map(self.refusals.get, self.kinds))), "One type of publishers is accepted.")
+        return self.subscription.lost
 
     def look(self) -> None:
         """Subscribe to the type that the publishers have, as they offer it."""
-        publishers = self._subscription.publishers()
-        if not self._offered:
-            self._heard = monotonic()
-        self._offered = [(each.topic_type, each.qos_profile.reliability) for each in publishers]
-        if len(usable := self._usable()) == 1:
-            self._follow(usable[0], [each for each in publishers if each.topic_type == usable[0]])
+        self.subscription.look()
+        if (kind := self.subscription.kind) not in ("", self.input.kind):
+            self.input.declare(kind, {kind: definition_text(kind)})
 
     def move(self) -> None:
         """Move arrived messages from the middleware into the input."""
-        if taken := self.taken():
+        if taken := [*self.subscription.taken()]:
             self.input.put(*as_messages(taken, self.input.source.topic, self.input.kind))
-
-    def taken(self) -> list[Taken]:
-        """The messages that have arrived."""
-        found = [*self._subscription.taken()]
-        self._heard = monotonic() if found else self._heard
-        return found
 
     def report(self, stream: str) -> TopicReport:
         """What is known of the topic now."""
         stamp, received, found = self.input.recent()
-        frames, kind = tuple(sorted(found - {""})), self.input.kind
+        frames, own = tuple(sorted(found - {""})), self.subscription
         return TopicReport(
             stream=stream,
             topic=self.name,
-            kind=kind if kind in self.kinds or not self.kinds else " and ".join(self.kinds),
-            reliability=reliability_text(self._subscription.reliability),
+            kind=self.input.kind if self.input.kind in own.kinds or not own.kinds else " and ".join(own.kinds),
+            reliability=reliability_text(own.reliability),
             frames=frames,
             figures=stamp_figures(stamp, received),
             problem=self._problem(stream, frames),
-            refused=self.refused,
-            note=NO_WRENCH if stream == "wrench" and not self._offered else "",
+            refused=bool(own.problem),
+            note=NO_WRENCH if stream == "wrench" and not own.offered else "",
         )
 
     def _problem(self, stream: str, frames: Sequence[str]) -> str:
-        if not self._offered:
+        own = self.subscription
+        if not own.offered:
             return "" if stream == "wrench" else "No publisher."
-        if self.refused:
-            return self.refusal
-        offered = [reliability for kind, reliability in self._offered if kind == self.input.kind]
-        if self._subscription.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
+        if own.problem:
+            return own.problem
+        offered = [each.qos_profile.reliability for each in own.offered if each.topic_type == own.kind]
+        if own.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
         expected = self.input.expected
         if expected and (others := [frame for frame in frames if frame.strip("/") != expected]):
             wrench = ", or wrench_frame to tip or a frame of tf" if stream == "wrench" else ""
             names = " and ".join(map(repr, others))
             return f"frame_id {names} is not accepted, give {expected!r}, or set world_frame{wrench}."
-        if monotonic() - self._heard > SILENT:
-            return f"No message for over {SILENT:g} s."
-        return ""
+        return silence(own)
 
-    def _usable(self) -> list[str]:
-        return [kind for kind in self.kinds if self._understood(kind)]
-
-    def _understood(self, kind: str) -> bool:
-        """Whether messages of a type have what the stream needs; remembers why not."""
-        if kind == self.input.kind:
-            return True
-        if kind not in self.refusals:
+    def _unfit(self, kind: str) -> str:
+        """Why messages of a type do not have what the stream needs, '' if they do."""
+        if kind not in self._known:
             try:
                 self.input.check(kind, {kind: definition_text(kind)})
-                self.refusals[kind] = ""
+                self._known[kind] = ""
             except RecordingError as error:
-                self.refusals[kind] = str(error)
-        return not self.refusals[kind]
-
-    def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        if kind != self.input.kind:
-            self.input.declare(kind, {kind: definition_text(kind)})
-        try:
-            self._subscription.follow(kind, publishers)
-        except PushPredictorError as error:
-            self.refusals[kind] = f"{error}."
+                self._known[kind] = str(error)
+        return self._known[kind]
 
 
 class TransformTopics:
@@ -154,54 +113,48 @@ class TransformTopics:
 
     def __init__(self, node: Node, topic: str, buffer: TransformBuffer) -> None:
         self.buffer = buffer
-        self.problem, self.refused = "No publisher.", False
-        self.heard = monotonic()  # when the last message came, or the last publisher
-        self._moving = FollowingSubscription(node, topic, DEEPEST, earlier=False, overridable=True)
-        self._static = FollowingSubscription(node, topic + STATIC, DEEPEST)
-        self._published = False
+        self.moving = FollowingSubscription(
+            node, topic, _no_tf, DEEPEST, first=TF_TYPE, earlier=False, overridable=True
+        )
+        self._static = FollowingSubscription(node, topic + STATIC, _no_tf, DEEPEST, first=TF_TYPE)
 
     @property
     def lost(self) -> int:
         """How many messages were overwritten or missed."""
-        return self._moving.lost + self._static.lost
+        return self.moving.lost + self._static.lost
 
     @property
-    def reliability(self) -> str:
-        """Of the subscription to the topic that is not static."""
-        return reliability_text(self._moving.reliability)
+    def refusal(self) -> str:
+        """Why the topics cannot be subscribed to, '' if they can."""
+        return self._static.problem or self.moving.problem
+
+    @property
+    def problem(self) -> str:
+        """In words, why there are no transforms; '' if nothing is wrong with the topics."""
+        return self.refusal or ("" if self.moving.offered else "No publisher.")
 
     def look(self) -> None:
         """Subscribe as the publishers offer the topics."""
-        refusals = [self._follow(subscription) for subscription in (self._static, self._moving)]
-        published = bool(self._moving.publishers())
-        self.problem = next(filter(None, refusals), "" if published else "No publisher.")
-        self.refused = any(refusals)
-        if published and not self._published:
-            self.heard = monotonic()
-        self._published = published
-
-    def _follow(self, subscription: FollowingSubscription) -> str:
-        """Subscribe as the publishers offer the topic; returns why that is not possible, empty if it is."""
-        publishers = subscription.publishers()
-        usable = [each for each in publishers if each.topic_type == TF_TYPE]
-        if publishers and not usable:
-            kinds = " and ".join(sorted({repr(each.topic_type) for each in publishers}))
-            return f"{subscription.name} is of type {kinds}, {TF_TYPE} is accepted."
-        if not usable and subscription.reliability is not None:
-            return ""
-        try:
-            subscription.follow(TF_TYPE, usable)
-        except PushPredictorError as error:
-            return f"{error}: {NOT_INSTALLED}."
-        return ""
+        self._static.look()
+        self.moving.look()
 
     def move(self) -> None:
         """Move arrived messages from the middleware into the buffer."""
-        for static, subscription in ((True, self._static), (False, self._moving)):
+        for static, subscription in ((True, self._static), (False, self.moving)):
             if taken := [*subscription.taken()]:
                 messages, arrived = as_messages(taken, subscription.name, TF_TYPE)
                 self.buffer.put(messages, static, arrived)
-                self.heard = self.heard if static else monotonic()
+
+
+def _no_tf(kind: str) -> str:
+    """Why a type is not the one of transforms, or is not available; '' if it is."""
+    if kind != TF_TYPE:
+        return f"It is of type {kind!r}, {TF_TYPE} is accepted."
+    try:
+        message_class(kind)
+    except PushPredictorError as error:
+        return f"{error}: {NOT_INSTALLED}."
+    return ""
 
 
 class FrameStream:
@@ -223,11 +176,11 @@ class FrameStream:
             stream=stream,
             topic=self.name,
             kind=TF_TYPE,
-            reliability=self._topics.reliability,
+            reliability=reliability_text(self._topics.moving.reliability),
             frames=(transforms.world,) if transforms.world else (),
             figures=stamp_figures(transforms.recent(frame, RECENT), None),
             problem=self._problem(),
-            refused=self._topics.refused,
+            refused=bool(self._topics.refusal),
         )
 
     def _problem(self) -> str:
@@ -237,9 +190,7 @@ class FrameStream:
         if problem := buffer.problem(frame):
             advice = "; set world_frame" if buffer.lacks_world(frame) else ""
             return f"{problem[0].upper()}{problem[1:]}{advice}."
-        if monotonic() - self._topics.heard > SILENT:
-            return f"No message for over {SILENT:g} s."
-        return ""
+        return silence(self._topics.moving)
 
 
 def as_messages(taken: Sequence[Taken], topic: str, kind: str) -> tuple[Messages, IntArray]:
@@ -248,6 +199,11 @@ def as_messages(taken: Sequence[Taken], topic: str, kind: str) -> tuple[Messages
     return Messages.of(
         topic, kind, [message.sent for message in taken], [message.message for message in taken]
     ), arrived
+
+
+def silence(topic: FollowingSubscription) -> str:
+    """In words, that no message comes; '' if that is not so."""
+    return f"No message for over {SILENT:g} s." if monotonic() - topic.heard > SILENT else ""
 
 
 def reliability_text(reliability: ReliabilityPolicy | None) -> str:

@@ -15,7 +15,7 @@ from time import time_ns
 import numpy as np
 from rclpy.node import Node
 
-from push_predictor.nodes.polling import FollowingSubscription, Taken
+from push_predictor.nodes.polling import ONE_TYPE, FollowingSubscription, Taken
 from push_predictor.nodes.validator.live_streams import TopicStream, as_messages
 from push_predictor.recordings.decoder.topic_input import LIMIT, TopicInput
 
@@ -67,16 +67,15 @@ class ScalarTopics:
     def __init__(self, node: Node, inputs: Mapping[str, TopicInput]) -> None:
         self._streams = {name: TopicStream(node, own, earlier=True) for name, own in inputs.items()}
         self._undated: dict[str, list[Taken]] = {name: [] for name in inputs}
-        self._ticks, self._clock = FollowingSubscription(node, CLOCK), ClockHistory()
+        self._ticks, self._clock = FollowingSubscription(node, CLOCK, _no_clock), ClockHistory()
 
     def look(self) -> None:
         """Subscribe to topics that have appeared."""
         for stream in self._streams.values():
             stream.look()
-        publishers = self._ticks.publishers() if self._streams else []
-        self._clock.published = bool(publishers)
-        if publishers:
-            self._ticks.follow(CLOCK_TYPE, publishers)
+        if self._streams:
+            self._ticks.look()
+        self._clock.published = bool(self._ticks.offered)
 
     def move(self) -> None:
         """Move arrived messages from the middleware."""
@@ -84,7 +83,7 @@ class ScalarTopics:
             if stream.input.timed:
                 stream.move()
             else:
-                self._undated[name] += stream.taken()
+                self._undated[name] += stream.subscription.taken()
                 del self._undated[name][:-LIMIT]
         for tick in self._ticks.taken():
             self._clock.put(tick.message, tick.sent)
@@ -124,15 +123,19 @@ class ScalarTopics:
         """In words, which topics have no samples, and which samples of the others were rejected."""
         found = []
         for name, stream in self._streams.items():
-            kinds, rejected = stream.kinds, stream.input.rejected
-            if stream.refused and len(kinds) > 1:
-                types = ", ".join(kinds)
+            topic, rejected = stream.subscription, stream.input.rejected
+            if topic.problem == ONE_TYPE:
+                types = ", ".join(topic.kinds)
                 found.append(f"Scalar topic {name} has publishers of the types {types}. One type is accepted.")
-            elif stream.refused:
-                found.append(f"{stream.refusal}.")
+            elif topic.problem:
+                found.append(f"{topic.problem.removesuffix('.')}.")
             elif not stream.input.kind:
                 found.append(f"Scalar topic {name} has no publisher.")
             elif rejected:
                 by_kind = ", ".join(f"{kind} {count}" for kind, count in rejected.items())
                 found.append(f"{name}: {rejected.total()} samples were rejected ({by_kind}).")
         return found
+
+
+def _no_clock(kind: str) -> str:
+    return "" if kind == CLOCK_TYPE else f"{CLOCK} is of type {kind}, {CLOCK_TYPE} is accepted."

@@ -17,14 +17,13 @@ from rclpy.validate_topic_name import validate_topic_name
 from push_predictor.errors import RequestError
 from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream, TransformTopics
 from push_predictor.nodes.validator.scalar_topics import ScalarTopics
-from push_predictor.online.topic_report import ReportLog, TopicReport
+from push_predictor.online.stream_health import ReportLog, TopicReport
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.transforms import WORLD
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
 
@@ -55,6 +54,9 @@ class SensorSubscriber:
         }
         self._streams["wrench"] = TopicStream(node, decoder.wrench.messages)
         self._scalars = ScalarTopics(node, decoder.scalars)
+        sensors = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
+        self._subscribed: tuple[ScalarTopics | TopicStream | TransformTopics, ...]
+        self._subscribed = (self._scalars, *sensors, *self._tf.values())
         self._log = ReportLog()
         self._reports: list[TopicReport] = []
         self._empty = monotonic()  # when nothing waited last
@@ -91,33 +93,21 @@ class SensorSubscriber:
         """The frame in which the poses are."""
         return self.decoder.world or WORLD
 
-    @property
-    def scalar_names(self) -> list[str]:
-        """The requested scalar topics, published or not, by their names in a recording."""
-        return list(self.decoder.scalars)
-
     def look(self) -> None:
         """Subscribe as the present publishers offer their topics; call often, in the executor's thread."""
         if monotonic() - self._looked < LOOK:
             return
         self._looked = monotonic()
         with self._draining:
-            self._scalars.move()
-            self._scalars.look()
-            for stream in self._subscribed():
-                stream.move()
-                stream.look()
+            for subscribed in self._subscribed:
+                subscribed.move()
+                subscribed.look()
 
     def drain(self) -> None:
         """Move arrived messages from the middleware into the decoder."""
         with self._draining:  # one at a time, so that messages stay in order
-            self._scalars.move()
-            for stream in self._subscribed():
-                stream.move()
-
-    def _subscribed(self) -> list[TopicStream | TransformTopics]:
-        streams = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
-        return [*streams, *self._tf.values()]
+            for subscribed in self._subscribed:
+                subscribed.move()
 
     def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):
@@ -125,10 +115,6 @@ class SensorSubscriber:
                 self.drain()
             except Exception as error:  # without this thread the queues would overflow
                 self._error(f"messages could not be taken: {error!r}", throttle_duration_sec=10.0)
-
-    def begin(self, rig: Rig) -> None:
-        """Begin a run: the samples that are taken from now on are of this rig."""
-        self.decoder.begin(rig)
 
     @property
     def waits_for_bias(self) -> bool:
@@ -162,7 +148,7 @@ class SensorSubscriber:
             return report
         tf = next(iter(self._tf.values()))
         if tf.problem:
-            return replace(report, problem=f"tf: {tf.problem}", refused=tf.refused)
+            return replace(report, problem=f"tf: {tf.problem}", refused=bool(tf.refusal))
         if problem:
             accepted = f"{problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
             return replace(report, problem=f"wrench_frame {frame!r}: {accepted}.")

@@ -15,10 +15,9 @@ from msg_adapters.diagnostics import diagnostic_array, diagnostic_status, level_
 from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.rig_source import RigSource
-from push_predictor.nodes.validator.model_source import ModelSource
-from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.results import ResultWriter
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
@@ -99,7 +98,7 @@ class StatusPublisher:
     def _activity(self) -> str:
         if self._session.state is State.DRAINING:
             return "waiting for the last answers"
-        if self._writer.report.busy:
+        if self._writer.report.alive:
             return "writing the report"
         return "validating" if self._session.active else "waiting for samples"
 
@@ -111,11 +110,11 @@ def _paragraph(texts: Sequence[str]) -> str:
 
 def _stream_figures(run: ValidationRun, sensors: SensorSubscriber) -> dict[str, object]:
     """Faults by kind, "streams KIND" of all streams and "slider KIND" of one."""
-    found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
+    found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.finder.counts.items()}
     without = "the wrench waits for its bias" if sensors.waits_for_bias else "no wrench received"
     found["contact from"] = "geometry and force" if run.sync.with_wrench else f"geometry alone: {without}"
     jitter = "regular, in place of stamps with a jitter of {:.2g} ms"
-    found |= {f"{name} stamps": jitter.format(1e3 * value) for name, value in run.stamp_jitter.items()}
+    found |= {f"{name} stamps": jitter.format(1e3 * value) for name, value in run.finder.stamp_jitter.items()}
     apart = run.sync.apart()
     found["streams clocks_apart"] = len(apart)
     return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}
@@ -123,11 +122,11 @@ def _stream_figures(run: ValidationRun, sensors: SensorSubscriber) -> dict[str, 
 
 def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
-    found += [*run.sync.problems(), *describe_faults(run.counts)]
+    found += [*run.sync.problems(), *describe_faults(run.finder.counts)]
     if run.refused:
         found.append(f"predict_push refused {run.refused} requests. The last, of model {run.last_refusal}")
-    if run.table_failure:
-        found.append(run.table_failure)
+    if run.table is not None and run.table.failure:
+        found.append(run.table.failure)
     if run.alarm is not None:
         found += _alarm_problems(run.alarm)
     return found

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -13,18 +14,18 @@ from types import MappingProxyType
 import numpy as np
 from rclpy.serialization import serialize_message
 
-from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
 from msg_adapters.residuals import residual_to_message
+from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import with_alarm
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.server_client import PredictionClient
 from push_predictor.online.alarm_process import AlarmProcess, CompletedPushes
 from push_predictor.online.check_process import SampleCheck
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
-from push_predictor.online.stream_sync import StreamSync
+from push_predictor.online.stream_health import StreamSync
 from push_predictor.online.window_table import JOURNAL, ResidualJournal, WindowTable
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.message_types import definition_text
@@ -48,7 +49,8 @@ class ValidationRun:
     models: by the name to request, the main one first. publish: called for every prediction, with rig and number of
     the model. world: returns the frame in which the poses are. alarm: of the main model. output: folder in which
     windows and residuals are saved as they arrive; None: they are not saved. scalars: the topics that may be published
-    in addition to the sensors. strict: a warning about the samples is an error.
+    in addition to the sensors. strict: a warning about the samples is an error. finder: has met the faults of the
+    streams.
     """
 
     def __init__(
@@ -66,7 +68,6 @@ class ValidationRun:
         self.rig = rig
         self.alarm = alarm
         self.table = WindowTable(output, rig) if output else None
-        self.table_failure = ""
         self.journal = ResidualJournal(output) if output else None
         self.validation = LiveValidation(models)
         self.sync = StreamSync(scalars)  # how far each stream has come
@@ -75,44 +76,30 @@ class ValidationRun:
         self.refused = 0
         self.last_refusal = ""
         self._pushes = CompletedPushes()
-        self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
+        self.finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
         self._publish, self._world = publish, world
         self._first: dict[str, float] = {}  # value of each scalar, by the name of its covariate
         if alarm is not None:
             alarm.begin()
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Faults of the streams that the window finder has met, by kind."""
-        return self._finder.counts
-
-    @property
-    def stamp_jitter(self) -> dict[str, float]:
-        """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
-        return self._finder.stamp_jitter
-
     def feed(self, samples: Samples) -> None:
         """Take a portion of the streams."""
         self._add_scalars(samples.scalars)
-        self._finder.add_wrench(samples.wrench)
-        self._finder.add_pusher(samples.pusher)
-        self._finder.add_slider(samples.slider)
+        self.finder.add_wrench(samples.wrench)
+        self.finder.add_pusher(samples.pusher)
+        self.finder.add_slider(samples.slider)
         self.sync.note(samples)
         self.checks.add(samples)
         if self.sync.in_step():
-            self._request(self._finder.take_ready())
+            self._request(self.finder.take_ready())
 
     def finish(self, scalars: Mapping[str, ScalarStream] = MappingProxyType({})) -> None:
         """Take the last scalars and find the last windows: no more samples will arrive."""
         self._add_scalars(scalars)
-        self._request(self._finder.finish())
+        self._request(self.finder.finish())
         if len(self.validation.windows):
             self.coverage = pushed_part(windows_to_table(self.validation.windows), self.rig)
-
-    def no_more_answers(self) -> None:
-        """Hand the last pushes to the alarm, without the windows that were not answered."""
-        self._pass_to_alarm(last=True)
 
     def write(self, folder: Path) -> list[Path]:
         """Write the JSON, the main model's with the alarm, and the residuals. Raises OSError or RecordingError."""
@@ -122,43 +109,33 @@ class ValidationRun:
             write_whole(path, with_alarm(path.read_text(), self.alarm.json).encode())
         return written
 
-    def _pass_to_alarm(self, last: bool = False) -> None:
+    def pass_to_alarm(self, last: bool = False) -> None:
+        """Hand the complete pushes to the alarm; last: also those with windows that will not be answered."""
         for push in self._pushes.take(last):
             if self.alarm is not None:
                 self.alarm.add(push)
 
     def _add_scalars(self, scalars: Mapping[str, ScalarStream]) -> None:
         for name, stream in scalars.items():
-            self._finder.add_scalar(name, stream)
+            self.finder.add_scalar(name, stream)
             if len(stream):
                 self._first.setdefault(f"topic:{name}", float(stream.value[0]))
 
     def _request(self, windows: Sequence[PushWindow]) -> None:
-        self._save(windows)
+        if self.table is not None:
+            self.table.add(windows, self.validation.windows, self._first)
         for window in windows:
             number = self.validation.add(window)
             self._pushes.found(number, window)
             push = np.array([window.velocity, window.contact, window.angle])
             for model, name in enumerate(self.validation.names):
                 request = query_to_request(name, push, window.duration, self._known(model, window))
-                self._client.ask(request, self._on_response(model, number))
+                self._client.ask(request, partial(self._take, model, number))
 
     def _known(self, model: int, window: PushWindow) -> dict[str, float]:
         """The finite covariates of a window, with those that only grow counted as the model counts them."""
         columns = self.validation.models[model].continued(windows_to_table([window])).covariates
         return {name: float(column[0]) for name, column in columns.items() if isfinite(column[0])}
-
-    def _save(self, windows: Sequence[PushWindow]) -> None:
-        """Append the windows to the table. A full disk does not end the measurement."""
-        if self.table is None or self.table_failure:
-            return
-        try:
-            self.table.add(windows, self.validation.windows, self._first)
-        except OSError as error:
-            self.table_failure = f"Windows are no longer saved: {error}"
-
-    def _on_response(self, model: int, number: int) -> Callable[[PredictPush.Response], None]:
-        return lambda response: self._take(model, number, response)
 
     def _take(self, model: int, number: int, response: PredictPush.Response) -> None:
         window, name = self.validation.windows[number], self.validation.names[model]
@@ -166,7 +143,7 @@ class ValidationRun:
             prediction = _finite(prediction_from_response(response))
             mean, covariance, in_domain = prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
             residual = residual_to_message(name, window, mean, covariance, in_domain, self._world())
-        except (RefusedError, MessageError) as error:
+        except (RefusedError, RequestError) as error:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
             self.validation.refuse(model, number, str(error))
@@ -181,7 +158,7 @@ class ValidationRun:
     def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
         if model == 0:
             self._pushes.answered(number, window, prediction)
-            self._pass_to_alarm()
+            self.pass_to_alarm()
 
 
 def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> Path:
@@ -200,8 +177,8 @@ def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> 
 
 
 def _finite(prediction: Prediction) -> Prediction:
-    """The prediction. Raises MessageError for a number that is not finite."""
+    """The prediction. Raises RequestError for a number that is not finite."""
     for name, values in (("mean", prediction.mean), ("covariance", prediction.covariance)):
         if not np.all(np.isfinite(values)):
-            raise MessageError(f"response {name}", values.ravel().tolist(), "finite numbers")
+            raise RequestError(f"response {name}", values.ravel().tolist(), "finite numbers")
     return prediction

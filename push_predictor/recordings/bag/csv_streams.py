@@ -157,7 +157,8 @@ def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
     header = tuple(found[0][1])
     for line, row in found[1:]:
         if len(row) != len(header):
-            raise RecordingError(f"{file} line {line}: {len(row)} cells, the header has {len(header)}")
+            many = "; numbers with a decimal comma need semicolons between the cells" if len(row) > len(header) else ""
+            raise RecordingError(f"{file} line {line}: {len(row)} cells, the header has {len(header)}{many}")
     return header, found[1:]
 
 

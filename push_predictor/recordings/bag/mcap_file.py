@@ -27,6 +27,7 @@ from mcap.stream_reader import StreamReader
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import FRAME, as_cdr
+from push_predictor.recordings.bag.idl import msg_of_idl
 from push_predictor.recordings.bag.mcap_records import (
     HEAD,
     LARGEST_CHUNK,
@@ -317,7 +318,8 @@ class McapFile:
         """Store a description, of a channel the first."""
         if isinstance(record, Schema):
             self._types.setdefault(record.id, record.name)
-            self.schemas.setdefault(record.name, record.data.decode(errors="replace"))
+            text = record.data.decode(errors="replace")
+            self.schemas.setdefault(record.name, msg_of_idl(text) if record.encoding == "ros2idl" else text)
         elif isinstance(record, Metadata):
             self.metadata[record.name] = record.metadata
         elif isinstance(record, Channel):

@@ -54,6 +54,8 @@ class Bag:
         self.files = files
         self._described = described
         self._scratch = scratch  # contains decompressed files while the bag is in use
+        for topic, kind in self.topics.items():
+            self.set_type(topic, kind)  # where another file has the schema
 
     @property
     def storage(self) -> str:
@@ -218,9 +220,11 @@ def _packed_or_not(file: Path) -> Path:
 def _found(folder: Path) -> list[Path]:
     """The files of the folder, bag_2 before bag_10; of several kinds, those of the first in ENDINGS.
 
-    Where no name ends so, those that begin as a bag.
+    Where no name ends so, those that begin as a bag. A compressed file next to its content is left out.
     """
     files = sorted((file for file in folder.iterdir() if file.is_file()), key=_numbered)
+    names = {file.name for file in files}
+    files = [f for f in files if f.suffix != ENDING or f.name.removesuffix(ENDING) not in names]
     kinds = ([file for file in files if _ending(file) == ending] for ending in ENDINGS)
     return next(filter(None, kinds), None) or [file for file in files if _begins_as_bag(file)]
 

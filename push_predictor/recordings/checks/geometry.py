@@ -17,13 +17,15 @@ from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import SPANS, Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
 from push_predictor.recordings.checks.orientation import orientation_finding
 from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
     LAG_ALLOWANCE,
+    TIP_POSE,
     frames_apart,
     outline_findings,
+    tip_offset,
     unchecked,
 )
 from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
@@ -32,7 +34,6 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
 FEWEST_CONTACTS = 20  # samples
-LEAST_STEADY = 0.7  # share of the contact without its begin and end, up to which those do not distort a robust fit
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
@@ -42,7 +43,7 @@ FEW_SAMPLES = 150  # enough for the gap alone, of hypotheses that are mostly wro
 FAR = 0.1  # of the outline's reach: a larger gap is no contact of this tip with this slider
 
 RIGHT_HANDED = "Use right-handed frames, seen from above."
-FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up slider=-z` does that."
+FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up=slider=-z` does that."
 IN_ORDER = "Give x before y, in right-handed frames seen from above."
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
 
@@ -133,11 +134,13 @@ def _findings_of_large_gap(
     if mirrors[best] < explained:
         return [_mirrored(best, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
-    if another and frames_apart(contacts, rig, fit) is None:
+    if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
-    explained_otherwise = another or {"frames_apart", "outline_shape"} & {finding.name for finding in found}
+    explained_otherwise = another or {"frames_apart", "tip_offset", "outline_shape"} & {
+        finding.name for finding in found
+    }
     return found if explained_otherwise else [*found, _unexplained(fit.gap)]
 
 
@@ -150,12 +153,11 @@ def contacts_of(motion: Motion | None) -> Contacts | None:
     """The samples in contact, None if there are too few."""
     if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
         return None
-    steady, touch = int(np.sum(motion.steady)), motion.contact
-    vague = motion.span > SPANS[0] or steady < LEAST_STEADY * np.sum(touch)  # where a contact begins and ends
-    if vague and steady >= FEWEST_CONTACTS:
-        touch = motion.steady
+    touch = motion.touching
     tips = to_body(motion.tip, motion.slider)[touch]
-    return Contacts(tips, body_velocity(motion)[touch], motion.push[touch], motion.slider[touch], motion.noise)
+    tool = None if motion.tool is None else motion.tool[touch]
+    velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]
+    return Contacts(tips, velocities, push, poses, motion.noise, tool=tool)
 
 
 def _too_brief(motion: Motion, rig: Rig) -> int | None:
@@ -252,8 +254,35 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
     if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
         return [_swapped(np.inf)]
+    if motion is not None and (height := _pushing_height(recording, motion)) is not None:
+        lowered = replace(recording.pusher, z=recording.pusher.z - height)
+        altered = replace(recording, pusher=lowered)
+        found = geometry_findings(altered, rig, motion_of(altered, rig))
+        if all(finding.severity != "refused" for finding in found):
+            return [_tip_height(height), *found]
     sentence = "The slider never moves while the lowered tip moves: no push was recorded."
     return [Finding("no_contact", "refused", sentence, TOPICS)]
+
+
+def _pushing_height(recording: Recording, motion: Motion) -> float | None:
+    """The height (m) of the tracked point above the slider's frame while both move, None if it is that of a tip."""
+    pushing = motion.moving & (motion.tip_speed > WindowOptions().least_speed)
+    if np.sum(pushing) < FEWEST_CONTACTS:
+        return None
+    above = float(np.nanmin(recording.pusher.z) - np.nanmedian(recording.slider.z))
+    height = above + float(np.median(motion.tip_height[pushing]))
+    return height if height > WindowOptions().lift else None
+
+
+def _tip_height(height: float) -> Finding:
+    lift = WindowOptions().lift
+    sentence = (
+        f"In pushes, the tracked point of the pusher is {1e3 * height:.0f} mm above the slider's frame, where a tip is "
+        f"lifted (over {1e3 * lift:.0f} mm). It is probably about that far from the tip, along the tool, such as the "
+        "flange; or the heights (z) of the two frames differ."
+    )
+    advice = f"{TIP_POSE[0].upper()}{TIP_POSE[1:]} Or correct z in one of the frames."
+    return Finding("tip_height", "refused", sentence, advice, {"height": Value(height, "m")})
 
 
 def _swapped(gap: float) -> Finding:

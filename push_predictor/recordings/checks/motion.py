@@ -33,6 +33,7 @@ MOVING_SHARE, MOVING = 0.4, 0.01  # of the lowered tip's speed; m/s: the noise o
 NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
 STEADY, STEADY_TIP = 0.5, 0.3  # change of velocity, as a share of it, of a slider and a tip that neither hit nor part
 FEWEST = 5  # samples of each stream
+LEAST_STEADY = 0.7  # share of the contact without its begin and end, from which on those distort no robust fit
 OFF = 0.001  # m from the outline
 
 
@@ -45,7 +46,7 @@ class Motion:
     unknown. moving (n,): whether the slider moves; contact (n,): it moves, and so does the lowered tip; steady (n,): in
     contact and neither begins nor ends to move, so that the tip is at the outline. push (n,): number of the contact.
     noise: standard deviation (m) of the outline's place in one sample, by the tracker's noise. span: s around a
-    sample, on both sides, that determine the slider's speed.
+    sample, on both sides, that determine the slider's speed. tool (n,): heading of the tip's frame, rad, unwrapped.
     """
 
     time: Array
@@ -61,6 +62,14 @@ class Motion:
     push: IntArray
     noise: float = 0.0
     span: float = SPANS[0]
+    tool: Array | None = None
+
+    @property
+    def touching(self) -> BoolArray:
+        """Which samples (n,) are in contact: without begin and end where fast pushes, or noise, leave those vague."""
+        steady, contact = int(np.sum(self.steady)), int(np.sum(self.contact))
+        vague = self.span > SPANS[0] or steady < LEAST_STEADY * contact
+        return self.steady if vague and steady >= FEWEST else self.contact
 
 
 @dataclass(frozen=True)
@@ -116,6 +125,7 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     time = time[order]
     pose = np.column_stack([slider.x, slider.y, np.unwrap(slider.heading)])[order]
     tip = values_at(time, tip_time[tip_order], np.column_stack([pusher.x, pusher.y, pusher.z])[tip_order])
+    tool = np.interp(time, tip_time[tip_order], np.unwrap(pusher.heading[tip_order]))
     tip_velocity, options = _velocity(time, tip[:, :2], SPANS[0]), WindowOptions()
     tip_speed = np.hypot(*tip_velocity.T)
     lowered = tip[:, 2] - slider.z[order] < options.lift
@@ -127,9 +137,9 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    return Motion(
-        time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, moving, contact, steady, number, noise
-    )
+    kinds = {"moving": moving, "contact": contact, "steady": steady, "push": number}
+    measured = {"noise": noise, "span": slider_speed.span, "tool": tool}
+    return Motion(time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, **kinds, **measured)
 
 
 def body_velocity(motion: Motion) -> Array:

@@ -44,6 +44,11 @@ def tilt_of(slider: PoseStream) -> float:
     return 0.0 if slider.tilt is None or not len(slider.tilt) else float(np.nanpercentile(slider.tilt, COVERED))
 
 
+def has_heading(slider: PoseStream) -> bool:
+    """Whether the z axis is near the vertical, up or down: with it level, the x axis may be vertical."""
+    return not STEEP < tilt_of(slider) < OVERTURNED
+
+
 def turn_and_path(slider: PoseStream) -> tuple[float, float]:
     """How far the slider turns (rad) and moves (m) in all; a pushed one turns about as far, in terms of its size."""
     usable = np.isfinite(slider.x + slider.y + slider.heading)

@@ -21,22 +21,25 @@ from push_predictor.recordings.checks.outline_fit import (
     FRAME_Y,
     FRAME_YAW,
     LAG,
+    SCALE,
     SIZE,
     STRETCH,
     TIE,
     TIP,
+    TOOL,
     YAW,
     Contacts,
     OutlineFit,
     X,
     Y,
     fit_frames,
+    fit_tool,
     refit,
 )
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array
 
-Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "proportions"]
+Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "tip_offset", "proportions"]
 DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
 LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
 SLOWEST_FILTER = 0.2  # s of delay
@@ -44,11 +47,13 @@ SEPARATE = 0.0002  # m; sd of size and tip radius, fitted together, above which 
 FINE = 0.0001  # m; a spread of the pushes below it leaves nothing to explain
 LARGEST_TIP_CHANGE = 0.55  # relative; a diameter given as the radius is a change of 0.5
 LARGEST_SIZE_CHANGE = 0.1  # relative
+LEAST_TURN = np.radians(20.0)  # of a tool, from which on its axes are others than the world's
 RIGHT_ANGLE = 1e-6  # cosine
 FEWEST_PUSHES = 8  # for five parameters: with fewer, the spread between pushes gives no standard deviation
 SHARE_OFF = 0.05  # of the pushes: if more lie off the corrected outline, its shape is wrong
 NOISY = 3.0 * 1.48  # three standard deviations of the pushes, in median absolute gaps
 ONE_PUSH_OFF = 2.0 * LENGTH_ALLOWANCE  # m; a single push may be disturbed by more than the allowance
+TIP_POSE = "give the pose of the tip (`--pusher-topic`, of a frame of tf `--pusher-topic /tf:TIP`), not of the flange."
 UNSEPARATED = "these contacts do not separate the two"
 
 
@@ -58,6 +63,8 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
         return [unchecked(fit.pushes)]
     cause = cause_of(contacts, rig, fit)
     found = [_frames_apart(cause.fit)] if cause.name == "frames_apart" else []
+    if cause.name == "tip_offset":
+        found.append(_tip_offset(cause.fit))
     if _is_turned(cause.fit):
         found.append(_turned(value_of(cause.fit, YAW, "rad")))
     if _is_shifted(cause.fit):
@@ -185,11 +192,22 @@ def _shape_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
 
 
 def _frames_apart(fit: OutlineFit) -> Finding:
-    """The pose of the pusher's world frame in the slider's: p' = turn(p) + shift."""
+    """The pose of the pusher's world frame in the slider's: p' = turn(p) + shift, and the ratio of their lengths."""
     yaw = value_of(fit, FRAME_YAW, "rad")
     shift = fit.centre + fit.estimate[[FRAME_X, FRAME_Y]] - rotate(fit.centre, np.array(yaw.value))
     sd = np.hypot(fit.sd[[FRAME_X, FRAME_Y]], np.abs(fit.centre[::-1]) * fit.sd[FRAME_YAW])
     degrees, (x, y) = np.degrees(yaw.value), np.round(1e3 * shift, 1) + 0.0
+    frame = {f"frame_{name}": Value(float(s), "m", float(d)) for name, s, d in zip("xy", shift, sd, strict=True)}
+    values = {"frame_yaw": yaw, **frame}
+    if _is_scaled(fit):
+        share = value_of(fit, SCALE, "1")
+        scale = Value(1.0 / (1.0 - share.value), "1", share.sd)
+        sentence = (
+            f"The slider's world is {scale.value:.4f} times (sd {scale.sd or 0.0:.1g}) as large as the pusher's: "
+            "distances between its places are wrong."
+        )
+        advice = "Calibrate the tracker again: its scale (wand), and its frame against the robot's."
+        return Finding("frames_apart", "warning", sentence, advice, {**values, "frame_scale": scale})
     sentence = (
         f"The world frames of slider and pusher are apart: the pusher's is turned by {degrees:.1f} degrees (sd "
         f"{np.degrees(yaw.sd or 0.0):.1g}) and shifted by ({x:.1f}, {y:.1f}) mm (sd {1e3 * sd[0]:.1g}, "
@@ -199,8 +217,18 @@ def _frames_apart(fit: OutlineFit) -> Finding:
         f"Calibrate tracker and robot again, or turn the pusher's positions by {degrees:.1f} degrees about the world "
         f"origin and add ({x:.1f}, {y:.1f}) mm."
     )
-    frame = {f"frame_{name}": Value(float(s), "m", float(d)) for name, s, d in zip("xy", shift, sd, strict=True)}
-    return Finding("frames_apart", "warning", sentence, advice, {"frame_yaw": yaw, **frame})
+    if not _exceeds(fit, FRAME_YAW, ANGLE_ALLOWANCE):
+        advice += f" Or the tracked point of the pusher is so far from its tip: {TIP_POSE}"
+    return Finding("frames_apart", "warning", sentence, advice, values)
+
+
+def _tip_offset(fit: OutlineFit) -> Finding:
+    x, y = (value_of(fit, each, "m") for each in TOOL)
+    sentence = (
+        f"The tip is at ({1e3 * x.value:.1f}, {1e3 * y.value:.1f}) mm (sd {1e3 * (x.sd or 0.0):.1g}, "
+        f"{1e3 * (y.sd or 0.0):.1g}) from the tracked point of the pusher, along its own axes, and turns with them."
+    )
+    return Finding("tip_offset", "warning", sentence, f"{TIP_POSE[0].upper()}{TIP_POSE[1:]}", {"x": x, "y": y})
 
 
 def _clock_findings(fit: OutlineFit, corrected: float) -> list[Finding]:
@@ -241,6 +269,7 @@ def cause_of(contacts: Contacts, rig: Rig, fit: OutlineFit) -> Cause:
     known: dict[Name, OutlineFit | None] = {
         "tip_radius": _with_tip(contacts, rig, fit),
         "frames_apart": frames_apart(contacts, rig, fit),
+        "tip_offset": tip_offset(contacts, rig, fit),
         "proportions": axes if axes is not None and _has_other_proportions(axes, rig) else None,
     }
     tried = {name: each for name, each in known.items() if each is not None}
@@ -255,10 +284,20 @@ def cause_of(contacts: Contacts, rig: Rig, fit: OutlineFit) -> Cause:
 def frames_apart(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
     """The fit with the world frames of slider and pusher apart, None unless they are and it explains the contacts."""
     apart = fit_frames(fit, contacts, rig)
-    turned = _exceeds(apart, FRAME_YAW, ANGLE_ALLOWANCE)
-    shifted = any(_exceeds(apart, each, LENGTH_ALLOWANCE) for each in (FRAME_X, FRAME_Y))
-    explained = apart.spread < LENGTH_ALLOWANCE and TIE * _penalised(apart) < _penalised(fit)
-    return apart if explained and (turned or shifted) else None
+    scaled = refit(apart, contacts, rig, SCALE)
+    if _is_scaled(scaled) and TIE * _penalised(scaled) < _penalised(apart):
+        apart = scaled
+    explained = apart.spread < LENGTH_ALLOWANCE + contacts.noise and TIE * _penalised(apart) < _penalised(fit)
+    return apart if explained and (_is_moved(apart) or _is_scaled(apart)) else None
+
+
+def tip_offset(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
+    """The fit with the tip away from the tracked point of the tool, None unless that explains the contacts."""
+    if contacts.tool is None or np.ptp(contacts.tool) < LEAST_TURN:
+        return None  # along the axes of a tool that does not turn, it is a shift of the world frame
+    away = fit_tool(fit, contacts, rig)
+    explained = away.spread < LENGTH_ALLOWANCE + contacts.noise and TIE * _penalised(away) < _penalised(fit)
+    return away if explained and any(_exceeds(away, each, LENGTH_ALLOWANCE) for each in TOOL) else None
 
 
 def half_size(rig: Rig) -> float:
@@ -301,6 +340,17 @@ def _is_shifted(fit: OutlineFit) -> bool:
 
 def _is_turned(fit: OutlineFit) -> bool:
     return _exceeds(fit, YAW, ANGLE_ALLOWANCE)
+
+
+def _is_moved(apart: OutlineFit) -> bool:
+    """Whether the world frames are turned or shifted against each other."""
+    shifted = any(_exceeds(apart, each, LENGTH_ALLOWANCE) for each in (FRAME_X, FRAME_Y))
+    return shifted or _exceeds(apart, FRAME_YAW, ANGLE_ALLOWANCE)
+
+
+def _is_scaled(apart: OutlineFit) -> bool:
+    """Whether the lengths in one world frame differ from those in the other, as far as the slider was pushed."""
+    return _exceeds(apart, SCALE, LENGTH_ALLOWANCE / max(apart.extent, LENGTH_ALLOWANCE))
 
 
 def _penalised(fit: OutlineFit) -> float:

@@ -25,11 +25,12 @@ from push_predictor.recordings.checks.motion import sums_by_push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
 
-YAW, X, Y, SIZE, LAG, TIP, FRAME_YAW, FRAME_X, FRAME_Y, STRETCH = range(10)
+YAW, X, Y, SIZE, LAG, TIP, FRAME_YAW, FRAME_X, FRAME_Y, STRETCH, SCALE, TOOL_X, TOOL_Y = range(13)
 SIMILARITY = (YAW, X, Y, SIZE, LAG)
 FRAMES = (FRAME_YAW, FRAME_X, FRAME_Y)
+TOOL = (TOOL_X, TOOL_Y)
 # Prior sd of what the contacts do not determine, in the units of OutlineFit.
-WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3])
+WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3, 0.1, 0.1, 0.1])
 SMALLEST = -0.9  # relative correction of the size: a smaller slider is none
 MOST_SAMPLES = 1200  # evenly drawn: more change the result by less than its standard deviation
 UNKNOWN_SIZE = 0.02  # relative sd
@@ -53,7 +54,8 @@ class Contacts:
 
     tips (n, 2) m and velocities (n, 2) m/s of the tip in the slider's frame; push (n,): number of the push; poses
     (n, 3) of the slider in the world frame: x, y (m) and heading (rad). noise: standard deviation (m) of the outline's
-    place in one sample. lag: of the slider's stamps, s, that is corrected in these samples.
+    place in one sample. lag: of the slider's stamps, s, that is corrected in these samples. tool (n,): heading of the
+    tool at the tip, rad; None if unknown.
     """
 
     tips: Array
@@ -62,11 +64,12 @@ class Contacts:
     poses: Array
     noise: float = 0.0
     lag: float = 0.0
+    tool: Array | None = None
 
     def at(self, rows: IntArray | BoolArray) -> Contacts:
         """The chosen samples: indices, or a mask (n,)."""
         own = {name: getattr(self, name)[rows] for name in ("tips", "velocities", "push", "poses")}
-        return replace(self, **own)
+        return replace(self, **own, tool=None if self.tool is None else self.tool[rows])
 
     def drawn(self, count: int) -> Contacts:
         """At most `count` evenly drawn samples."""
@@ -77,14 +80,16 @@ class Contacts:
 class OutlineFit:
     """A correction of the outline in the slider's frame, and its uncertainty.
 
-    estimate (10,) and sd (10,): yaw (rad, counter-clockwise, about the centroid), shift along x and y (m), relative
+    estimate (13,) and sd (13,): yaw (rad, counter-clockwise, about the centroid), shift along x and y (m), relative
     size minus 1, lag of the slider's stamps (s), correction of the tip's radius (m); turn (rad, about `centre`) and
     shift (m, m) that bring the tip from the pusher's world frame to the slider's; relative length along the outline's x
-    minus that along its y. estimate and sd are 0 where a parameter was not fitted.
+    minus that along its y; relative length of the slider's world frame over the pusher's, minus 1; place of the tip (m,
+    m) along the tool's axes. estimate and sd are 0 where a parameter was not fitted.
 
     gap: median absolute gap that is left, m; cost: its mean, m; push_gaps (pushes,): the median of each push, m,
     signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples, push_noise
-    (pushes,) its standard deviation by the tracker's noise, m. centre (2,): mean place of the tip, m, world frame.
+    (pushes,) its standard deviation by the tracker's noise, m. centre (2,): mean place of the tip, m, world frame;
+    extent: distance (m) from there that few of the slider's places exceed.
     """
 
     estimate: Array
@@ -96,6 +101,7 @@ class OutlineFit:
     push_samples: IntArray
     push_noise: Array
     centre: Array
+    extent: float
 
     @property
     def pushes(self) -> int:
@@ -156,6 +162,16 @@ def fit_frames(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
     return _fit(contacts, rig, {*_fitted(first), *FRAMES}, starts)
 
 
+def fit_tool(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
+    """Fit the place of the tip along the tool's axes too, from the first fit and from afar; contacts know the tool."""
+    assert contacts.tool is not None
+    apart = rotate(contacts.poses[:, :2] - to_world(contacts.tips, contacts.poses), -contacts.tool).mean(axis=0)
+    start = np.zeros(len(WEAK))
+    start[list(TOOL)] = apart
+    starts = [first.estimate] if first.spread <= DISTURBED else [first.estimate, start]
+    return _fit(contacts, rig, {*_fitted(first), *TOOL}, lambda problem: starts)
+
+
 def _turned_starts(problem: Problem) -> list[Array]:
     """No correction, and the two best of the turns within one period of the symmetry, exact or almost."""
     rows = np.zeros((STARTS, len(WEAK)))
@@ -188,7 +204,9 @@ def _fit(
     if turns := problem.outline.rotational_symmetry:
         estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
     gap, noise = float(np.median(np.abs(gaps))), MEDIAN_SD * contacts.noise / np.sqrt(samples)
-    return OutlineFit(estimate, sd, gap, cost, gaps[middle], nearest.contact[middle], samples, noise, problem.centre)
+    return OutlineFit(
+        estimate, sd, gap, cost, gaps[middle], nearest.contact[middle], samples, noise, problem.centre, problem.extent
+    )
 
 
 class Placed(NamedTuple):
@@ -202,7 +220,7 @@ class Placed(NamedTuple):
 class Problem:
     """Gaps (n,) m between the contacts and the corrected outline of a rig, and the fit of some of the parameters.
 
-    A correction (10,) is that of OutlineFit. outline: the rig's, with its centroid as the origin: a turn about it
+    A correction (13,) is that of OutlineFit. outline: the rig's, with its centroid as the origin: a turn about it
     shifts nothing, so that both are known as well as they can be.
     """
 
@@ -210,8 +228,10 @@ class Problem:
         self._contacts, self._middle, self._radius = contacts, rig.outline.centroid, rig.pusher_radius
         self.outline = transformed(rig.outline, shift=(-self._middle[0], -self._middle[1]))
         self.push = contacts.push
+        self._tool = np.zeros(len(contacts.push)) if contacts.tool is None else contacts.tool
         self._world = to_world(contacts.tips, contacts.poses)
         self.centre = np.asarray(self._world.mean(axis=0))
+        self.extent = float(np.quantile(np.linalg.norm(contacts.poses[:, :2] - self.centre, axis=1), MOST_PUSHES))
         self._free = np.isin(np.arange(len(WEAK)), list(parameters))
         self._free[YAW] &= self.outline.rotational_symmetry != 0
         self._last: tuple[bytes, Placed] | None = None
@@ -220,9 +240,9 @@ class Problem:
         """The tips against the corrected outline. The last one is kept: gaps and slopes need it."""
         key = correction.tobytes()
         if self._last is None or self._last[0] != key:
-            yaw, x, y, growth, lag, _, *frame, stretch = correction.tolist()
+            yaw, x, y, growth, lag, _, *_, stretch, _, _, _ = correction.tolist()
             size = 1.0 + max(growth, SMALLEST)
-            tips = self._tips(*frame) - self._middle - lag * self._contacts.velocities - [x, y]
+            tips = self._tips(correction) - self._middle - lag * self._contacts.velocities - [x, y]
             own = rotate(tips, np.array(-yaw)) / size
             self._last = key, Placed(own, size, stretched(self.outline, stretch).project(own))
         return self._last[1]
@@ -233,7 +253,7 @@ class Problem:
         return np.asarray(placed.size * placed.nearest.distance - correction[TIP] - self._radius)
 
     def slopes(self, correction: Array) -> Array:
-        """Derivatives (n, 10) of the gaps by the correction.
+        """Derivatives (n, 13) of the gaps by the correction.
 
         A distance grows along the outward normal; by a change of the outline it falls by what its nearest point moves
         along the normal.
@@ -249,6 +269,8 @@ class Problem:
         slopes[:, TIP] = -1.0
         slopes[:, FRAME_YAW] = -_cross(in_world, rotate(self._world - self.centre, correction[FRAME_YAW]))
         slopes[:, [FRAME_X, FRAME_Y]] = in_world
+        slopes[:, SCALE] = _dot(in_world, contacts.poses[:, :2] - self.centre)
+        slopes[:, list(TOOL)] = rotate(in_world, -self._tool)
         slopes[:, STRETCH] = -size * _dot(nearest.normal, self._moved(nearest.point, float(correction[STRETCH])))
         return slopes
 
@@ -257,7 +279,7 @@ class Problem:
         return float(np.mean(np.minimum(np.abs(self.gaps(correction)), LARGEST)))
 
     def two_best(self, rows: Array) -> list[Array]:
-        """The two of the corrections (n, 10) with the smallest residuals."""
+        """The two of the corrections (n, 13) with the smallest residuals."""
         return list(rows[np.argsort([float(np.sum(np.abs(self.residuals(row[self._free])))) for row in rows])[:2]])
 
     def best(self, starts: Sequence[Array]) -> Array:
@@ -282,7 +304,7 @@ class Problem:
         return np.vstack([slopes / NOISE, np.diag(1.0 / WEAK[self._free])])
 
     def deviation(self, correction: Array) -> Array:
-        """Standard deviations (10,) by the sandwich formula with pushes as clusters, from the prior without data."""
+        """Standard deviations (13,) by the sandwich formula with pushes as clusters, from the prior without data."""
         gap, slope, weak = self.gaps(correction), self.slopes(correction)[:, self._free], WEAK[self._free]
         weight = 1.0 / np.sqrt(1.0 + (gap / NOISE) ** 2)
         noise = max(float(np.median(np.abs(gap))) * 1.5, 1e-5)
@@ -310,12 +332,18 @@ class Problem:
         full[self._free] = part
         return full
 
-    def _tips(self, yaw: float, x: float, y: float) -> Array:
-        """The tips in the slider's frame, after a turn about the centre and a shift in the world frame."""
-        if yaw == x == y == 0.0:
+    def _tips(self, correction: Array) -> Array:
+        """The tips in the slider's frame, after what is corrected in the world frame and at the tool.
+
+        A world of the slider that is `scale` too large brings its origin, not its outline, away from the tip.
+        """
+        yaw, shift, scale = correction[FRAME_YAW], correction[[FRAME_X, FRAME_Y]], correction[SCALE]
+        tool = correction[list(TOOL)]
+        if yaw == scale == 0.0 and not shift.any() and not tool.any():
             return self._contacts.tips
-        turned = self.centre + rotate(self._world - self.centre, np.array(yaw)) + [x, y]
-        return to_body(turned, self._contacts.poses)
+        turned = self.centre + rotate(self._world - self.centre, yaw) + shift
+        away = scale * (self._contacts.poses[:, :2] - self.centre)
+        return to_body(turned + away + rotate(tool, self._tool), self._contacts.poses)
 
     def _moved(self, points: Array, stretch: float) -> Array:
         """Change of points (n, 2) of the stretched outline with the stretch; see shapes.stretched."""

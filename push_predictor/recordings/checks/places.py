@@ -22,7 +22,7 @@ RETURN = 0.25  # of a jump: nearer to an earlier place than this, the stream is 
 RECENT = 6  # stretches of a stream whose ends are remembered
 JUST = 500_000_000  # ns; a slider that is put back is elsewhere for longer
 FEWEST_RETURNS = 5  # to two places
-HALF = 0.25  # share of the samples from which the window finder cannot know which body is meant
+HALF = 0.12  # share of the samples elsewhere: with more, the window finder cannot know which body is meant
 EXCHANGED = 0.02  # m between a body that was exchanged and the place where the other one was
 SPAN = 100_000_000  # ns around an exchange
 
@@ -32,8 +32,7 @@ class Places:
     """Stretches of a stream between jumps.
 
     jumps (n - 1,): which steps are jumps. returns: how often one leads back to where an earlier stretch just ended;
-    distance: median of these jumps, m; share: of the samples that are at the place that is returned to most often, or
-    elsewhere, whichever is less.
+    distance: median of these jumps, m; share: of the samples around them that are at the place with fewer of them.
     """
 
     jumps: BoolArray
@@ -53,19 +52,18 @@ def places_of(stream: PoseStream) -> Places:
     jumps = step > np.maximum(JUMP_DISTANCE + JUMP_SPEED * elapsed, JUMP * _usual_step(place))
     begins = np.append(0, np.flatnonzero(jumps) + 1)
     ends = np.append(begins[1:], len(place)) - 1
-    body, returned = np.arange(len(begins)), list[int]()
+    returned = list[int]()
     for k in range(2, len(begins)):
         before = np.arange(max(0, k - RECENT), k - 1)
         before = before[stamp[begins[k]] - stamp[ends[before]] < JUST]
         away = np.hypot(*(place[ends[before]] - place[begins[k]]).T)
         if len(before) and away.min() < min(RETURN * step[begins[k] - 1], JUMP_DISTANCE):
-            body[k] = body[before[np.argmin(away)]]
             returned.append(k)
     if not returned:
         return Places(jumps)
-    most = np.bincount(body[returned]).argmax()
-    share = float(np.sum((ends - begins + 1)[body == most])) / len(place)
-    return Places(jumps, len(returned), float(np.median(step[begins[returned] - 1])), min(share, 1.0 - share))
+    length, back = ends - begins + 1, np.array(returned)
+    share = np.sum(np.minimum(length[back - 1], length[back])) / np.sum(length[back - 1] + length[back])
+    return Places(jumps, len(returned), float(np.median(step[begins[back] - 1])), float(share))
 
 
 def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:

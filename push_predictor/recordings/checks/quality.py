@@ -9,14 +9,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.finding import Finding, Severity, Value
 from push_predictor.recordings.checks.stream_facts import StreamFacts
+from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.cut import FIT_SAMPLES
 from push_predictor.recordings.windows.push_window import WindowOptions
 
 WINDOW = WindowOptions().duration  # s
 TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
-FEWEST_SAMPLES = 3  # of a stream in a window; two always fit a line, whatever their noise
+FEWEST_SAMPLES = 3  # in a window: with two, one push in thirty loses a window
+ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
+SPEED_NOISE, TOO_NOISY = 0.003, 0.01  # m/s of the tip: twice the least speed; a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
 FEWEST_HOLDS = 2
 LEVER = 0.05  # m of an outline from its centre
@@ -25,7 +28,10 @@ DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
 
 def quality_findings(facts: Mapping[str, StreamFacts]) -> list[Finding]:
     """Findings about streams of poses, by name."""
-    found = [of(name, each) for name, each in facts.items() for of in (_resolution, _source, _holds, _rate, _noise)]
+    every = (_resolution, _source, _holds, _rate, _noise)
+    found = [of(name, each) for name, each in facts.items() for of in every]
+    if "pusher" in facts:
+        found.append(_speed_noise(facts["pusher"]))
     return [finding for finding in found if finding is not None]
 
 
@@ -71,16 +77,16 @@ def _holds(name: str, facts: StreamFacts) -> Finding | None:
 
 def _rate(name: str, facts: StreamFacts) -> Finding | None:
     count = WINDOW / facts.source_period
-    if count > FIT_SAMPLES - 0.5:
+    if count > ENOUGH:
         return None
-    rate, least = 1.0 / facts.source_period, FIT_SAMPLES / WINDOW
+    rate, least = 1.0 / facts.source_period, FEWEST_SAMPLES / WINDOW
     sentence = f"The {name} has {rate:.3g} poses a second: {count:.1f} in a window of {WINDOW:g} s"
     values = {"rate": Value(rate, "Hz")}
-    advice = f"Record it with at least {least:.0f} Hz; 100 Hz is usual."
+    advice = f"At least {least:.0f} Hz are needed; 100 Hz are usual."
     if count < FEWEST_SAMPLES - 0.5:
-        sentence += ", too few for a speed and the begin and end of a push."
+        sentence += f", fewer than the {FEWEST_SAMPLES} that a speed and the begin and end of a push need."
         return Finding(f"rate_{name}", "refused", sentence, advice, values)
-    sentence += ". Begin and end of a push are known to one interval, and speeds have no redundant sample."
+    sentence += f". Begin and end of a push are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
     return Finding(f"rate_{name}", "warning", sentence, advice, values)
 
 
@@ -96,6 +102,18 @@ def _noise(name: str, facts: StreamFacts) -> Finding | None:
     values = {"noise": Value(facts.noise, "m"), "heading_noise": Value(facts.heading_noise, "rad")}
     advice = "A model learns this as spread of the outcome. Use a tracker of less noise, or larger markers."
     return Finding(f"noise_{name}", "warning", sentence, advice, values)
+
+
+def _speed_noise(facts: StreamFacts) -> Finding | None:
+    """Of the tip: a window's velocity is the slope of a line through few samples."""
+    count = max(FIT_SAMPLES, 1.0 + FIT_SPAN / facts.source_period)
+    noise = facts.noise / (facts.source_period * np.sqrt(count * (count**2 - 1.0) / 12.0))
+    if facts.coarse or noise < SPEED_NOISE:
+        return None
+    sentence = f"Noise of {1e3 * facts.noise:.2g} mm makes the tip's speeds uncertain by {1e3 * noise:.0f} mm/s."
+    advice = "Take the tip's pose from the robot's joints in place of a camera, or filter it without delay."
+    severity: Severity = "warning" if noise < TOO_NOISY else "refused"
+    return Finding("speed_noise", severity, sentence, advice, {"speed": Value(float(noise), "m/s")})
 
 
 def _step(quantum: float) -> str:

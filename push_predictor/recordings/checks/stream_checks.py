@@ -12,18 +12,18 @@ from dataclasses import replace
 from typing import Any
 
 from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.flips import without_flips
+from push_predictor.recordings.checks.orientation import has_heading
 from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies
 from push_predictor.recordings.checks.quality import quality_findings
 from push_predictor.recordings.checks.session import in_order, of_one_body, repeated_samples
+from push_predictor.recordings.checks.stamp_noise import regular_in_bursts, stamp_findings
 from push_predictor.recordings.checks.stamps import clocks_never_meet, stamps_of, unset_stamps
 from push_predictor.recordings.checks.stream_facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.units import stream_rates, stream_units
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.windows.regular_stamps import stamp_noise
 
-STAMPS = "Windows use regular stamps in their place. Better: stamp each sample when it is measured, not at receipt."
 FEWEST = 10  # samples of a stream that has facts
 
 
@@ -38,22 +38,25 @@ def stream_stage(evidence: Evidence) -> Evidence:
     found, sound = _jumps(recording)
     if any(finding.severity == "refused" for finding in found):
         return evidence.found(found)
-    flips, sound = without_flips(sound)
+    headed = has_heading(sound.slider)
+    flips, sound = without_flips(sound, rig.outline) if headed else (None, sound)
     found += [] if flips is None else [flips]
+    if flips is not None and flips.severity == "refused":
+        return evidence.found(found)
     if wrong_units := stream_units(sound, rig):
         return evidence.found([*found, *wrong_units])
-    facts, sound = _facts(sound)
-    found += [*quality_findings(facts), *_stamp_findings(recording)]
+    facts, sound = _facts(sound, headed)
+    found += [*quality_findings(facts), *stamp_findings(recording)]
     return replace(evidence.found(found, sound), facts=facts)
 
 
-def _facts(recording: Recording) -> tuple[dict[str, StreamFacts], Recording]:
-    """The facts of the streams of poses, and the recording as repaired."""
+def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
+    """The facts of the streams of poses, and the recording as repaired; headed: whether the slider has headings."""
     facts, repaired = dict[str, StreamFacts](), dict[str, Any]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        if len(poses := in_order(stream)) >= FEWEST:
-            facts[name], repaired[name] = pose_facts(poses, angle=name == "slider")
-            if repaired[name] is poses:
+        if len(poses := regular_in_bursts(in_order(stream))) >= FEWEST:
+            facts[name], repaired[name] = pose_facts(poses, angle=headed and name == "slider")
+            if repaired[name] is stream:
                 del repaired[name]
     return facts, replace(recording, **repaired) if repaired else recording
 
@@ -69,18 +72,3 @@ def _jumps(recording: Recording) -> tuple[list[Finding], Recording]:
     slider, pusher = (of_one_body(in_order(stream)) for stream in (recording.slider, recording.pusher))
     wrench = None if recording.wrench is None else in_order(recording.wrench)
     return found, replace(recording, slider=slider, pusher=pusher, wrench=wrench)
-
-
-def _stamp_findings(recording: Recording) -> list[Finding]:
-    """A note on streams whose stamps the window finder replaces by regular ones; empty without any."""
-    streams = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
-    noise = {name: stamp_noise(stream.stamp) for name, stream in streams.items() if stream is not None}
-    noisy = {name: each for name, each in noise.items() if each is not None and each.corrected}
-    if not noisy:
-        return []
-    listed = ", ".join(
-        f"{name} {1e3 * each.jitter:.2g} ms ({100.0 * each.jitter / each.period:.0f} % of the period)"
-        for name, each in noisy.items()
-    )
-    values = {f"{name}_jitter": Value(each.jitter, "s") for name, each in noisy.items()}
-    return [Finding("stamp_jitter", "note", f"The stamps have jitter (standard deviation): {listed}.", STAMPS, values)]

@@ -11,16 +11,19 @@ import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.held import HARMLESS, HeldPoses
+from push_predictor.recordings.windows.held import HeldPoses
 from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.recordings.windows.resolution import LEVER, Resolution, lengths
 from push_predictor.recordings.windows.smoothing import SHORTEST, SmoothedPoses, fit_span
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.recordings.windows.track import Track
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
-LEAST_SHARE = 0.3  # of the changes follow on repeats: the source is slower than its messages
-FEWEST_CHANGES = 20  # in motion, from which the rate of the source is estimated
+LEAST_SHARE = 0.1  # of the poses in motion are repeats: the source is slower than its messages
+MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
+FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is estimated
+AROUND = 25  # samples on either side that show whether a body moves: more than a slow source repeats a pose
+STEPS, LEAST_WAY = 3.0, 5e-5  # steps of the resolution, m: a body moves by more in one interval
 ROUNDED = np.sqrt(12.0)  # standard deviations of a rounding error in one step
 THIRD = np.sqrt(20.0)  # standard deviations of a third difference in one of a sample
 
@@ -75,7 +78,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
     kept = held.take(samples, final=True)
     smoothed = SmoothedPoses(track.is_jump, column).take(kept, final=True)
     period = float(np.median(np.diff(stream.stamp))) * NANOSECOND
-    source_period = _source_period(stream.stamp, pose, held, period)
+    source_period = _source_period(pose, quantum, period, len(held.dropouts))
     noise = _noise(values[_changed(pose)] if source_period > period else values)
     facts = StreamFacts(
         samples=len(stream),
@@ -89,7 +92,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
         held=held.stale,
         holds=tuple(held.dropouts),
     )
-    return facts, stream if not (held.stale or facts.coarse) else _with(stream, smoothed)
+    return facts, _with(stream, smoothed) if held.stale or facts.coarse else stream
 
 
 def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
@@ -99,17 +102,19 @@ def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
     return replace(stream, stamp=samples.stamp, x=x, y=y, z=z, heading=heading, tilt=tilt)
 
 
-def _source_period(stamp: IntArray, pose: Array, held: HeldPoses, period: float) -> float:
-    """The mean interval (s) of the changes in motion, where many of them follow on repeats; else the period."""
-    begins = _changed(pose)
-    change = np.linalg.norm(np.diff(pose[begins], axis=0), axis=1)
-    interval = np.diff(stamp[begins]) * NANOSECOND
-    longest = max(held.updates, default=0.0)
-    moving: BoolArray = (change > HARMLESS) & (interval <= max(longest, period))
-    count = int(np.sum(moving))
-    if count < FEWEST_CHANGES or len(held.updates) < LEAST_SHARE * count:
+def _source_period(pose: Array, quantum: float, period: float, holds: int) -> float:
+    """The mean interval (s) of new poses in motion, where many of them are repeated; else the period."""
+    if len(pose) <= 2 * AROUND:
         return period
-    return float(np.mean(interval[moving]))
+    way = np.linalg.norm(pose[2 * AROUND :] - pose[: -2 * AROUND], axis=1) / (2 * AROUND)
+    moving = way > np.maximum(STEPS * quantum, LEAST_WAY)
+    again = np.all(pose[1:] == pose[:-1], axis=1)[AROUND - 1 : -AROUND]
+    count = int(np.sum(moving))
+    share = float(np.mean(again[moving])) if count else 0.0
+    runs = int(np.sum(again[1:] & ~again[:-1] & moving[1:]))
+    if holds > MOST_HOLDS * runs:  # single losses, not a slow source
+        return period
+    return period / (1.0 - share) if count >= FEWEST_MOVING and LEAST_SHARE < share < 1.0 else period
 
 
 def _changed(pose: Array) -> IntArray:

@@ -19,6 +19,7 @@ LARGEST = 2.0  # m: reach of a slider
 HIGHEST_RATE = 20e3  # Hz of samples
 LOWEST_RATE = 1.0  # Hz
 LONGEST = 30.0  # s of a table's row
+SPEED_SPAN = 0.1  # s between the poses whose speed is judged
 PUSHER_MM = "Give positions in metres: divide by 1000."
 
 
@@ -94,8 +95,12 @@ def _rate(name: str, stream: PoseStream) -> Finding | None:
 
 
 def _speed(name: str, stream: PoseStream) -> Finding | None:
-    """Of the steps that contain half of the path: a few tracking errors, or long rests, do not matter."""
-    step, time = np.hypot(np.diff(stream.x), np.diff(stream.y)), 1e-9 * np.diff(stream.stamp)
+    """Of the steps that contain half of the path: a few tracking errors, or long rests, do not matter.
+
+    Steps of SPEED_SPAN: between two samples, stamps of receipt and poses of a slower source show no speed.
+    """
+    rows = _every(stream, SPEED_SPAN)
+    step, time = np.hypot(np.diff(stream.x[rows]), np.diff(stream.y[rows])), 1e-9 * np.diff(stream.stamp[rows])
     known = np.isfinite(step) & (time > 0.0)
     if not known.any():
         return None
@@ -113,6 +118,13 @@ def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
     return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})
+
+
+def _every(stream: PoseStream, span: float) -> slice:
+    """Samples about `span` s apart."""
+    step = np.diff(stream.stamp)
+    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
+    return slice(None, None, max(1, round(span / max(period, 1e-6))))
 
 
 def _weighted_median(values: Array, weights: Array) -> float:

@@ -29,7 +29,8 @@ MOST_STEPS = 4000  # evenly drawn
 FEWEST_STEPS = 20
 FLAT = 3.0  # the steps spread so many times farther in the plane, in its narrower direction, than out of it
 ROUNDS = 12  # of the robust fit of the plane
-ACCURACY = 1e-5  # m; a smaller distance from the plane is rounding
+NARROWEST = 0.02  # of the steps, in that direction: along one line they show no plane
+ACCURACY = 0.001  # of a step: a smaller distance from the plane is rounding
 UPRIGHT = np.radians(30.0)  # an axis this near to the vertical is meant to be up
 LENGTH_ALLOWANCE = 0.0005  # m that a tilted view may shorten the slider
 LIFT = 0.005  # m above the height of pushes
@@ -71,9 +72,9 @@ def up_findings(recording: Recording, rig: Rig) -> list[Finding]:
     if None in axes or "z" in axes:
         return [_tilted(wrong, values)]
     both = len(ups) == len(wrong) == 2 and len(set(axes)) == 1
-    options = ["--up " + (f"{axis}" if both else f"{name}={axis}") for name, axis in zip(wrong, axes, strict=True)]
-    given = " and ".join(f"`{option}`" for option in dict.fromkeys(options))
-    return [Finding("world_up", "refused", _raised(wrong), f"Turn the poses until z points up: {given}.", values)]
+    option = f"{axes[0]}" if both else ",".join(f"{name}={axis}" for name, axis in zip(wrong, axes, strict=True))
+    advice = f"Turn the poses until z points up: `--up={option}`."
+    return [Finding("world_up", "refused", _raised(wrong), advice, values)]
 
 
 def _raised(wrong: dict[str, Up]) -> str:
@@ -144,13 +145,13 @@ def _plane(steps: Array) -> Up | None:
     """
     if len(steps) < FEWEST_STEPS:
         return None
-    weight = np.ones(len(steps))
+    steps, weight = steps / np.linalg.norm(steps, axis=1, keepdims=True), np.ones(len(steps))  # a fast hand counts once
     for _ in range(ROUNDS):
         _, axes = np.linalg.eigh((steps * weight[:, None]).T @ steps)
         off = np.abs(steps @ axes[:, 0])
         weight = 1.0 / (off + ACCURACY)
     narrow = float(np.sqrt(np.median((steps @ axes[:, 1]) ** 2)))
-    if narrow < max(FLAT * float(np.median(off)), LEAST_STEP):
+    if narrow < max(FLAT * float(np.median(off)), NARROWEST):
         return None
     normal = axes[:, 0]
     return Up(normal * np.sign(normal[np.argmax(np.abs(normal))]))

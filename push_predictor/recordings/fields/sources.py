@@ -150,7 +150,7 @@ class Columns:
 
     stamp (n,) in ns: of the nearest header around the field, else when the message was logged or sent. values (n, k).
     valid (n,): readable. frame (n,): number of the frame that the header names among `frames`. absent (n,): readable,
-    but without the chosen element.
+    but without the chosen element, or with a matrix that is no pose.
     """
 
     stamp: IntArray
@@ -202,28 +202,38 @@ class FieldReader:
             absent[block.rows] = True
             for steps, which in places(block, self._fields[0]):
                 part, rows = block.where(which), block.rows[which]
-                if (numbers := self._numbers(part, steps)) is None:
+                if (found := self._numbers(part, steps)) is None:
                     continue
-                values[rows], valid[rows], absent[rows] = numbers, True, False
+                values[rows], absent[rows] = found
+                valid[rows] = ~absent[rows]
                 if self._header:
                     # The fields before the header are those before the field, with the same element.
                     header = ".".join([*steps[: len(self._header) - 1], "header"])
                     if not self._from_log:
-                        stamp[rows], valid[rows] = header_stamps(part, header)
+                        stamp[rows], sound = header_stamps(part, header)
+                        valid[rows] &= sound
                     names, number = part.text(f"{header}.frame_id")
                     frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
             if absent[block.rows].all() and len(self.names) < MOST_NAMES:
                 self.names |= element_names(block, self._fields[0])
         return Columns(stamp, values, valid, frame, tuple(frames), absent)
 
-    def _numbers(self, block: Block, first: Sequence[str]) -> Array | None:
-        """The numbers (n, count) of the fields; None without them. first: the steps of the first field."""
+    def _numbers(self, block: Block, first: Sequence[str]) -> tuple[Array, BoolArray] | None:
+        """The numbers (n, count) of the fields, and which rows are a matrix that is no pose; None without the fields.
+
+        first: the steps of the first field.
+        """
         paths = [block.paths(".".join(self._found(steps, first))) for steps in self._fields]
         if not all(paths):
             return None
         parts = [block.numbers(each) for each in paths]
         found = pose_rows_of(parts) if self._target is POSE_TARGET else np.hstack(parts)
-        return found if found is not None and found.shape[1] == self._target.count else None
+        if found is None or found.shape[1] != self._target.count:
+            return None
+        unfit = np.isnan(found).all(axis=1)
+        if unfit.any():
+            unfit &= np.isfinite(np.hstack(parts)).all(axis=1)
+        return found, np.asarray(unfit)
 
     def _found(self, steps: Sequence[Step], first: Sequence[str]) -> list[str]:
         """The steps of a field, with the elements that were chosen for the first field."""

@@ -135,14 +135,26 @@ class WindowCutter:
         }
 
 
-def pusher_motion(pusher: Track, begin: Array) -> tuple[Array, Array]:
+def pusher_motion(pusher: Track, begin: Array, end: Array) -> tuple[Array, Array]:
     """Positions (n, 2) m and velocities (n, 2) m/s at times (n,) s, by least-squares lines through the samples after.
 
-    Each line takes those of FIT_SPAN, and at least FIT_SAMPLES.
+    Each line takes those of FIT_SPAN, and at least FIT_SAMPLES, but none after `end` (n,) s. Where that leaves fewer
+    than two, it joins the positions at both times.
     """
     first = np.searchsorted(pusher.time, begin)
     last = np.maximum(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right"), first + FIT_SAMPLES)
-    last = np.minimum(last, len(pusher.time))
+    last = np.minimum(last, np.searchsorted(pusher.time, end, side="right"))
+    few = last < first + 2
+    position, velocity = np.empty((len(begin), 2)), np.empty((len(begin), 2))
+    position[few] = pusher.at(begin[few])[:, :2]
+    velocity[few] = (pusher.at(end[few])[:, :2] - position[few]) / (end - begin)[few, None]
+    if not few.all():
+        position[~few], velocity[~few] = _lines(pusher, begin[~few], first[~few], last[~few])
+    return position, velocity
+
+
+def _lines(pusher: Track, begin: Array, first: IntArray, last: IntArray) -> tuple[Array, Array]:
+    """Positions and velocities (n, 2) at times (n,) of lines through the samples from each first to each last."""
     count, rows = last - first, part_rows(first, last)
     time = pusher.time[rows] - np.repeat(begin, count)
     mean_time, mean = part_means(time[:, None], count), part_means(pusher.values[rows, :2], count)
@@ -159,7 +171,7 @@ def _motions(outline: Outline, slider: Track, pusher: Track, times: Array) -> _M
     """The motions between times (2, n) in s."""
     poses, tips = (track.at(times.ravel()).reshape(*times.shape, -1) for track in (slider, pusher))
     poses, tips = poses[..., [0, 1, 3]], tips[..., :2]
-    position, velocity = pusher_motion(pusher, times[0])
+    position, velocity = pusher_motion(pusher, times[0], times[1])
     touch, heading = outline.project(to_body(position, poses[0])), np.arctan2(velocity[:, 1], velocity[:, 0])
     contact, edge = touch.contact, outline.edge(touch.contact)[0]
     normal, angle = _angles(outline, contact, poses[0], heading)

@@ -15,7 +15,8 @@ import numpy as np
 
 from push_predictor.types import Array, BoolArray, IntArray
 
-FIXED = np.unique([np.round(2.0 * np.pi * turn / parts, 12) for parts in (2, 3, 4, 5, 6) for turn in range(1, parts)])
+# rad: turns that map 2 to 6, or 8, equal markers onto each other
+FIXED = np.unique([np.round(2.0 * np.pi * turn / parts, 12) for parts in (4, 5, 6, 8) for turn in range(1, parts)])
 NEAR = 0.05  # rad from a fixed angle; a pushed body turns less between two samples
 STAYS, SPEED = 0.001, 0.2  # m, m/s: a body that moves no farther between two samples stays in its place
 LONGEST_STEP = 150_000_000  # ns between two samples: in a longer time a body can have been turned

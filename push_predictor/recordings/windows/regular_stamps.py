@@ -15,6 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.windows.bursts import WIDTH, burst_period, floor_at, missing_in_bursts
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -30,16 +31,21 @@ POWER = 400.0  # half a period is over four standard deviations of the excess st
 LIMIT = 4.0  # jitters by which an interval deviates at most
 AROUND = 50  # samples before and after one that determine its stamp
 ROWS = 4096  # stamps that are fitted at once: each needs its neighbours' in memory, 1 kB a time
+BURST_PERIODS = 12.0  # in which samples may be held up: a longer interval is a gap
 KEPT = max(AROUND, 5 * MOST_WIDTH)  # samples that are kept before those that were not returned yet
 
 
 @dataclass(frozen=True)
 class StampNoise:
-    """Usual interval and jitter, the standard deviation of a stamp, in s; corrected: whether stamps are replaced."""
+    """Usual interval and jitter, the standard deviation of a stamp, in s; corrected: whether stamps are replaced.
+
+    bursts: the stamps are those of receipt, in bursts.
+    """
 
     period: float
     jitter: float
     corrected: bool
+    bursts: bool = False
 
 
 class RegularStamps:
@@ -100,7 +106,8 @@ class RegularStamps:
     def _regular(self, new: OrderedSamples, noise: StampNoise, final: bool) -> OrderedSamples:
         before = new.stamp[:1] if self._last is None else np.array([self._last])
         gap = np.diff(np.concatenate([before, new.stamp])) * NANOSECOND
-        begins = np.flatnonzero((gap > longest_interval(noise.period)) | new.interrupted)
+        longest = BURST_PERIODS * noise.period if noise.bursts else longest_interval(noise.period)
+        begins = np.flatnonzero((gap > longest) | new.interrupted)
         found = []
         for number, rows in enumerate(np.split(np.arange(len(new.stamp)), begins)):
             if number or self._segment is None:
@@ -119,7 +126,7 @@ class _Segment:
     """An uninterrupted run of samples; number: of each in the grid, as far as it is known."""
 
     def __init__(self, noise: StampNoise, nothing: OrderedSamples) -> None:
-        self._noise, self._width = noise, width(noise)
+        self._noise, self._width = noise, WIDTH if noise.bursts else width(noise)
         self._samples = nothing
         self._number = np.empty(0, np.int64)
         self._returned = 0  # of the samples that are kept
@@ -137,11 +144,16 @@ class _Segment:
         begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
         found = taken(self._samples, slice(begin, end))
         stamp = self._samples.stamp[: len(self._number)]
-        parts = [_line_at(stamp, self._number, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
+        parts = [self._line_at(stamp, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
         regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
         self._returned = end
         self._forget()
         return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
+
+    def _line_at(self, stamp: IntArray, begin: int, end: int) -> IntArray:
+        if self._noise.bursts:
+            return floor_at(stamp, self._number, self._noise.period, begin, end, AROUND)
+        return _line_at(stamp, self._number, begin, end)
 
     def _count(self, closed: bool) -> None:
         """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
@@ -149,7 +161,10 @@ class _Segment:
         end = max(len(self._samples.stamp) - (0 if closed else 3 * self._width), known)
         if end == known:
             return
-        missing = missing_before(self._samples.stamp, self._noise)[known:end]
+        stamp = self._samples.stamp
+        bursts = self._noise.bursts
+        missing = missing_in_bursts(stamp, self._noise.period) if bursts else missing_before(stamp, self._noise)
+        missing = missing[known:end]
         last = int(self._number[-1]) if known else -1
         self._number = np.concatenate([self._number, last + np.cumsum(missing + 1)])
 
@@ -193,6 +208,8 @@ def stamp_noise(stamp: IntArray) -> StampNoise | None:
         return None
     usual = float(np.median(interval[interval > 0.0]))
     jitter = float(_jitter(interval, usual))
+    if (period := burst_period(stamp[:DECIDING])) is not None:
+        return StampNoise(period, jitter, corrected=True, bursts=True)
     large = max(SHARE * usual, LEAST) < jitter <= LARGEST_SHARE * usual
     return StampNoise(usual, jitter, bool(large and _is_regular(interval - usual, LIMIT * jitter)))
 

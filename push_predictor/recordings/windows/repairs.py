@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is repaired in a stream in order: stale poses, stamps with jitter, and a coarse resolution."""
+"""What is repaired in a stream in order: stale poses, stamps with jitter, a coarse resolution, and a low rate."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from push_predictor.recordings.windows.held import HeldPoses
 from push_predictor.recordings.windows.regular_stamps import RegularStamps
 from push_predictor.recordings.windows.resolution import Resolution, lengths
+from push_predictor.recordings.windows.slow import SlowPoses
 from push_predictor.recordings.windows.smoothing import SmoothedPoses
 from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, with_values
 from push_predictor.types import Array
@@ -18,7 +19,7 @@ from push_predictor.types import Array
 class StreamRepairs:
     """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
 
-    held, smoothed: None for a stream without a position. The result does not depend on the portions.
+    held, smoothed, slow: None for a stream without a position. The result does not depend on the portions.
     """
 
     def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
@@ -29,6 +30,7 @@ class StreamRepairs:
         self.regular = RegularStamps()
         self.held = None if is_jump is None else HeldPoses(angle)
         self.smoothed = None if is_jump is None else SmoothedPoses(is_jump, angle)
+        self.slow = None if is_jump is None else SlowPoses(is_jump, fill=angle is not None, angle=angle)
         self._resolution = Resolution(2 if angle is None else 3)
         self._angle = angle
         self._heading: Array = np.empty(0)  # the last one, rad
@@ -36,17 +38,19 @@ class StreamRepairs:
     @property
     def waiting(self) -> int:
         """How many samples wait."""
-        return self.regular.waiting + sum(step.waiting for step in (self.held, self.smoothed) if step is not None)
+        return self.regular.waiting + sum(
+            step.waiting for step in (self.held, self.smoothed, self.slow) if step is not None
+        )
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        if self.held is None or self.smoothed is None:
+        if self.held is None or self.smoothed is None or self.slow is None:
             return self.regular.take(new, final)
         values = self._unwrapped(new.values)
         # The repair of one must not hide the resolution from the next: they get it as a further column.
         quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
         new = with_values(new, np.column_stack([values, quantum]))
-        for step in (self.held, self.regular, self.smoothed):
+        for step in (self.held, self.regular, self.smoothed, self.slow):
             new = step.take(new, final)
         return with_values(new, new.values[:, :-1])
 

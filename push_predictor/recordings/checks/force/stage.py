@@ -79,7 +79,7 @@ def wrench_findings(
         return []
     free = _free(motion, rig) if outlined else np.zeros(len(motion.time), dtype=np.bool_)
     zero, spread = _zero(motion.force[free])
-    touching = motion.contact & np.isfinite(motion.force[:, 0])
+    touching = motion.touching & np.isfinite(motion.force[:, 0])
     if np.sum(touching) < FEWEST:
         return []
     few = len(np.unique(motion.push[touching])) < FEWEST_PUSHES

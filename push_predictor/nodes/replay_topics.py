@@ -12,7 +12,6 @@ from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException, ParameterException
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, ReliabilityPolicy
@@ -20,6 +19,7 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.qos import message_class, replay_profile
+from push_predictor.nodes.runtime import of_rcl
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.fields.sources import SCALAR_FIELDS, TF_TYPES
 
@@ -121,9 +121,9 @@ class ReplayTopics:
         try:
             options = QoSOverridingOptions.with_default_policies()
             return self._node.create_publisher(found, name, profile, qos_overriding_options=options)
-        except rclpy_implementation.RCLError:  # a RuntimeError too, but not about an override
-            raise
         except (InvalidQosOverridesError, ParameterException, RuntimeError, TypeError) as error:
+            if of_rcl(error):  # not about an override
+                raise
             raise PushPredictorError(f"qos_overrides.{topic}.publisher: {error}, give a QoS policy") from None
 
 

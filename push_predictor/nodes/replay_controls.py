@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import traceback
 from collections.abc import Callable
 from functools import partial
 from types import ModuleType
@@ -17,10 +16,9 @@ from builtin_interfaces.msg import Duration, Time
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from msg_adapters.predictions import refuse
-from push_predictor.error_codes import ErrorCode, error_code
+from msg_adapters import stamp_to_ns
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
-from push_predictor.replay.clock import SECOND
+from push_predictor.nodes.runtime import refusal
 from push_predictor.replay.player import PlayRange, ReplayPlayer
 from push_predictor_interfaces import srv as own_types
 
@@ -46,7 +44,7 @@ class ReplayControls:
             "Play": self._play,
             "PlayNext": self._play_next,
             "Burst": self._burst,
-            "Seek": lambda request, response: player.seek(_nanoseconds(request.time)),
+            "Seek": lambda request, response: player.seek(stamp_to_ns(request.time)),
             "Stop": lambda request, response: player.stop(),
         }
         for kind, handler in handlers.items():
@@ -56,19 +54,13 @@ class ReplayControls:
             node.create_service(getattr(types, kind), f"~/{name}", callback, callback_group=group)
 
     def _guarded(self, handler: Callable[[Any, Any], object], request: Any, response: Any) -> Any:
-        """Turn every exception into a refusal: one that left a callback would end the node."""
         try:
             handler(request, response)
-            if hasattr(response, "success"):
-                response.success = True
-            return response
-        except PushPredictorError as error:
-            self._node.get_logger().warning(str(error))
-            return refuse(response, str(error), error_code(error))
         except Exception as error:
-            self._node.get_logger().error(traceback.format_exc())
-            reason = f"internal error, see the log of the node: {error!r}"
-            return refuse(response, reason, ErrorCode.INTERNAL_ERROR)
+            return refusal(error, response, self._node.get_logger())
+        if hasattr(response, "success"):
+            response.success = True
+        return response
 
     def _set_rate(self, request: Any, response: Any) -> None:
         if not self._player.set_rate(request.rate):
@@ -76,7 +68,7 @@ class ReplayControls:
 
     def _play(self, request: Any, response: Any) -> None:
         duration, until = _limit(request.playback_duration), _limit(request.playback_until_timestamp)
-        if not self._player.play(PlayRange(max(0, _nanoseconds(request.start_offset)), duration, until)):
+        if not self._player.play(PlayRange(max(0, stamp_to_ns(request.start_offset)), duration, until)):
             raise BusyError("a playback is running: end it with ~/stop")
 
     def _play_next(self, request: Any, response: Any) -> None:
@@ -101,10 +93,6 @@ def _imported_rosbag2() -> ModuleType | None:
         return None
 
 
-def _nanoseconds(time: Time | Duration) -> int:
-    return int(time.sec) * SECOND + int(time.nanosec)
-
-
 def _limit(time: Time | Duration) -> int | None:
     """None for 0: an empty request plays everything."""
-    return value if (value := _nanoseconds(time)) > 0 else None
+    return value if (value := stamp_to_ns(time)) > 0 else None

@@ -1,17 +1,51 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The folder that a validator writes: result, residuals and report."""
+"""What a validator publishes of each window, and what it writes at the end of a run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.markers import window_markers
+from msg_adapters.residuals import alarm_to_message
 from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json, alarm_sentence
+from push_predictor.models.prediction import Prediction
+from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import one_line
 from push_predictor.nodes.validator.validation_run import ValidationRun
-from push_predictor.online.report_process import ReportWriter
+from push_predictor.online.child_process import Child
+from push_predictor.online.live_validation import write_report
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor_interfaces.msg import PushAlarm, PushResidual
+
+
+class ResultPublishers:
+    """Publishers of push_residual, push_alarm and push_markers. world: returns the frame in which the poses are."""
+
+    def __init__(self, node: Node, world: Callable[[], str]) -> None:
+        self._log, self._world = node.get_logger(), world
+        self._residuals = node.create_publisher(PushResidual, "push_residual", 1000)
+        self._alarms = node.create_publisher(PushAlarm, "push_alarm", LATCHED)
+        self._markers = node.create_publisher(MarkerArray, "push_markers", 100)  # for a burst after a stall
+
+    def publish(self, rig: Rig, model: int, window: PushWindow, prediction: Prediction, residual: PushResidual) -> None:
+        """Publish the residual of a window; markers only of the main model, 0, and while somebody subscribes."""
+        self._residuals.publish(residual)
+        if model == 0 and self._markers.get_subscription_count():
+            self._markers.publish(window_markers(rig, window, prediction, self._world()))
+
+    def alarm(self, model: str, state: AlarmState, end: int) -> None:
+        """Log and publish an alarm about a model that has fired; end: of the push at which it fired, ns."""
+        self._log.warning(alarm_sentence(alarm_json(state)))
+        self._alarms.publish(alarm_to_message(state, model, end, self._world()))
 
 
 class ResultWriter:
@@ -19,7 +53,7 @@ class ResultWriter:
 
     def __init__(self, output: str, log: Any) -> None:
         self.folder = _folder(output)
-        self.report = ReportWriter()
+        self.report = Child("report", write_report)
         self._log = log
         self._has_result = False
 
@@ -40,13 +74,14 @@ class ResultWriter:
         if not len(run.validation.predicted()):
             self._log.warning(f"The result has no score: {windows} windows were found, and none was predicted.")
         if with_report and len(run.validation.predicted()):
-            self.report.start(run.validation, self.folder, None if run.alarm is None else run.alarm.json)
+            alarm = None if run.alarm is None else run.alarm.json
+            self.report.start(*run.validation.reported(), self.folder, alarm)
             self._log.info(f"Writing the report {self.folder / 'report.html'}, which takes some seconds.")
         return ""
 
     def close(self) -> None:
         """End a report that is being written."""
-        if self.report.busy:
+        if self.report.alive:
             self._log.warning("The report was interrupted. `push_predictor report validation` writes one.")
         self.report.stop()
 

@@ -1,24 +1,103 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether the streams of a validation are in step: in a fast replay the middleware may delay one of them."""
+"""What a validator reports of its live streams: each topic, and whether the streams are in step.
+
+In a fast replay the middleware may delay one of them.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from time import monotonic
+
+import numpy as np
 
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG
+from push_predictor.recordings.windows.regular_stamps import stamp_noise
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP
 from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, describe_clock_offset
+from push_predictor.types import IntArray
 
+SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another clock
 PATIENCE = 5.0  # s of waiting for a stream that lags behind
 # ns; the finder proceeds without a stream that lags by twice as much
 SENSOR_LAG, SCALAR_LAG = 0.5e9 * LONGEST_LAG, 0.5 * LONGEST_GAP
 SILENT = 2.0  # s without a sample after which a stream is called silent
 LAGS = 50  # portions of a stream over which its stamps are compared with the slider's
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """What is known of a topic. stream: slider, pusher or wrench; kind: the message type; reliability: '' without one.
+
+    refused: whether the topic cannot be used as it is. figures: in words, empty before enough messages came.
+    """
+
+    stream: str
+    topic: str
+    kind: str
+    reliability: str
+    frames: tuple[str, ...] = ()
+    figures: str = ""
+    problem: str = ""
+    refused: bool = False
+    note: str = ""
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What has to change for the line to be logged again: not its figures."""
+        return self.topic, self.kind, self.reliability, self.frames, self.problem, self.note, bool(self.figures)
+
+    @property
+    def line(self) -> str:
+        """The report in one line."""
+        parts = [self.topic, self.kind, self.reliability]
+        parts += [f"frame_id {' and '.join(map(repr, self.frames))}"] if self.frames else []
+        text = f"{self.stream}: {', '.join(filter(None, [*parts, self.figures]))}"
+        return " ".join([f"{text}.", *filter(None, (self.problem, self.note))])
+
+
+def stamp_figures(stamp: IntArray, received: IntArray | None) -> str:
+    """Rate, jitter (standard deviation of a stamp) and latency of messages, in words; empty for too few.
+
+    stamp (n,), received (n,): in ns, in order; received: None if it is not known. A great latency means that the stamps
+    are of another clock than that of this machine, as in a replay.
+    """
+    if (noise := stamp_noise(stamp)) is None:
+        return ""
+    found = f"{1.0 / noise.period:.1f} Hz, stamp jitter {1e3 * noise.jitter:.2g} ms"
+    if received is None:
+        return found
+    latency = 1e-9 * float(np.median(received - stamp))
+    return f"{found}, " + (
+        "stamps of another clock" if abs(latency) > SAME_CLOCK else f"latency {1e3 * latency:.2g} ms"
+    )
+
+
+class ReportLog:
+    """Which reports are news: a report is logged when it differs from the one before, and stays so for a second look.
+
+    A refusal is logged at once.
+    """
+
+    def __init__(self) -> None:
+        self._logged: dict[str, tuple[object, ...]] = {}
+        self._seen: dict[str, tuple[object, ...]] = {}
+
+    def news(self, reports: Iterable[TopicReport]) -> list[TopicReport]:
+        """The reports to log now."""
+        found = []
+        for report in reports:
+            stable = self._seen.get(report.stream) == report.key
+            self._seen[report.stream] = report.key
+            if (stable or report.refused) and self._logged.get(report.stream) != report.key:
+                self._logged[report.stream] = report.key
+                found.append(report)
+        return found
 
 
 class StreamSync:

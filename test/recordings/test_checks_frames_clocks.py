@@ -1,0 +1,240 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Frames with another axis up, points away from the tip, clocks that drift or are set, noise and fast pushes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checked_bags import bag, found, rig_of, sample
+from coarse import coarse_simulator
+from lab_bags import pose_rows
+from mistakes import UPSIDE_DOWN, late, spatial_rows
+
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.shapes import ellipse
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.motion import motion_of
+from push_predictor.recordings.checks.push_lags import push_lags
+from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
+from push_predictor.recordings.fields.pose_rows import composed
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording, taken
+from push_predictor.simulation.pushes import random_pushes
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.slider import Slider
+from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.types import Array
+
+HEXAGON, MANY = "hexagon_delrin", "square_abs_repeats"
+BOTH = ("slider", "pusher")
+
+
+def about(axis: str, degrees: float) -> Array:
+    half = 0.5 * np.radians(degrees)
+    return np.array([*(np.sin(half) * np.eye(3)["xyz".index(axis)]), np.cos(half)])
+
+
+def turned_world(
+    recording: Recording, turn: Array, streams: tuple[str, ...] = BOTH, body: Array | None = None
+) -> Recording:
+    """Poses in a world turned by a quaternion; body: a turn of the slider's own frame."""
+    made = {"slider": slider_stream, "pusher": pusher_stream}
+    altered = {}
+    for name in streams:
+        stream: PoseStream = getattr(recording, name)
+        own = body if body is not None and name == "slider" else np.array([0.0, 0.0, 0.0, 1.0])
+        none = np.zeros((len(stream), 3))
+        outer, inner = (np.hstack([none, np.tile(each, (len(stream), 1))]) for each in (turn, own))
+        altered[name] = made[name](stream.stamp, composed(composed(outer, pose_rows(stream)), inner))
+    return replace(recording, **altered)
+
+
+# --- up --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("turn", "streams", "option"),
+    [
+        (about("x", -90.0), BOTH, "y"),
+        (about("x", 90.0), BOTH, "-y"),
+        (about("y", 90.0), BOTH, "x"),
+        (about("x", -90.0), ("slider",), "slider=y"),
+        (about("y", -90.0), ("slider",), "slider=-x"),
+        (about("x", 90.0), ("pusher",), "pusher=-y"),
+        (about("x", 180.0), BOTH, "-z"),
+        (about("x", 180.0), ("slider",), "slider=-z"),
+        (about("y", 180.0), ("pusher",), "pusher=-z"),
+    ],
+)
+@pytest.mark.parametrize("name", [HEXAGON, "square_abs_test"])
+def test_an_axis_other_than_z_that_is_up_is_named(
+    name: str, turn: Array, streams: tuple[str, ...], option: str
+) -> None:
+    (finding,) = check_recording(turned_world(sample(name), turn, streams), rig_of(name))
+    assert (finding.name, finding.severity) == ("world_up", "refused")
+    assert f"`--up={option}`" in finding.advice
+
+
+def test_a_slider_that_a_hand_lifts_at_times_shows_the_plane_of_the_pushes() -> None:
+    slider = bag(HEXAGON).slider
+    time = 1e-9 * (slider.stamp - slider.stamp[0])
+    lift = np.where(time % 10.0 < 2.0, 0.02 * (1.0 - np.cos(np.pi * time)), 0.0)
+    recording = replace(bag(HEXAGON), slider=replace(slider, x=slider.x + 0.5 * lift, z=slider.z + lift))
+    assert not {"world_up", "world_tilted"} & set(found(recording, rig_of(HEXAGON)))
+
+
+def test_a_body_frame_upside_down_is_no_world_upside_down() -> None:
+    upside_down = slider_stream(bag(HEXAGON).slider.stamp, spatial_rows(bag(HEXAGON).slider, UPSIDE_DOWN))
+    findings = found(replace(bag(HEXAGON), slider=upside_down), rig_of(HEXAGON))
+    assert list(findings) == ["slider_tilted"] and "points down" in findings["slider_tilted"].sentence
+
+
+def test_a_body_and_a_world_upside_down_are_named() -> None:
+    """The tilt of the body is 0 then: the tip, lifted towards negative z, shows it."""
+    (finding,) = check_recording(turned_world(bag(HEXAGON), about("x", 180.0), body=UPSIDE_DOWN), rig_of(HEXAGON))
+    assert finding.name == "world_up" and "`--up=-z`" in finding.advice
+
+
+def test_a_body_whose_x_axis_is_up_has_no_heading() -> None:
+    lying = turned_world(bag(HEXAGON), about("x", 0.0), ("slider",), about("y", 90.0))
+    (finding,) = check_recording(lying, rig_of(HEXAGON))
+    assert (finding.name, finding.severity) == ("slider_tilted", "refused")
+
+
+@pytest.mark.parametrize(("degrees", "severity"), [(3.0, None), (14.0, "warning"), (50.0, "refused")])
+def test_a_tilted_world_is_named_if_it_shortens_the_slider(degrees: float, severity: str | None) -> None:
+    findings = found(turned_world(bag(HEXAGON), about("y", degrees)), rig_of(HEXAGON))
+    assert {name: each.severity for name, each in findings.items()} == ({"world_tilted": severity} if severity else {})
+    if severity:
+        assert findings["world_tilted"].values["slider_tilt"].value == pytest.approx(np.radians(degrees), abs=0.02)
+
+
+# --- the tip ---------------------------------------------------------------------------------------------------------
+
+
+def with_tracked_point(recording: Recording, place: tuple[float, float, float], turns: bool = False) -> Recording:
+    """The pose of a point of the tool in place of the tip's; turns: the tool turns during the recording."""
+    pusher = recording.pusher
+    heading = np.linspace(0.0, 9.0, len(pusher)) if turns else np.zeros(len(pusher))
+    x, y = rotate(np.tile(place[:2], (len(pusher), 1)), heading).T
+    moved = replace(pusher, x=pusher.x + x, y=pusher.y + y, z=pusher.z + place[2], heading=wrap_angle(heading))
+    return replace(recording, pusher=moved)
+
+
+def test_a_flange_above_the_tip_is_named_with_its_height() -> None:
+    (finding,) = check_recording(with_tracked_point(bag(HEXAGON), (0.0, 0.0, 0.12)), rig_of(HEXAGON))
+    assert (finding.name, finding.severity) == ("tip_height", "refused")
+    assert finding.values["height"].value == pytest.approx(0.12, abs=0.012) and "not of the flange" in finding.advice
+
+
+def test_a_point_above_and_away_from_the_tip_is_named_with_both() -> None:
+    findings = found(with_tracked_point(bag(HEXAGON), (0.06, 0.0, 0.12)), rig_of(HEXAGON))
+    assert list(findings) == ["tip_height", "frames_apart"]
+    assert findings["frames_apart"].values["frame_x"].value == pytest.approx(-0.06, abs=2e-4)
+    assert "not of the flange" in findings["frames_apart"].advice
+
+
+@pytest.mark.parametrize("place", [(0.004, -0.002, 0.0), (0.05, 0.02, 0.0)])
+def test_the_tips_place_along_the_axes_of_a_tool_that_turns_is_found(place: tuple[float, float, float]) -> None:
+    (finding,) = check_recording(with_tracked_point(bag(HEXAGON), place, turns=True), rig_of(HEXAGON))
+    assert (finding.name, finding.severity) == ("tip_offset", "warning")
+    assert [finding.values[axis].value for axis in "xy"] == pytest.approx([-place[0], -place[1]], abs=2e-4)
+
+
+@pytest.mark.parametrize("scale", [1.03, 0.96])
+def test_a_tracker_of_another_scale_is_no_wrong_shape(scale: float) -> None:
+    slider = bag(HEXAGON).slider
+    scaled = replace(bag(HEXAGON), slider=replace(slider, x=scale * slider.x, y=scale * slider.y))
+    (finding,) = check_recording(scaled, rig_of(HEXAGON))
+    assert finding.name == "frames_apart"
+    assert finding.values["frame_scale"].value == pytest.approx(scale, abs=1e-3)
+
+
+# --- clocks ----------------------------------------------------------------------------------------------------------
+
+
+def stepped(recording: Recording, name: str, sizes: dict[float, float]) -> Recording:
+    """A stream whose clock is set by sizes (s) at shares of the recording: {share: size}."""
+    stream: PoseStream = getattr(recording, name)
+    stamp = stream.stamp.copy()
+    for share, size in sizes.items():
+        stamp[round(share * len(stamp)) :] += round(1e9 * size)
+    return replace(recording, **{name: replace(stream, stamp=stamp)})
+
+
+@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("size", [0.4, -0.4, 0.06, 37.0])
+def test_a_clock_that_was_set_is_named_with_size_and_time(name: str, size: float) -> None:
+    recording = bag(MANY)
+    (finding,) = check_recording(stepped(recording, name, {0.4: size}), rig_of(MANY))
+    assert (finding.name, finding.severity) == ("clock_step", "warning")
+    relative = size if name == "slider" else -size
+    assert finding.values["step"].value == pytest.approx(relative, abs=0.005)
+    stamp = getattr(recording, name).stamp
+    when = 1e-9 * float(stamp[round(0.4 * len(stamp))] - recording.slider.stamp[0])
+    assert finding.values["time"].value == pytest.approx(when, abs=0.1)
+    assert f"the {name}'s {'forward' if size > 0.0 else 'back'}" in finding.sentence
+
+
+def test_several_steps_are_named_each() -> None:
+    (finding,) = check_recording(stepped(bag(MANY), "slider", {0.3: 0.2, 0.7: -0.1}), rig_of(MANY))
+    steps = [finding.values[f"step_{k}"].value for k in (1, 2)]
+    assert finding.name == "clock_step" and steps == pytest.approx([0.2, -0.1], abs=0.005)
+
+
+@pytest.mark.parametrize(("name", "ppm"), [("slider", 800.0), ("pusher", 800.0), ("slider", -2000.0)])
+def test_a_clock_that_drifts_is_named_with_its_rate(name: str, ppm: float) -> None:
+    stream: PoseStream = getattr(bag(MANY), name)
+    stamp = stream.stamp + ((stream.stamp - bag(MANY).slider.stamp[0]) * 1e-6 * ppm).astype(np.int64)
+    (finding,) = check_recording(replace(bag(MANY), **{name: replace(stream, stamp=stamp)}), rig_of(MANY))
+    assert (finding.name, finding.severity) == ("clock_drift", "warning")
+    relative = ppm if name == "slider" else -ppm
+    assert 1e6 * finding.values["drift"].value == pytest.approx(relative, rel=0.05)
+    assert ("fast" if relative > 0.0 else "slow") in finding.sentence
+
+
+@pytest.mark.parametrize("lag", [0.06, -0.3, 5.0])
+def test_a_constant_lag_is_found_however_long(lag: float) -> None:
+    finding = found(late(sample("square_abs_test"), lag), rig_of("square_abs_test"))["clocks_apart"]
+    assert finding.values["lag"].value == pytest.approx(lag, abs=0.003)
+
+
+def test_lags_of_single_pushes_are_those_of_the_stamps() -> None:
+    lags = push_lags(late(bag(HEXAGON), 0.04), rig_of(HEXAGON))
+    assert lags is not None and lags.share > 0.9
+    assert np.median(lags.lag) == pytest.approx(0.04, abs=0.003)
+
+
+# --- noise and speed -------------------------------------------------------------------------------------------------
+
+
+def noisy(recording: Recording, length: float, angle: float, rate: float) -> Recording:
+    slider, rng = recording.slider, np.random.default_rng(0)
+    keep = np.unique(np.searchsorted(slider.stamp, np.arange(slider.stamp[0], slider.stamp[-1], 1e9 / rate)))
+    slider = taken(slider, keep)
+    x, y, heading = rng.normal(size=(3, len(slider))) * np.array([[length], [length], [angle]])
+    moved = replace(slider, x=slider.x + x, y=slider.y + y, heading=wrap_angle(slider.heading + heading))
+    return replace(recording, slider=moved)
+
+
+@pytest.mark.parametrize(("length", "degrees", "rate"), [(0.001, 0.5, 30.0), (0.0005, 0.2, 60.0), (3e-5, 0.0, 20.0)])
+def test_the_noise_of_a_tracker_is_no_fault_of_outline_or_clock(length: float, degrees: float, rate: float) -> None:
+    findings = found(noisy(bag("square_abs_test"), length, np.radians(degrees), rate), rig_of("square_abs_test"))
+    assert not [name for name in findings if name.startswith(("outline", "clock", "tip", "frames", "wrench"))]
+
+
+@pytest.mark.parametrize("speed", [0.15, 0.3])
+def test_fast_pushes_are_no_fault_of_the_outline(speed: float) -> None:
+    slider = Slider("oval", ellipse(0.05, 0.04), 0.8)
+    with coarse_simulator(2.0):
+        plan = random_pushes(20, (speed,), 0.03, np.random.default_rng(0))
+        recording = simulate(SimulationSpec(slider, "abs", plan, seed=1))
+    rig: Rig | None = recording.rig
+    assert rig is not None
+    motion = motion_of(recording, rig)
+    assert motion is not None and np.sum(motion.touching) < np.sum(motion.contact)
+    assert not [name for name in found(recording, rig) if name.startswith(("outline_s", "clock", "tip", "frames"))]
