@@ -167,3 +167,9 @@ def test_windows_are_the_same_online(alter: Callable[[Recording], Recording]) ->
     found += finder.finish()
     expected = windows_of(recording)
     assert [(window.push_id, window.start) for window in found] == [(each.push_id, each.start) for each in expected]
+
+
+def test_a_rare_force_begins_and_ends_no_window() -> None:
+    """At 10 Hz its line between two samples begins up to 0.1 s before the touch."""
+    rare, blind = (windows_of(each) for each in (at_rate(bag(NAME), 10.0), replace(bag(NAME), wrench=None)))
+    assert [(window.start, window.end) for window in rare] == [(window.start, window.end) for window in blind]

@@ -37,6 +37,7 @@ ABSENT = 0.2  # share of the contacts with a force
 FRICTION = (0.04, 3.0)  # of the force over the slider's weight: no surface has less or more
 PLAUSIBLE = (0.08, 1.2)  # of the same: a unit with which it lies there is named
 FRICTION_FACTOR = 3.0  # the force over that of the known friction, or its inverse
+PUSHED = 75.0  # percentile: a noisy tracker takes some rest for contact
 GRAVITY = 9.81  # m/s^2
 UNITS = {"kN": 1e3, "kgf": 9.80665, "lbf": 4.44822, "gf": 9.80665e-3, "mN": 1e-3}  # N
 
@@ -163,7 +164,7 @@ def _absent(size: Array, least: float) -> Finding | None:
 
 def _scale(size: Array, rig: Rig) -> Finding | None:
     """A finding if no friction explains the force: the slider's weight times its friction moves it."""
-    force = float(np.median(size))
+    force = float(np.percentile(size, PUSHED))
     if rig.object_mass is None or force == 0.0:
         return None
     weight = GRAVITY * rig.object_mass
@@ -177,7 +178,7 @@ def _scale(size: Array, rig: Rig) -> Finding | None:
         return None
     fitting = {unit: newton for unit, newton in UNITS.items() if plausible[0] <= share * newton <= plausible[1]}
     sentence = (
-        f"The force in contact is {force:.3g} N in the median, {share:.2g} of the slider's weight of {weight:.3g} N: "
+        f"The force in contact is about {force:.3g} N, {share:.2g} of the slider's weight of {weight:.3g} N: "
         f"friction makes it {lowest:.2g} to {highest:.2g}."
     )
     if fitting:
