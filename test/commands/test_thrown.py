@@ -38,8 +38,9 @@ def status_of(call: list[str]) -> object:
 
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_a_call_of_random_files_and_options_ends_in_one_line(
-    thrower: Thrower, group: int, capsys: pytest.CaptureFixture[str]
+    thrower: Thrower, group: int, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(tmp_path)  # some options name a file
     for number in range(group * CALLS, (group + 1) * CALLS):
         call = thrower.call(number)
         status, err = status_of(call), capsys.readouterr().err

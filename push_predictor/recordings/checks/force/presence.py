@@ -54,6 +54,8 @@ def _stuck(time: Array, force: Array, motion: Motion) -> BoolArray:
 
     A force of 0 throughout is absent.
     """
+    if not len(time):
+        return np.zeros(0, dtype=np.bool_)
     run = np.concatenate([[0], np.cumsum((np.diff(force, axis=0) != 0.0).any(axis=1))])
     first, last = (np.searchsorted(run, np.arange(run[-1] + 1), side=side) for side in ("left", "right"))
     found = np.zeros(len(run), dtype=np.bool_)
