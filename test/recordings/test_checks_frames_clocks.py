@@ -17,8 +17,8 @@ from mistakes import UPSIDE_DOWN, late, spatial_rows
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
 from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.clocks.push_lags import push_lags
 from push_predictor.recordings.checks.motion import motion_of
-from push_predictor.recordings.checks.push_lags import push_lags
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.rig import Rig

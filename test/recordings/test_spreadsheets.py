@@ -13,8 +13,7 @@ import pytest
 from square_session import pushes
 
 from push_predictor.errors import RecordingError, TableError
-from push_predictor.recordings.bag.column_units import UNITS, column_of
-from push_predictor.recordings.bag.spreadsheet import cells_of
+from push_predictor.recordings.bag.spreadsheet import UNITS, cells_of, column_of
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table_file import read_table, write_table

@@ -15,11 +15,10 @@ import numpy as np
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
-from push_predictor.recordings.bag.column_units import Column, column_of
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.bag.notes import Notes
-from push_predictor.recordings.bag.spreadsheet import ERRORS, cells_of
+from push_predictor.recordings.bag.spreadsheet import ERRORS, Column, cells_of, column_of
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The cells of a CSV file, also as spreadsheets write it: semicolons or tabs, decimal commas, a byte order mark.
+"""The cells of a CSV file, also as spreadsheets write it: semicolons, tabs, decimal commas, units in the header.
 
 Numbers get a decimal point where all of the file have a comma. Empty columns at the end and empty rows are left out.
 """
@@ -11,13 +11,32 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import math
 import re
+from decimal import Decimal
+from typing import NamedTuple
 
 ERRORS = (OSError, ValueError, csv.Error)  # ValueError: also of text that cannot be decoded
 _SEPARATORS = (",", ";", "\t")
 _MARKED = re.compile(r"sep=(.)\s*")  # Excel's first line
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _WITH_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+
+_NUMBER = {"1": "1", "-": "1"}
+_LENGTH = {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"}
+_TIME = {"s": "1", "sec": "1", "seconds": "1", "ms": "1e-3", "us": "1e-6", "µs": "1e-6", "ns": "1e-9"}
+_ANGLE = {"rad": "1", "deg": str(math.pi / 180.0), "°": str(math.pi / 180.0), "mrad": "1e-3"}
+_FORCE = {"n": "1", "mn": "1e-3", "kn": "1e3"}
+_TORQUE = {"nm": "1", "n m": "1", "n*m": "1", "n·m": "1", "nmm": "1e-3", "n mm": "1e-3", "ncm": "1e-2", "mnm": "1e-3"}
+UNITS = {
+    "time": _TIME,
+    **dict.fromkeys("xyz", _LENGTH),
+    "heading": _ANGLE,
+    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
+    **dict.fromkeys(("tx", "ty", "tz", "torque"), _TORQUE),
+    **dict.fromkeys(("qx", "qy", "qz", "qw"), _NUMBER),
+}
+_NAMED = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 
 Rows = list[tuple[int, list[str]]]
 
@@ -35,6 +54,25 @@ def cells_of(data: bytes) -> Rows:
         return rows
     rows[0][1][0] = rows[0][1][0].removeprefix("#").strip()  # of a header as numpy.savetxt writes it
     return _with_points(_without_empty_columns(rows), separator)
+
+
+class Column(NamedTuple):
+    """name: in lower case, without the unit; unit: as written, '' without one; factor: to the SI unit."""
+
+    name: str
+    unit: str = ""
+    factor: Decimal = Decimal(1)
+
+
+def column_of(text: str) -> Column:
+    """The column that a cell of the header names. Raises ValueError, which states the units, for an unknown one."""
+    found = _NAMED.fullmatch(text.strip())
+    name = (found[1] if found else text.strip()).lower()
+    if found is None or name not in UNITS:
+        return Column(text.strip().lower())
+    if (factor := UNITS[name].get(found[2].lower())) is None:
+        raise ValueError(f"column {text!r} has an unknown unit, give {', '.join(UNITS[name])}")
+    return Column(name, found[2], Decimal(factor))
 
 
 def _decoded(data: bytes) -> str:

@@ -9,14 +9,14 @@ checked.py. Each works on what the stages before have accepted, and leaves out w
 
 from __future__ import annotations
 
-from push_predictor.recordings.checks.clocks import clock_stage
+from push_predictor.recordings.checks.clocks.stage import clock_stage
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.force.stage import force_stage
-from push_predictor.recordings.checks.frames import frame_stage
-from push_predictor.recordings.checks.geometry import geometry_stage
+from push_predictor.recordings.checks.frames.stage import frame_stage
+from push_predictor.recordings.checks.geometry.stage import geometry_stage
 from push_predictor.recordings.checks.losses import loss_stage
-from push_predictor.recordings.checks.stream_checks import stream_stage
+from push_predictor.recordings.checks.streams.stage import stream_stage
 from push_predictor.recordings.checks.table_signs import table_signs
 from push_predictor.recordings.checks.units import table_units
 from push_predictor.recordings.rig import Rig

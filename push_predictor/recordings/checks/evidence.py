@@ -11,7 +11,7 @@ from functools import cached_property
 
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.motion import Motion, motion_of
-from push_predictor.recordings.checks.stream_facts import StreamFacts
+from push_predictor.recordings.checks.streams.facts import StreamFacts
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 

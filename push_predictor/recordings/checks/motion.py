@@ -17,7 +17,7 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.contact import LONGEST_BREAK
 from push_predictor.recordings.windows.push_window import WindowOptions
-from push_predictor.recordings.windows.regular_stamps import SD
+from push_predictor.recordings.windows.repairs.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
 SPANS = (

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.orientation import OUTRUN, STEEP, TRAVEL, tilt_of, turn_and_path
+from push_predictor.recordings.checks.frames.orientation import OUTRUN, STEEP, TRAVEL, tilt_of, turn_and_path
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable

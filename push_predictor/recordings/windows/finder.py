@@ -21,8 +21,8 @@ import numpy as np
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
-from push_predictor.recordings.windows.continued import continued
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.recordings.windows.repairs.continued import continued
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
 from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray

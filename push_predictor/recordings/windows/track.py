@@ -11,7 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs import StreamRepairs
+from push_predictor.recordings.windows.repairs.chain import StreamRepairs
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
 from push_predictor.types import Array, BoolArray, IntArray
 

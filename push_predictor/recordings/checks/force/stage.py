@@ -15,7 +15,7 @@ from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.force.direction import FEWEST_PUSHES, TOPIC, direction_findings
 from push_predictor.recordings.checks.force.presence import presence_findings
 from push_predictor.recordings.checks.force.timing import force_delays, rate_finding, timing_finding, unseen_finding
-from push_predictor.recordings.checks.geometry import MIRRORS
+from push_predictor.recordings.checks.geometry.stage import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig

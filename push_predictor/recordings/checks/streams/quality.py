@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
-from push_predictor.recordings.checks.stream_facts import StreamFacts
+from push_predictor.recordings.checks.streams.facts import StreamFacts
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.cut import FIT_SAMPLES
 from push_predictor.recordings.windows.push_window import WindowOptions

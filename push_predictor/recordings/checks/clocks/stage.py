@@ -14,16 +14,16 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from push_predictor.recordings.checks.clocks.push_lags import FINE, PushLags, push_lags
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.geometry import contacts_of
+from push_predictor.recordings.checks.geometry.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart
+from push_predictor.recordings.checks.geometry.outline_fit import MEDIAN_SD, TIE, fit_outline
+from push_predictor.recordings.checks.geometry.stage import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
-from push_predictor.recordings.checks.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart
-from push_predictor.recordings.checks.outline_fit import MEDIAN_SD, TIE, fit_outline
-from push_predictor.recordings.checks.push_lags import FINE, PushLags, push_lags
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.regular_stamps import SD
+from push_predictor.recordings.windows.repairs.regular_stamps import SD
 from push_predictor.types import Array
 
 Name: TypeAlias = Literal["slider", "pusher"]

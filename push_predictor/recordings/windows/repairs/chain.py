@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.recordings.windows.held import HeldPoses
-from push_predictor.recordings.windows.regular_stamps import RegularStamps
-from push_predictor.recordings.windows.resolution import Resolution, lengths
+from push_predictor.recordings.windows.repairs.held import HeldPoses
+from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps
+from push_predictor.recordings.windows.repairs.resolution import Resolution, lengths
+from push_predictor.recordings.windows.repairs.smoothing import SmoothedPoses
 from push_predictor.recordings.windows.slow import SlowPoses
-from push_predictor.recordings.windows.smoothing import SmoothedPoses
 from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, with_values
 from push_predictor.types import Array
 

@@ -10,10 +10,10 @@ import numpy as np
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.geometry import tip_follows
+from push_predictor.recordings.checks.frames.orientation import orientation_finding
+from push_predictor.recordings.checks.frames.up import up_findings
+from push_predictor.recordings.checks.geometry.stage import tip_follows
 from push_predictor.recordings.checks.motion import Motion, body_velocity
-from push_predictor.recordings.checks.orientation import orientation_finding
-from push_predictor.recordings.checks.up import up_findings
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array, BoolArray

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.resolution import lengths
+from push_predictor.recordings.windows.repairs.resolution import lengths
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
 from push_predictor.types import Array, BoolArray, IntArray
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.orientation import OVERTURNED, tilt_of
+from push_predictor.recordings.checks.frames.orientation import OVERTURNED, tilt_of
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.regular_stamps import SD
+from push_predictor.recordings.windows.repairs.regular_stamps import SD
 from push_predictor.types import Array, BoolArray
 
 STEPS = (0.1, 0.2, 0.5)  # s between the positions whose difference is a step of the motion: the first that noise allows

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.resolution import LEVER, Resolution
+from push_predictor.recordings.windows.repairs.resolution import LEVER, Resolution
 from push_predictor.types import Array, BoolArray
 
 EXACT = 1e-8  # m off the line of the two poses before: rounding of a continued pose

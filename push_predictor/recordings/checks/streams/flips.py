@@ -13,7 +13,7 @@ from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.windows.flips import HeadingFlips, flip_steps
+from push_predictor.recordings.windows.repairs.flips import HeadingFlips, flip_steps
 from push_predictor.types import Array, IntArray
 
 FEWEST = 3

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.bursts import WIDTH, burst_period, floor_at, missing_in_bursts
+from push_predictor.recordings.windows.repairs.bursts import WIDTH, burst_period, floor_at, missing_in_bursts
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.held import HeldPoses
-from push_predictor.recordings.windows.regular_stamps import SD
-from push_predictor.recordings.windows.resolution import LEVER, Resolution, lengths
-from push_predictor.recordings.windows.smoothing import SHORTEST, SmoothedPoses, fit_span
+from push_predictor.recordings.windows.repairs.held import HeldPoses
+from push_predictor.recordings.windows.repairs.regular_stamps import SD
+from push_predictor.recordings.windows.repairs.resolution import LEVER, Resolution, lengths
+from push_predictor.recordings.windows.repairs.smoothing import SHORTEST, SmoothedPoses, fit_span
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray

@@ -13,17 +13,17 @@ from typing import Any
 
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.flips import without_flips
-from push_predictor.recordings.checks.orientation import has_heading
-from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies
-from push_predictor.recordings.checks.quality import quality_findings
-from push_predictor.recordings.checks.session import in_order, of_one_body, repeated_samples
-from push_predictor.recordings.checks.stamp_noise import regular_in_bursts, stamp_findings
-from push_predictor.recordings.checks.stamps import clocks_never_meet, stamps_of, unset_stamps
-from push_predictor.recordings.checks.stream_facts import StreamFacts, pose_facts
+from push_predictor.recordings.checks.frames.orientation import has_heading
+from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
+from push_predictor.recordings.checks.streams.flips import without_flips
+from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
+from push_predictor.recordings.checks.streams.quality import quality_findings
+from push_predictor.recordings.checks.streams.session import in_order, of_one_body, repeated_samples
+from push_predictor.recordings.checks.streams.stamp_noise import regular_in_bursts, stamp_findings
+from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, stamps_of, unset_stamps
 from push_predictor.recordings.checks.units import stream_rates, stream_units
 from push_predictor.recordings.streams import Recording, taken
-from push_predictor.recordings.windows.continued import continued, continued_runs
+from push_predictor.recordings.windows.repairs.continued import continued, continued_runs
 
 CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
 FEWEST_RUNS = 2

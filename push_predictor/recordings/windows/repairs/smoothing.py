@@ -13,7 +13,7 @@ import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.windows.parts import part_means, part_rows
-from push_predictor.recordings.windows.resolution import EVIDENCE, LEVER
+from push_predictor.recordings.windows.repairs.resolution import EVIDENCE, LEVER
 from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, joined, taken, with_values
 from push_predictor.types import Array, BoolArray, IntArray
 
