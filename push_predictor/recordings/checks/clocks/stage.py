@@ -232,7 +232,7 @@ def _step(recording: Recording, recorded: Recording, size: float, sd: float, aft
         if near.any():
             last = int(np.flatnonzero(near)[0])  # with the clock before the step
             stream: PoseStream = getattr(recording, name)
-            index = int(np.searchsorted(stream.stamp, stamp[last], side="right"))
+            index = int(np.argmax(stream.stamp >= stamp[last])) + 1  # stamps decrease where a clock was set back
             return Step(size, sd, float(time[last]), name, index, True)
     index = int(np.searchsorted(recording.slider.stamp, origin + round(1e9 * 0.5 * (after + before))))
     return Step(size, sd, 0.5 * (after + before), "slider", index, False)

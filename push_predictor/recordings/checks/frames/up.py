@@ -74,6 +74,8 @@ def up_findings(recording: Recording, rig: Rig) -> list[Finding]:
     both = len(ups) == len(wrong) == 2 and len(set(axes)) == 1
     option = f"{axes[0]}" if both else ",".join(f"{name}={axis}" for name, axis in zip(wrong, axes, strict=True))
     advice = f"Turn the poses until z points up: `--up={option}`."
+    if both and recording.wrench is not None:
+        advice += f" If the force is along the axes of that world, too: `--up={option},wrench={option}`."
     return [Finding("world_up", "refused", _raised(wrong), advice, values)]
 
 

@@ -15,8 +15,8 @@ from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.track import JUMP_DISTANCE, JUMP_SPEED
 from push_predictor.types import Array, BoolArray
 
-LAG = 4  # samples: of up to so many bodies in turn, each one's next sample is at most so far
 USUAL = 90.0  # percentile of a body's own steps
+LAG = 12  # samples: the next one of a body that has more than 10 % of them is at most about so far
 JUMP = 20.0  # times the usual step
 RETURN = 0.25  # of a jump: nearer to an earlier place than this, the stream is back there
 RECENT = 6  # stretches of a stream whose ends are remembered
@@ -86,7 +86,7 @@ def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:
 
 
 def exchanged(recording: Recording, slider: Places, pusher: Places) -> Finding | None:
-    """A warning if slider and tip take each other's place for a while."""
+    """A finding if slider and tip take each other's place, for a while or for good."""
     one, other = recording.slider, recording.pusher
     if len(slider.jumps) != len(one) - 1 or len(pusher.jumps) != len(other) - 1:
         return None
@@ -97,17 +97,30 @@ def exchanged(recording: Recording, slider: Places, pusher: Places) -> Finding |
     place, tip = np.column_stack([one.x, one.y]), np.column_stack([other.x, other.y])
     nearest = tips[np.argmin(np.abs(other.stamp[tips][None, :] - one.stamp[at][:, None]), axis=1)]
     together = np.abs(other.stamp[nearest] - one.stamp[at]) < SPAN
-    crossed = _near(place[at], tip[nearest - 1]) & _near(tip[nearest], place[at - 1])
-    count = int(np.sum(together & crossed))
-    if count < 2:
+    crossed = _near(place[at], tip[nearest - 1], place[at - 1]) & _near(tip[nearest], place[at - 1], tip[nearest - 1])
+    times = np.sort(one.stamp[at[together & crossed]])
+    if not len(times):
         return None
-    sentence = f"Slider and tip take each other's place {count} times, both in one instant: the tracker exchanges them."
-    advice = "The windows break there. Give the bodies marker patterns that differ more."
-    return Finding("bodies_exchanged", "warning", sentence, advice, {"exchanges": Value(count, "1")})
+    ends = np.append(times, one.stamp[-1])[: len(times) + len(times) % 2]
+    share = float(np.sum(ends[1::2] - ends[::2])) / float(one.stamp[-1] - one.stamp[0])
+    begin = NANOSECOND * float(times[0] - one.stamp[0])
+    sentence = (
+        f"Slider and tip take each other's place {len(times)} time{'' if len(times) == 1 else 's'}, both in one "
+        f"instant, first after {begin:.1f} s, and are exchanged for {100.0 * share:.0f} % of the time."
+    )
+    often = share > HALF
+    advice = "Give the bodies marker patterns that differ more. " + (
+        "Use the recording up to the exchange; the rest with the topics exchanged."
+        if often
+        else "The windows break there."
+    )
+    values = {"exchanges": Value(len(times), "1"), "share": Value(share, "1"), "begin": Value(begin, "s")}
+    return Finding("bodies_exchanged", "refused" if often else "warning", sentence, advice, values)
 
 
-def _near(one: Array, other: Array) -> BoolArray:
-    return np.asarray(np.hypot(*(one - other).T) < EXCHANGED)
+def _near(one: Array, other: Array, before: Array) -> BoolArray:
+    """Whether places are where the other body was, not where the same one was before, each (n, 2) m."""
+    return np.asarray(np.hypot(*(one - other).T) < np.minimum(EXCHANGED, RETURN * np.hypot(*(one - before).T)))
 
 
 def _usual_step(place: Array) -> float:
