@@ -313,10 +313,8 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
     assert "motion" in seen and found.alpha == 0.05 and found.model is model
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
     assert "elapsed_time" in tried and "slider_x" not in tried
-    assert repr(found).startswith(f"Trace of 'earlier': verdict {found.verdict}")
-    gain = found.gain_nlpd
-    assert f"{gain.value:+.3f} ({gain.low:+.3f} to {gain.high:+.3f})" in repr(found)
-    assert gain.low <= gain.value <= gain.high and len(repr(found).splitlines()) < 10
+    assert repr(found).startswith(f"Trace of 'earlier': {found.verdict} (")
+    assert found.gain_nlpd.low <= found.gain_nlpd.value <= found.gain_nlpd.high
 
 
 # --- the next push ----------------------------------------------------------------------------------------------------

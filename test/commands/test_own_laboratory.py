@@ -61,4 +61,5 @@ def test_the_commands_of_the_readme_validate_a_model(
     assert (tmp_path / "monday.pushmodel").is_file()
     capsys.readouterr()
     assert main(validate) == 0
-    assert capsys.readouterr().out.startswith("The model fits: 95 % intervals cover ")
+    # Of so few pushes nothing is learnt that mechanics would not know better.
+    assert capsys.readouterr().out.startswith("The model predicts worse than textbook physics: ")

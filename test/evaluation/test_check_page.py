@@ -142,7 +142,7 @@ def test_the_caption_and_the_json_state_where_the_contacts_are(
     assert sound.contacts is not None and refused.contacts is not None and refused.contacts.lost is None
     assert contact_sentence(sound.contacts) == (
         "0.0 % of the contacts are more than 1 mm inside it, 0.0 % as far outside. "
-        "Windows use 94 % of the time in contact."
+        "Windows use 97 % of the time in contact."
     )
     assert contact_sentence(refused.contacts).endswith("as far outside.")
 

@@ -59,4 +59,4 @@ def test_without_an_effect_a_clock_that_is_off_is_a_note() -> None:
 
 def test_every_finding_about_clocks_has_a_size() -> None:
     every = [replace(LATE, name=name, values={"size": Value(-0.03, "s")}) for name in NAMES]
-    assert [effect.values for effect in clock_errors(every).effects] == [(-0.03,)] * len(NAMES)
+    assert [effect.values for effect in clock_errors(every)] == [(-0.03,)] * len(NAMES)

@@ -351,7 +351,7 @@ def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path) -> None:
     trace = without_motion_effect("measurement", "clock_offset", "model_inputs", LATE)
     held, fewer = trace.held_out, slice(0, 30)
     after = held.after
-    columns = ("push_id", "mean", "covariance", "observed")
+    columns = ("push_id", "mean", "covariance", "observed", "textbook")
     cut = replace(after, **{name: getattr(after, name)[fewer] for name in columns})
     text = written(
         tmp_path, replace(trace, held_out=replace(held, after=cut), find_unexplained=lambda: trace.unexplained[:90])

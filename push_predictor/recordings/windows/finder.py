@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream, repeated, taken
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, Stream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.repairs.continued import continued
@@ -83,10 +83,10 @@ class WindowFinder:
         for name, stream in recording.scalars.items():
             self.add_scalar(name, stream)
         if recording.wrench is not None:
-            self.add_wrench(taken(recording.wrench, ~repeated(recording.wrench)))
-        slider, pusher = recording.slider, recording.pusher
-        self.add_pusher(taken(pusher, ~(repeated(pusher) | continued(pusher, angle=False))))
-        self.add_slider(taken(slider, ~(repeated(slider) | continued(slider, angle=True))))
+            self.add_wrench(self._once("wrench", recording.wrench))
+        slider, pusher = self._once("slider", recording.slider), self._once("pusher", recording.pusher)
+        self.add_pusher(taken(pusher, ~continued(pusher, angle=False)))
+        self.add_slider(taken(slider, ~continued(slider, angle=True)))
         return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:
@@ -130,6 +130,13 @@ class WindowFinder:
         self._counts["refused"] += sum(track.discarded for track in self._scalars.values())
         self._scalars = {}
         return self._taken()
+
+    def _once(self, name: str, stream: Stream) -> Stream:
+        """The samples without those that are there before, as in a loop that was recorded; they are counted."""
+        again = repeated(stream)
+        if count := int(np.sum(again)):
+            self._counts.update({"repeated": count, f"{name} repeated": count, "refused": count})
+        return taken(stream, ~again)
 
     # --- arriving samples ---------------------------------------------------------------------------------------
 
