@@ -20,11 +20,12 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 SEARCHED = 0.5  # s before and after a touch in which its force is looked for
 PAUSE = 0.1  # s without contact before a touch
-LEVEL = 0.8  # quantile of the force before and after a touch that is taken for that in contact
+HIGH = 0.4  # of the samples of a contact have a larger force than that which is taken for it
 SHARE = 0.5  # of the force in contact, at which it is said to rise: a filter delays this point by its delay
 RESTED = 0.0005  # m that the slider moves at most in PAUSE before a touch: it begins no motion otherwise
 CARRIED = 0.001  # m that the slider moves after a touch: a tip that only passes it pushes nothing
 STEADY = 0.2  # s after a touch in which the gap is that of a contact
+TOGETHER = 0.001  # m, the gap in a contact
 GAP_NOISE = 0.0002  # m, standard deviation of the gap with which it shows a touch
 RECENT = 30  # touches that decide whether the force may, besides all: a clock may be set
 FEWEST = 5  # touches
@@ -155,7 +156,8 @@ class ForceTiming:
         x, y = (samples.force - _median(zero)).T
         # The last of the approach, at which the gap still shrinks by as much.
         approach = NEAR * max(float(samples.closing_speed[touch]), 0.0) / float(samples.speed[touch])
-        delay = _delay(time - time[touch] - approach, np.hypot(x, y), least_force)
+        share = 0.5 * min((_parted(time, samples.gap, touch) - time[touch]) / SEARCHED, 1.0)
+        delay = _delay(time - time[touch] - approach, np.hypot(x, y), 1.0 - HIGH * share, least_force)
         self.touches.append((float(time[touch]), delay))
         self._delays.append(delay)
         unseen = len(self._delays) >= UNSEEN and all(map(math.isnan, self._delays[-UNSEEN:]))
@@ -174,9 +176,18 @@ def _exact(time: Array, gap: Array, touch: int) -> bool:
     return noise < GAP_NOISE and float((time[after][1:] - time[after][:-1]).max()) <= NEAR
 
 
-def _delay(time: Array, size: Array, least_force: float) -> float:
-    """The time (s) of the rise that is nearest to 0; NaN without one, or if the force is below least_force (N)."""
-    ordered, level = np.sort(size), LEVEL * (len(size) - 1)
+def _parted(time: Array, gap: Array, touch: int) -> float:
+    """When (s) tip and slider part after a touch; the last time if they stay together."""
+    apart = np.flatnonzero(gap[touch:] > TOGETHER)
+    return float(time[touch + apart[0]] if len(apart) else time[-1])
+
+
+def _delay(time: Array, size: Array, quantile: float, least_force: float) -> float:
+    """The time (s) of the rise that is nearest to 0; NaN without one, or if the force is below least_force (N).
+
+    quantile: of the force that is taken for that in contact.
+    """
+    ordered, level = np.sort(size), quantile * (len(size) - 1)
     below = int(level)
     force = float(ordered[below] + (level - below) * (ordered[min(below + 1, len(size) - 1)] - ordered[below]))
     rises = np.flatnonzero((size[:-1] < SHARE * force) & (size[1:] >= SHARE * force))
