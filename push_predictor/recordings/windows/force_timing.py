@@ -157,7 +157,10 @@ class ForceTiming:
         # The last of the approach, at which the gap still shrinks by as much.
         approach = NEAR * max(float(samples.closing_speed[touch]), 0.0) / float(samples.speed[touch])
         share = 0.5 * min((_parted(time, samples.gap, touch) - time[touch]) / SEARCHED, 1.0)
-        delay = _delay(time - time[touch] - approach, np.hypot(x, y), 1.0 - HIGH * share, least_force)
+        begin = time[touch] + approach
+        # Of poses that are late by one time the tip enters the outline before the slider starts: it and the force agree.
+        reached = min(_reached(time, samples.gap, touch) - begin, 0.0)
+        delay = _delay(time - begin, np.hypot(x, y), 1.0 - HIGH * share, reached, least_force)
         self.touches.append((float(time[touch]), delay))
         self._delays.append(delay)
         unseen = len(self._delays) >= UNSEEN and all(map(math.isnan, self._delays[-UNSEEN:]))
@@ -182,10 +185,20 @@ def _parted(time: Array, gap: Array, touch: int) -> float:
     return float(time[touch + apart[0]] if len(apart) else time[-1])
 
 
-def _delay(time: Array, size: Array, quantile: float, least_force: float) -> float:
-    """The time (s) of the rise that is nearest to 0; NaN without one, or if the force is below least_force (N).
+def _reached(time: Array, gap: Array, touch: int) -> float:
+    """When (s) the tip reached the outline before a touch, where it is inside at the touch; else at the touch."""
+    outside = np.flatnonzero(gap[: touch + 1] > 0.0)
+    if not len(outside) or outside[-1] == touch:
+        return float(time[touch])
+    last = int(outside[-1])
+    return float(time[last] + (time[last + 1] - time[last]) * gap[last] / (gap[last] - gap[last + 1]))
 
-    quantile: of the force that is taken for that in contact.
+
+def _delay(time: Array, size: Array, quantile: float, reached: float, least_force: float) -> float:
+    """How late (s) the force rises, at its rise nearest to the touch at 0 s; NaN without one, or if it is too small.
+
+    quantile: of the force that is taken for that in contact. reached: s, not above 0; a rise from there to 0 is in
+    time. least_force: N; a smaller one does not show a contact.
     """
     ordered, level = np.sort(size), quantile * (len(size) - 1)
     below = int(level)
@@ -195,7 +208,8 @@ def _delay(time: Array, size: Array, quantile: float, least_force: float) -> flo
         return float("nan")
     share = (SHARE * force - size[rises]) / (size[rises + 1] - size[rises])
     found = time[rises] + share * (time[rises + 1] - time[rises])
-    return float(found[np.argmin(np.abs(found))])
+    late = np.maximum(found, 0.0) + np.minimum(found - reached, 0.0)
+    return float(late[np.argmin(np.abs(late))])
 
 
 def _median(values: Array) -> Array:
