@@ -15,10 +15,12 @@ from hypothesis import strategies as st
 from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.contact import ContactSample
+from push_predictor.recordings.windows.contact import ContactSamples
+from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.push_segmenter import TARE_SAMPLES, PushSegmenter
+from push_predictor.recordings.windows.force_zero import TARE_SAMPLES
+from push_predictor.recordings.windows.push_segmenter import PushSegmenter
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 from push_predictor.recordings.windows.track import Track
 
@@ -174,41 +176,47 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     assert first.displacement[0] > 0.9 * 0.004
 
 
-AT_REST = ContactSample(
-    stamp=0,
-    time=0.0,
-    place=(0.0, 0.0),
-    gap=0.0,
-    height=0.0,
-    closing_speed=0.0,
-    opening_speed=0.0,
-    force=(0.0, 0.0),
-    speed=0.0,
-    at_speed=False,
-    in_break=False,
-    after_break=False,
-    repositioned=False,
-)
+def samples_at(time: np.ndarray, gap: np.ndarray, force: np.ndarray, speed: np.ndarray) -> ContactSamples:
+    """Samples (n,) of a slider at rest, with a force along x; a tip that moves has its speed."""
+    still, never = np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_)
+    return ContactSamples(
+        stamp=np.rint(1e9 * time).astype(np.int64),
+        time=time,
+        place=np.zeros((len(time), 2)),
+        gap=gap,
+        height=still,
+        closing_speed=still,
+        opening_speed=still,
+        force=np.column_stack([force, still]),
+        speed=speed,
+        at_speed=speed > 0.0,
+        in_break=never,
+        after_break=never,
+        repositioned=never,
+    )
 
 
+@pytest.mark.parametrize("portion", [1, 7, 100])
 @pytest.mark.parametrize("gap", [0.0005, 0.1])  # at rest in contact, moving freely
-def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> None:
+def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float, portion: int) -> None:
     segmenter = PushSegmenter(WindowOptions())
-    rest = AT_REST._replace(gap=gap)
-    for k, force in enumerate([*np.full(20, 1.0), *np.linspace(1.0, 2.0, TARE_SAMPLES)]):
-        segmenter.step(rest._replace(stamp=4_000_000 * k, time=0.004 * k, force=(force, 0.0)))
-    pushing = rest._replace(gap=0.0005, force=(5.0, 0.0), speed=0.02, at_speed=True)
-    segmenter.step(pushing._replace(stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
+    force = np.concatenate([np.full(20, 1.0), np.linspace(1.0, 2.0, TARE_SAMPLES), [5.0]])
+    pushes = np.arange(len(force)) == len(force) - 1
+    samples = samples_at(
+        0.004 * np.arange(len(force)), np.where(pushes, 0.0005, gap), force, np.where(pushes, 0.02, 0.0)
+    )
+    for begin in range(0, len(force), portion):
+        segmenter.take(taken_samples(samples, slice(begin, begin + portion)))
     assert segmenter.push is not None and segmenter.push.tare is not None
     assert segmenter.push.tare == pytest.approx((1.5, 0.0))
 
 
 def test_a_window_may_end_with_the_last_sample_of_a_push() -> None:
-    segmenter, period, found = PushSegmenter(WindowOptions(duration=0.2)), 10_000_000, []
-    free = AT_REST._replace(gap=0.1)
-    for k in range(26):  # five in free motion, then a window of 20 periods from the sixth to the last
-        sample = free if k < 5 else free._replace(gap=0.0, force=(5.0, 0.0), speed=0.02, at_speed=True)
-        found += segmenter.step(sample._replace(stamp=k * period, time=1e-9 * k * period))
+    period, pushes = 10_000_000, np.arange(26) >= 5  # free motion, then a window of 20 periods from the sixth on
+    samples = samples_at(
+        1e-9 * period * np.arange(26), np.where(pushes, 0.0, 0.1), np.where(pushes, 5.0, 0.0), 0.02 * pushes
+    )
+    found = PushSegmenter(WindowOptions(duration=0.2)).take(samples)
     assert [each[:2] for each in found] == [(5 * period, 25 * period)]
 
 

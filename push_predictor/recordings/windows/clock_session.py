@@ -13,7 +13,7 @@ from push_predictor.recordings.dropouts import CLOCK_SET, NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
-from push_predictor.recordings.windows.cut import PushContext, WindowCutter
+from push_predictor.recordings.windows.cut import WindowCutter
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.repairs.flips import HeadingFlips
@@ -116,10 +116,8 @@ class ClockSession:
         last = int(np.searchsorted(slider.time, until, side="right"))
         if last <= first:
             return []
-        due: list[tuple[int, int, PushContext]] = []
-        for sample in contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last):
-            due += self._segmenter.step(sample)
-        found = self._cutter.cut(self.tracks, due, self._origin or 0, self._first)
+        samples = contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last)
+        found = self._cutter.cut(self.tracks, self._segmenter.take(samples), self._origin or 0, self._first)
         self._count_dropouts(float(slider.time[last - 1]))
         self.evaluated = int(slider.stamp[last - 1])
         self._forget(float(slider.time[last - 1]))
@@ -165,9 +163,8 @@ def free_motion(rig: Rig, slider: PoseStream, pusher: PoseStream, stamp: IntArra
     track, tip = session.tracks["slider"], session.tracks["pusher"]
     if not all(len(each) and each.period_known(final=True) for each in (track, tip)):
         return np.zeros(len(stamp), dtype=np.bool_)
-    samples = list(contact_samples(rig, track, tip, None, 0, len(track)))
-    free = np.array([touches_nothing(sample, WindowOptions()) and not sample.in_break for sample in samples])
-    joined = ~np.array([sample.after_break for sample in samples])
+    samples = contact_samples(rig, track, tip, None, 0, len(track))
+    free, joined = touches_nothing(samples, WindowOptions()) & ~samples.in_break, ~samples.after_break
     after = np.searchsorted(track.stamp, stamp)
     within = (after > 0) & (after < len(track)) & (np.maximum.accumulate(stamp) - stamp < CLOCK_SET)
     after = np.clip(after, 1, len(track) - 1)

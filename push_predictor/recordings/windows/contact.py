@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.track import JUMP_DISTANCE, Track
-from push_predictor.types import Array, BoolArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 REACH = 0.1  # s of data after a sample that its evaluation needs
 NEAR = 0.05  # s around a sample that determine motion and gap
@@ -26,40 +25,59 @@ LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push,
 SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
 
 
-class ContactSample(NamedTuple):
-    """One slider sample. A recording has hundreds of thousands: a tuple takes a third of a dataclass's time.
+@dataclass(frozen=True, eq=False)
+class ContactSamples:
+    """A portion of n slider samples, in order.
 
-    stamp ns, time s; place (x, y) m of the slider; gap m between pusher and outline, height m of the tip above the
-    slider. closing_speed: rate at
-    which the gap shrinks after the sample, m/s; opening_speed: at which it grew before it, m/s. force: measured
-    (fx, fy) N, None if unknown. speed: of the pusher, m/s,
-    the smaller of the means around and after the sample. at_speed: the pusher is not accelerating. in_break: a stream
-    has a break here; after_break: one had a break since the previous sample; repositioned: the slider was placed
-    elsewhere since the previous sample.
+    stamp (n,) ns, time (n,) s; place (n, 2) m of the slider; gap (n,) m between pusher and outline, height (n,) m of
+    the tip above the slider. closing_speed (n,): rate at which the gap shrinks after the sample, m/s; opening_speed
+    (n,): at which it grew before it, m/s. force (n, 2): measured, N, NaN if unknown. speed (n,): of the pusher, m/s,
+    the smaller of the means around and after the sample. at_speed (n,): the pusher is not accelerating. in_break (n,):
+    a stream has a break here; after_break (n,): one had a break since the previous sample; repositioned (n,): the
+    slider was placed elsewhere since the previous sample.
     """
 
-    stamp: int
-    time: float
-    place: tuple[float, float]
-    gap: float
-    height: float
-    closing_speed: float
-    opening_speed: float
-    force: tuple[float, float] | None
-    speed: float
-    at_speed: bool
-    in_break: bool
-    after_break: bool
-    repositioned: bool
+    stamp: IntArray
+    time: Array
+    place: Array
+    gap: Array
+    height: Array
+    closing_speed: Array
+    opening_speed: Array
+    force: Array
+    speed: Array
+    at_speed: BoolArray
+    in_break: BoolArray
+    after_break: BoolArray
+    repositioned: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.stamp)
+
+    @property
+    def force_known(self) -> BoolArray:
+        """Whether the force at the samples (n,) is known."""
+        return ~np.isnan(self.force[:, 0])
+
+
+def taken(samples: ContactSamples, rows: slice | IntArray) -> ContactSamples:
+    """Some of the samples, by index."""
+    return ContactSamples(*(getattr(samples, field.name)[rows] for field in fields(samples)))
+
+
+def joined(first: ContactSamples, second: ContactSamples) -> ContactSamples:
+    """One portion of two consecutive ones."""
+    return ContactSamples(
+        *(np.concatenate([getattr(first, field.name), getattr(second, field.name)]) for field in fields(first))
+    )
 
 
 def contact_samples(
     rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: int, last: int
-) -> Iterator[ContactSample]:
+) -> ContactSamples:
     """The contact at slider samples first to last - 1 (indices into the track)."""
-    time, stamp = slider.time[first:last], slider.stamp[first:last]
+    time = slider.time[first:last]
     tips = {span: pusher.at(time + span) for span in (0.0, -NEAR, FIT_SPAN, FORWARD_SPAN, NEAR, REACH)}
-    height = tips[0.0][:, 2] - slider.values[first:last, 2]
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     absent = _absent(wrench, time)
     after_break, in_break = _breaks([slider, pusher], before, time)
@@ -68,21 +86,22 @@ def contact_samples(
         after_break, in_break = after_break | overlap & ~absent, in_break | beyond & ~absent
     gap, closing_speed, opening_speed = _gaps(rig, slider, pusher, first, last)
     around, after = (_speed(pusher, time, tips, *span) for span in ((-NEAR, NEAR), (0.0, FORWARD_SPAN)))
-    # A step of the resolution is no motion.
-    speed = np.maximum(np.minimum(around, after) - pusher.resolution / (2.0 * NEAR), 0.0)
-    at_speed, forces = _at_speed(pusher, time, tips), _forces(wrench, time, absent)
-    repositioned = _repositioned(slider, pusher, first, last)
-    known = ~np.isnan(forces[:, 0])
-    forces_or_none = ((x, y) if there else None for x, y, there in zip(*forces.T.tolist(), known.tolist(), strict=True))
-    places = map(tuple, slider.values[first:last, :2].tolist())
-    columns = [
-        stamp.tolist(),
-        time.tolist(),
-        places,
-        *(of.tolist() for of in (gap, height, closing_speed, opening_speed)),
-    ]
-    later = [of.tolist() for of in (speed, at_speed, in_break, after_break, repositioned)]
-    yield from map(ContactSample._make, zip(*columns, forces_or_none, *later, strict=True))
+    return ContactSamples(
+        stamp=slider.stamp[first:last],
+        time=time,
+        place=slider.values[first:last, :2],
+        gap=gap,
+        height=tips[0.0][:, 2] - slider.values[first:last, 2],
+        closing_speed=closing_speed,
+        opening_speed=opening_speed,
+        force=_forces(wrench, time, absent),
+        # A step of the resolution is no motion.
+        speed=np.maximum(np.minimum(around, after) - pusher.resolution / (2.0 * NEAR), 0.0),
+        at_speed=_at_speed(pusher, time, tips),
+        in_break=in_break,
+        after_break=after_break,
+        repositioned=_repositioned(slider, pusher, first, last),
+    )
 
 
 def _at_speed(pusher: Track, time: Array, tips: dict[float, Array]) -> BoolArray:

@@ -10,22 +10,22 @@ and ends. Where slider and tip show first touches themselves, the pushes so far 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.recordings.windows.contact import NEAR, ContactSample
-from push_predictor.types import Array
+from push_predictor.recordings.windows.contact import NEAR, ContactSamples, joined, taken
+from push_predictor.types import Array, BoolArray, IntArray
 
 SEARCHED = 0.5  # s before and after a touch in which its force is looked for
 PAUSE = 0.1  # s without contact before a touch
-LEVEL = 80.0  # percentile of the force before and after a touch that is taken for that in contact
+HIGH = 0.4  # of the samples of a contact have a larger force than that which is taken for it
 SHARE = 0.5  # of the force in contact, at which it is said to rise: a filter delays this point by its delay
 RESTED = 0.0005  # m that the slider moves at most in PAUSE before a touch: it begins no motion otherwise
 CARRIED = 0.001  # m that the slider moves after a touch: a tip that only passes it pushes nothing
 STEADY = 0.2  # s after a touch in which the gap is that of a contact
+TOGETHER = 0.001  # m, the gap in a contact
 GAP_NOISE = 0.0002  # m, standard deviation of the gap with which it shows a touch
 RECENT = 30  # touches that decide whether the force may, besides all: a clock may be set
 FEWEST = 5  # touches
@@ -71,13 +71,13 @@ def force_delay(delays: Sequence[float]) -> ForceDelay:
     missing = 1.0 - len(known) / len(values) if len(values) else 0.0
     if not len(known):
         return ForceDelay(0.0, np.inf, len(values), missing)
-    middle = float(np.median(known))
-    spread = max(SPREAD * float(np.median(np.abs(known - middle))), SAMPLING)
+    middle = float(_median(known))
+    spread = max(SPREAD * float(_median(np.abs(known - middle))), SAMPLING)
     return ForceDelay(middle, float(spread / np.sqrt(len(known))), len(values), missing)
 
 
 class ForceTiming:
-    """Takes the samples in order.
+    """Takes the samples in order, in portions.
 
     touches: time (s) of each touch so far, and the delay of the force (s), NaN where it does not show the contact.
     """
@@ -85,65 +85,134 @@ class ForceTiming:
     def __init__(self) -> None:
         self.touches: list[tuple[float, float]] = []
         self.apart = False
-        self._samples: deque[ContactSample] = deque()  # of the last SEARCHED, and since a touch that is not judged yet
-        self._touch: ContactSample | None = None
+        self._delays: list[float] = []
+        self._samples: ContactSamples | None = None  # of the last SEARCHED, and since a touch that is not judged yet
+        self._touch: int | None = None  # its index in these
         self._last_contact = -np.inf
 
-    def add(
+    def take(
         self,
-        sample: ContactSample,
-        contact: bool,
-        free_force: Sequence[tuple[float, float]],
-        least_force: Callable[[], float],
-    ) -> None:
-        """Add a sample. contact: whether the geometry shows one; free_force: what the sensor last read without one.
+        samples: ContactSamples,
+        contact: BoolArray,
+        usable: BoolArray,
+        zero: Callable[[int], Array],
+        least_force: Callable[[int], float],
+    ) -> BoolArray:
+        """Add n samples and return whether the force is apart at each, by the touches judged up to it.
 
-        least_force: N, a smaller one does not show a contact; asked at a touch only.
+        contact (n,): whether the geometry shows one, and the tip moves; usable (n,): whether the force and its zero are
+        known without a break since the sample before. Asked at the sample at which a touch is judged: zero, the
+        readings (m, 2) N without contact, and least_force, N: a smaller one does not show a contact.
         """
-        if sample.force is None or sample.after_break or not free_force:
-            self._samples.clear()
-            self._touch, self._last_contact = None, sample.time
-            return
-        self._samples.append(sample)
-        if self._touch is None:
-            while self._samples[0].time < sample.time - SEARCHED:
-                self._samples.popleft()
-            if contact and sample.time - self._last_contact > PAUSE:
-                self._touch = sample
-        elif sample.time > self._touch.time + SEARCHED:
-            self._judge(self._touch, np.median(free_force, axis=0), least_force())
-        if contact:
-            self._last_contact = sample.time
+        apart = np.full(len(samples), self.apart)
+        touches = self._candidates(samples.time, contact, usable)
+        known = samples if self._samples is None else joined(self._samples, samples)
+        first = len(known) - len(samples)
+        unusable = first + np.flatnonzero(~usable)
+        waiting = [] if self._touch is None else [self._touch]
+        begin, self._touch = 0, None  # of the samples that are not searched yet
+        for touch in [*waiting, *(first + touches).tolist()]:
+            if touch < begin:  # within the time that is searched for another
+                continue
+            end = int(np.searchsorted(known.time, known.time[touch] + SEARCHED, side="right"))
+            broken = int(np.searchsorted(unusable, touch))
+            if broken < len(unusable) and unusable[broken] <= end:
+                begin = int(unusable[broken])
+            elif end == len(known):
+                self._touch = touch
+                break
+            else:
+                begin = end + 1
+                since = max(_begin(known.time, touch), int(unusable[broken - 1]) + 1 if broken else 0)
+                self._judge(
+                    taken(known, slice(since, end + 1)), touch - since, zero(end - first), least_force(end - first)
+                )
+                apart[end - first :] = self.apart
+        self._keep(known, int(unusable[-1]) + 1 if len(unusable) else 0)
+        return apart
 
-    def _judge(self, touch: ContactSample, zero: Array, least_force: float) -> None:
-        self._touch = None
-        before = next(sample for sample in self._samples if sample.time >= touch.time - PAUSE)
-        rested = math.dist(before.place, touch.place) < RESTED
-        if not rested or math.dist(touch.place, self._samples[-1].place) < CARRIED or not self._exact(touch.time):
+    def _candidates(self, time: Array, contact: BoolArray, usable: BoolArray) -> IntArray:
+        """Samples at which a contact begins after PAUSE without one, and without a break."""
+        times = np.where(contact | ~usable, time, -np.inf)
+        last = np.maximum.accumulate(np.append(self._last_contact, times))
+        self._last_contact = float(last[-1])
+        return np.flatnonzero(usable & contact & (time - last[:-1] > PAUSE))
+
+    def _keep(self, known: ContactSamples, usable: int) -> None:
+        """Keep the samples that the next touch, or the one that waits, needs."""
+        if not len(known):
             return
-        time = np.array([sample.time for sample in self._samples]) - touch.time
-        size = np.hypot(*(np.array([sample.force for sample in self._samples]) - zero).T)
+        since = max(_begin(known.time, len(known) - 1 if self._touch is None else self._touch), usable)
+        self._samples = taken(known, slice(since, None))
+        self._touch = None if self._touch is None else self._touch - since
+
+    def _judge(self, samples: ContactSamples, touch: int, zero: Array, least_force: float) -> None:
+        """Judge a touch, the index of one of the samples around it. zero: readings (m, 2) N without contact."""
+        time, place = samples.time, samples.place
+        before = int(np.searchsorted(time, time[touch] - PAUSE))
+        rested = math.dist(place[before], place[touch]) < RESTED
+        if not rested or math.dist(place[touch], place[-1]) < CARRIED or not _exact(time, samples.gap, touch):
+            return
+        x, y = (samples.force - _median(zero)).T
         # The last of the approach, at which the gap still shrinks by as much.
-        time -= NEAR * max(touch.closing_speed, 0.0) / touch.speed
-        self.touches.append((touch.time, _delay(time, size, least_force)))
-        delays = [delay for _, delay in self.touches]
-        unseen = len(delays) >= UNSEEN and not np.isfinite(delays[-UNSEEN:]).any()
-        self.apart = unseen or force_delay(delays).apart or force_delay(delays[-RECENT:]).apart
-
-    def _exact(self, touch: float) -> bool:
-        """Whether the gap shows the touch exactly: it has little noise after it, and samples close to each other."""
-        after = [(each.time, each.gap) for each in self._samples if touch <= each.time <= touch + STEADY]
-        time, gap = np.array(after).T
-        noise = float(np.std(np.diff(gap))) / np.sqrt(2.0)
-        return noise < GAP_NOISE and float(np.max(np.diff(time))) <= NEAR
+        approach = NEAR * max(float(samples.closing_speed[touch]), 0.0) / float(samples.speed[touch])
+        share = 0.5 * min((_parted(time, samples.gap, touch) - time[touch]) / SEARCHED, 1.0)
+        begin = time[touch] + approach
+        # Of poses that are late by one time the tip enters the outline before the slider starts: it and the force agree.
+        reached = min(_reached(time, samples.gap, touch) - begin, 0.0)
+        delay = _delay(time - begin, np.hypot(x, y), 1.0 - HIGH * share, reached, least_force)
+        self.touches.append((float(time[touch]), delay))
+        self._delays.append(delay)
+        unseen = len(self._delays) >= UNSEEN and all(map(math.isnan, self._delays[-UNSEEN:]))
+        self.apart = unseen or any(force_delay(self._delays[-last:]).apart for last in (0, RECENT))
 
 
-def _delay(time: Array, size: Array, least_force: float) -> float:
-    """The time (s) of the rise that is nearest to 0; NaN without one, or if the force is below least_force (N)."""
-    force = float(np.percentile(size, LEVEL))
+def _begin(time: Array, sample: int) -> int:
+    """The first sample within SEARCHED before one."""
+    return int(np.searchsorted(time, time[sample] - SEARCHED))
+
+
+def _exact(time: Array, gap: Array, touch: int) -> bool:
+    """Whether the gap shows the touch exactly: it has little noise after it, and samples close to each other."""
+    after = slice(touch, int(np.searchsorted(time, time[touch] + STEADY, side="right")))
+    noise = float((gap[after][1:] - gap[after][:-1]).std()) / math.sqrt(2.0)
+    return noise < GAP_NOISE and float((time[after][1:] - time[after][:-1]).max()) <= NEAR
+
+
+def _parted(time: Array, gap: Array, touch: int) -> float:
+    """When (s) tip and slider part after a touch; the last time if they stay together."""
+    apart = np.flatnonzero(gap[touch:] > TOGETHER)
+    return float(time[touch + apart[0]] if len(apart) else time[-1])
+
+
+def _reached(time: Array, gap: Array, touch: int) -> float:
+    """When (s) the tip reached the outline before a touch, where it is inside at the touch; else at the touch."""
+    outside = np.flatnonzero(gap[: touch + 1] > 0.0)
+    if not len(outside) or outside[-1] == touch:
+        return float(time[touch])
+    last = int(outside[-1])
+    return float(time[last] + (time[last + 1] - time[last]) * gap[last] / (gap[last] - gap[last + 1]))
+
+
+def _delay(time: Array, size: Array, quantile: float, reached: float, least_force: float) -> float:
+    """How late (s) the force rises, at its rise nearest to the touch at 0 s; NaN without one, or if it is too small.
+
+    quantile: of the force that is taken for that in contact. reached: s, not above 0; a rise from there to 0 is in
+    time. least_force: N; a smaller one does not show a contact.
+    """
+    ordered, level = np.sort(size), quantile * (len(size) - 1)
+    below = int(level)
+    force = float(ordered[below] + (level - below) * (ordered[min(below + 1, len(size) - 1)] - ordered[below]))
     rises = np.flatnonzero((size[:-1] < SHARE * force) & (size[1:] >= SHARE * force))
     if not len(rises) or force < least_force:
         return float("nan")
     share = (SHARE * force - size[rises]) / (size[rises + 1] - size[rises])
     found = time[rises] + share * (time[rises + 1] - time[rises])
-    return float(found[np.argmin(np.abs(found))])
+    late = np.maximum(found, 0.0) + np.minimum(found - reached, 0.0)
+    return float(late[np.argmin(np.abs(late))])
+
+
+def _median(values: Array) -> Array:
+    """The medians of values (n, ...) over n; numpy's takes four times as long for few."""
+    ordered, middle = np.sort(values, axis=0), len(values) // 2
+    return np.asarray(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2.0)

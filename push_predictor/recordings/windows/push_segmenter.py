@@ -5,19 +5,17 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
-
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSample
+from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSamples, taken
 from push_predictor.recordings.windows.cut import PushContext
 from push_predictor.recordings.windows.force_timing import ForceTiming
+from push_predictor.recordings.windows.force_zero import ForceZero
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
+from push_predictor.types import BoolArray
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
-TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0  # standard deviations of the force in free motion
 CLEAR = 3.0  # times the least force in contact: a smaller force shows a contact late
 CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
@@ -25,9 +23,9 @@ LEAST_CLOSING_SPEED = 0.001  # m/s, below the noise of a tracker
 INSIDE = 0.005  # m; a tip this deep inside the outline shows unsynchronised clocks or a wrong frame
 
 
-def touches_nothing(sample: ContactSample, options: WindowOptions) -> bool:
-    """Whether the tip is lifted or away from the outline, so that its force is the sensor's zero."""
-    return sample.height > options.lift or sample.gap > FREE_GAP
+def touches_nothing(samples: ContactSamples, options: WindowOptions) -> BoolArray:
+    """Whether the tip (n,) is lifted or away from the outline, so that its force is the sensor's zero."""
+    return np.asarray((samples.height > options.lift) | (samples.gap > FREE_GAP))
 
 
 class PushSegmenter:
@@ -45,16 +43,12 @@ class PushSegmenter:
         self.push: PushContext | None = None
         self.samples = self.touching = 0
         self.timing = ForceTiming()
+        self._zero = ForceZero()
         self._start: int | None = None  # of the incomplete window
         self._last_good = -np.inf
-        self._last_time = -np.inf
+        self._last_time: float | None = None
         self._idle = 0.0
         self._pushes = 0
-        self._free_force: deque[tuple[float, float]] = deque(maxlen=TARE_SAMPLES)
-        self._resting_force: deque[tuple[float, float]] = deque(
-            maxlen=TARE_SAMPLES
-        )  # at rest near the slider, before a push
-        self._zero: tuple[tuple[float, float] | None, float] | None = None  # of these forces; None after a new one
         self._touching = self._shown = False
         self._inside = False
         self._first_touch: int | None = None
@@ -65,119 +59,143 @@ class PushSegmenter:
         """Start (ns) of the incomplete window, None without one."""
         return self._start
 
-    def step(self, sample: ContactSample) -> list[tuple[int, int, PushContext]]:
-        """Add one sample and return the windows that end at or before it."""
-        self._update_breaks(sample)
-        self._update_tare(sample)
-        judged = not (sample.in_break or self._inside)
-        self._shown = judged and self._shows_contact(sample)
-        self._touching = touching = judged and self._touches(sample)
-        self.samples += 1
-        self.touching += touching
-        if touching and self._first_touch is None:
-            self._first_touch = sample.stamp
-        if touching and sample.speed >= self.options.least_speed:
-            return self._pushing(sample)
-        self._not_pushing(sample, touching)
-        return []
+    def take(self, samples: ContactSamples) -> list[tuple[int, int, PushContext]]:
+        """Add a portion of samples and return the windows that end at or before the last of them."""
+        if not len(samples):
+            return []
+        options, known = self.options, samples.force_known
+        lowered = samples.height <= options.lift
+        inside = (samples.gap < -INSIDE) & lowered
+        judged = lowered & ~(samples.in_break | inside)
+        tared = self._zero.add(samples.force, known & ~samples.in_break & touches_nothing(samples, options))
+        shown = self._shows_contact(samples, judged, ~known | tared)
+        # A force that does not show contacts when the geometry does is not asked.
+        apart = self._force_apart(samples, ~(samples.in_break | inside), shown, known & tared & ~samples.after_break)
+        near = judged & known & (samples.gap <= options.touch_gap)
+        touching = np.where(known & tared & ~apart, self._presses(samples, near & tared), shown)
+        found = self._segment(samples, touching, inside, near, known & ~tared)
+        self.samples += len(samples)
+        return found
 
-    def _update_breaks(self, sample: ContactSample) -> None:
-        elapsed, self._last_time = sample.time - self._last_time, sample.time
-        if sample.after_break:
-            self._start = None
-        else:
-            self._idle += elapsed if math.isfinite(elapsed) else 0.0
-        if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.in_break:
-            self.counts["inside"] += not self._inside
-            self._start = None
-        self._inside = inside
-        if sample.repositioned or (sample.after_break and elapsed > LONGEST_BREAK):
-            self.counts["resets"] += sample.repositioned
-            self._end_push()
+    # --- contact ------------------------------------------------------------------------------------------------
 
-    def _update_tare(self, sample: ContactSample) -> None:
-        if sample.force is None or sample.in_break:
-            return
-        if touches_nothing(sample, self.options):
-            self._free_force.append(sample.force)
-            self._zero = None
-        elif sample.speed < self.options.least_speed and self.push is None:
-            self._resting_force.append(sample.force)
-            self._zero = None
+    def _shows_contact(self, samples: ContactSamples, judged: BoolArray, ends: BoolArray) -> BoolArray:
+        """Whether the geometry shows a contact: the gap is small and does not shrink before it, nor grow after it.
 
-    def _touches(self, sample: ContactSample) -> bool:
-        pushing = self._shown and sample.speed >= self.options.least_speed
-        self.timing.add(sample, pushing, self._free_force, self._clear_force)
-        if sample.height > self.options.lift:
-            return False
-        pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
-        if self.timing.apart:
-            return self._shown
-        if sample.force is not None and self._free_force:
-            return pressed
-        # The force on a resting tip may be a preload: it can continue a contact but not show its begin or end.
-        return self._shown or (self._touching and pressed)
+        judged (n,): whether it can show one; ends (n,): whether a growing gap ends it.
+        """
+        limit = np.maximum(LEAST_CLOSING_SPEED, CLOSING_SHARE * samples.speed)
+        near = judged & (samples.gap <= self.options.touch_gap_alone) & ~(ends & (samples.opening_speed > limit))
+        sample = np.arange(len(samples))
+        begun = np.maximum.accumulate(np.where(near & (samples.closing_speed <= limit), sample, -1))
+        ended = np.maximum.accumulate(np.where(near, -2 if self._shown else -1, sample))
+        shown = np.asarray(begun > ended)
+        self._shown = bool(shown[-1])
+        return shown
 
-    def _shows_contact(self, sample: ContactSample) -> bool:
-        """Whether the geometry shows a contact: the gap is small and does not shrink before it, nor grow after it."""
-        if sample.height > self.options.lift or sample.gap > self.options.touch_gap_alone:
-            return False
-        limit = max(LEAST_CLOSING_SPEED, CLOSING_SHARE * sample.speed)
-        separates = sample.opening_speed > limit and (sample.force is None or bool(self._free_force))
-        return not separates and (self._shown or sample.closing_speed <= limit)
+    def _force_apart(
+        self, samples: ContactSamples, judged: BoolArray, shown: BoolArray, usable: BoolArray
+    ) -> BoolArray:
+        """Whether the force does not show contacts (n,), by the touches so far."""
+        rows, apart = np.flatnonzero(judged), np.zeros(len(samples), dtype=np.bool_)
+        apart[rows] = self.timing.take(
+            samples if len(rows) == len(samples) else taken(samples, rows),
+            (shown & self._moves(samples))[rows],
+            usable[rows],
+            zero=lambda sample: self._zero.readings(int(rows[sample])),
+            least_force=lambda sample: self._clear_force(self._zero.at(int(rows[sample])).noise),
+        )
+        return apart
 
-    def _presses(self, force: tuple[float, float] | None) -> bool:
-        zero, _ = self._tare()
-        if force is None or zero is None:
-            return False
-        return math.hypot(force[0] - zero[0], force[1] - zero[1]) > self._least_force()
+    def _moves(self, samples: ContactSamples) -> BoolArray:
+        return np.asarray(samples.speed >= self.options.least_speed)
 
-    def _least_force(self) -> float:
-        """The force (N) above which there is contact."""
-        return max(self.options.least_force, NOISE_FACTOR * self._tare()[1])
+    def _presses(self, samples: ContactSamples, near: BoolArray) -> BoolArray:
+        """At which samples (n,) of those near the slider the force shows a contact."""
+        found, rows = np.zeros(len(samples), dtype=np.bool_), np.flatnonzero(near)
+        size, noise = self._zero.above(samples.force, rows)
+        found[rows] = size > np.maximum(self.options.least_force, NOISE_FACTOR * noise)
+        return found
 
-    def _clear_force(self) -> float:
+    def _clear_force(self, noise: float) -> float:
         """The force (N) that shows a contact without delay."""
-        return max(CLEAR * self.options.least_force, self._least_force())
+        return max(CLEAR * self.options.least_force, NOISE_FACTOR * noise)
 
-    def _tare(self) -> tuple[tuple[float, float] | None, float]:
-        """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""
-        if self._zero is None:
-            readings = np.array(self._free_force or self._resting_force)
-            x, y = readings.mean(axis=0).tolist() if len(readings) else (0.0, 0.0)
-            noise = float(np.hypot(*readings.std(axis=0))) if len(readings) else 0.0
-            self._zero = (x, y) if len(readings) else None, noise
-        return self._zero
+    def _at_rest(self, samples: ContactSamples, sample: int, near: bool, moves: bool) -> bool:
+        """Whether a contact goes on at a sample before any free motion, where the force at rest is the zero."""
+        if not moves and self.push is None:
+            self._zero.rest(tuple(samples.force[sample].tolist()))
+        # The force on a resting tip may be a preload: it can continue a contact but not show its begin or end.
+        if not (near and self._touching) or self._zero.at(sample).mean is None:
+            return False
+        size, noise = self._zero.above(samples.force, np.array([sample]))
+        return bool(size[0] > max(self.options.least_force, NOISE_FACTOR * noise[0]))
 
-    def _pushing(self, sample: ContactSample) -> list[tuple[int, int, PushContext]]:
-        push = self.push
-        if push is None or self._idle > self.options.push_pause:
-            push = self._begin_push(sample)
-        self._idle = 0.0
-        self._last_good, self._last_contact = sample.time, sample.stamp
-        if self._start is None and sample.at_speed:
-            self._start = sample.stamp
+    # --- pushes and windows -------------------------------------------------------------------------------------
+
+    def _segment(
+        self, samples: ContactSamples, touching: BoolArray, inside: BoolArray, near: BoolArray, untared: BoolArray
+    ) -> list[tuple[int, int, PushContext]]:
+        """The windows in a portion with contacts (n,).
+
+        near (n,): a force would show a contact; untared (n,): its zero in free motion is not known yet.
+        """
+        time, moves = samples.time, self._moves(samples)
+        elapsed = np.diff(time, prepend=time[0] if self._last_time is None else self._last_time)
+        entered = inside & ~samples.in_break
+        self.counts["inside"] += int(np.sum(entered & ~np.append(self._inside, inside[:-1])))
+        self.counts["resets"] += int(np.sum(samples.repositioned))
+        self._inside, self._last_time = bool(inside[-1]), float(time[-1])
+        ends = samples.repositioned | (samples.after_break & (elapsed > LONGEST_BREAK))
+        stops, asks = samples.after_break | entered | ends, untared & ~samples.in_break
+        idle = np.where(samples.after_break, 0.0, elapsed)
+        columns = (samples.stamp, time, idle, stops, asks, touching, moves, samples.at_speed)
+        done: list[tuple[int, int, PushContext]] = []
+        for k, (stamp, at, step, stop, ask, touches, moving, at_speed) in enumerate(
+            zip(*(column.tolist() for column in columns), strict=True)
+        ):
+            self._idle += step
+            if stop:
+                self._start = None
+                if ends[k]:
+                    self._end_push()
+            if ask:
+                touches = self._at_rest(samples, k, bool(near[k]), moving) or touches
+            self._touching = touches
+            self.touching += touches
+            if touches and self._first_touch is None:
+                self._first_touch = stamp
+            if touches and moving:
+                if self.push is None or self._idle > self.options.push_pause:
+                    self._begin_push(stamp, self._zero.at(k).mean)
+                self._idle, self._last_good, self._last_contact = 0.0, at, stamp
+                if self._start is None and at_speed:
+                    self._start = stamp
+                if self._start is not None and self._start + self._length <= stamp:
+                    done += self._complete(stamp)
+            else:
+                if at - self._last_good > self.options.bounce:
+                    self._start = None
+                if not touches and self._idle > self.options.push_pause:
+                    self._first_touch = None
+        return done
+
+    def _complete(self, stamp: int) -> list[tuple[int, int, PushContext]]:
+        """The windows of the push that end at or before a stamp (ns)."""
         done = []
-        while self._start is not None and self._start + self._length <= sample.stamp:
-            done.append((self._start, self._start + self._length, push))
+        while self.push is not None and self._start is not None and self._start + self._length <= stamp:
+            done.append((self._start, self._start + self._length, self.push))
             self._start += self._stride
         return done
 
-    def _not_pushing(self, sample: ContactSample, touching: bool) -> None:
-        if sample.time - self._last_good > self.options.bounce:
-            self._start = None
-        if not touching and self._idle > self.options.push_pause:
-            self._first_touch = None
-
-    def _begin_push(self, sample: ContactSample) -> PushContext:
-        first = self._first_touch if self._first_touch is not None else sample.stamp
+    def _begin_push(self, stamp: int, tare: tuple[float, float] | None) -> None:
+        first = self._first_touch if self._first_touch is not None else stamp
         if self.push is not None and first == self.push.first_touch:
-            first = sample.stamp  # the pusher rested in contact; this push begins with its motion
+            first = stamp  # the pusher rested in contact; this push begins with its motion
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
-        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._tare()[0])
+        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), tare)
         self._pushes += 1
         self._start = None
-        return self.push
 
     def _end_push(self) -> None:
         self.push, self._start, self._first_touch = None, None, None

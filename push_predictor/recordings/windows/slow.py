@@ -66,13 +66,13 @@ class SlowPoses:
         """Whether the interval before each sample (n,) is a usual one of a slow stream."""
         interval = np.diff(samples.stamp) * NANOSECOND
         found = np.zeros(len(samples.stamp), dtype=np.bool_)
-        if len(interval) > USUAL:
-            usual = np.median(sliding_window_view(interval, USUAL), axis=1)[1:]
-            last = interval[USUAL:]
-            longest = np.maximum(SHORTEST_DROPOUT, DROPOUT_PERIODS * usual)
-            found[USUAL + 1 :] = (usual > SLOW) & (last > SLOW) & (last <= longest)
-        jumps = self._is_jump(samples.values[:-1], samples.values[1:], interval)
-        return np.asarray(found & ~samples.interrupted & ~np.append(False, jumps)[: len(found)])
+        rows = USUAL + np.flatnonzero(interval[USUAL:] > SLOW)
+        if len(rows):
+            usual, last = np.median(sliding_window_view(interval, USUAL)[rows - USUAL + 1], axis=1), interval[rows]
+            slow = (usual > SLOW) & (last <= np.maximum(SHORTEST_DROPOUT, DROPOUT_PERIODS * usual))
+            jumps = self._is_jump(samples.values[rows], samples.values[rows + 1], last)
+            found[rows + 1] = slow & ~samples.interrupted[rows + 1] & ~jumps
+        return found
 
     def _with_poses(self, samples: OrderedSamples, rows: IntArray, slow: BoolArray) -> OrderedSamples:
         """The samples in these consecutive rows, with the poses that are put in before those of a slow stream."""

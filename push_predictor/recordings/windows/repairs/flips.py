@@ -65,7 +65,8 @@ def flip_steps(stamp: IntArray, pose: Array) -> tuple[Array, BoolArray]:
     """
     step, elapsed = np.diff(pose, axis=0), np.abs(np.diff(stamp))
     elsewhere = (elapsed > LONGEST_STEP) | (np.hypot(step[:, 0], step[:, 1]) > STAYS + SPEED * 1e-9 * elapsed)
-    turn = np.mod(step[:, 2], 2.0 * np.pi)
-    nearest = FIXED[np.argmin(np.abs(turn[:, None] - FIXED), axis=1)]
-    flips = ~elsewhere & (np.abs(turn - nearest) < NEAR)
-    return np.where(flips, nearest, 0.0), elsewhere
+    turn, found = np.mod(step[:, 2], 2.0 * np.pi), np.zeros(len(step))
+    rows = np.flatnonzero(~elsewhere & (turn > FIXED[0] - NEAR) & (turn < FIXED[-1] + NEAR))  # few, if any
+    nearest = FIXED[np.argmin(np.abs(turn[rows, None] - FIXED), axis=1)]
+    found[rows] = np.where(np.abs(turn[rows] - nearest) < NEAR, nearest, 0.0)
+    return found, elsewhere

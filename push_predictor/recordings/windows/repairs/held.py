@@ -67,13 +67,14 @@ class HeldPoses:
         stamp, ends = samples.stamp, np.append(begins[1:], len(pose))
         keep, values = np.ones(len(pose), dtype=np.bool_), samples.values.copy()
         first = np.concatenate([self._before, stamp[begins]])
+        changes = np.append(np.linalg.norm(pose[begins[1:]] - pose[begins[:-1]], axis=1) > HARMLESS, False)
         for run in np.flatnonzero(ends - begins > 1).tolist():
             begin, end = int(begins[run]), int(ends[run])
             if stamp[end - 1] - stamp[begin] > LONGEST_HOLD:
                 continue
             if not final and not self._decidable(stamp, begins, run):
                 return keep, values, max(begin + 1, self._returned)
-            if run + 1 < len(begins) and self._is_stale(stamp, pose, begins, run, float(values[end, -1])):
+            if changes[run] and self._is_stale(stamp, pose, begins, run, float(values[end, -1])):
                 rows = np.arange(max(begin + 1, self._returned), end)
                 usual = first[: run + len(self._before) + 2][-USUAL - 1 :]
                 interval = float(stamp[end] - stamp[begin]) * NANOSECOND
