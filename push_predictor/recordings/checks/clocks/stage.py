@@ -232,7 +232,8 @@ def _step(recording: Recording, recorded: Recording, size: float, sd: float, aft
         if near.any():
             last = int(np.flatnonzero(near)[0])  # with the clock before the step
             stream: PoseStream = getattr(recording, name)
-            index = int(np.searchsorted(stream.stamp, stamp[last], side="right"))
+            whole = len(stream) == len(stamp)  # with late samples, if any
+            index = last + 1 if whole else int(np.searchsorted(stream.stamp, stamp[last], side="right"))
             return Step(size, sd, float(time[last]), name, index, True)
     index = int(np.searchsorted(recording.slider.stamp, origin + round(1e9 * 0.5 * (after + before))))
     return Step(size, sd, 0.5 * (after + before), "slider", index, False)
