@@ -13,6 +13,7 @@ from checked_bags import bag, found, rig_of, sample
 from coarse import coarse_simulator
 from lab_bags import pose_rows
 from mistakes import UPSIDE_DOWN, late, spatial_rows
+from stream_faults import held
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
@@ -207,6 +208,14 @@ def test_lags_of_single_pushes_are_those_of_the_stamps() -> None:
     lags = push_lags(late(bag(HEXAGON), 0.04), rig_of(HEXAGON))
     assert lags is not None and lags.share > 0.9
     assert np.median(lags.lag) == pytest.approx(0.04, abs=0.003)
+
+
+@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("rate", [20.0, 50.0])
+def test_along_a_single_side_no_outline_is_shifted(name: str, rate: float) -> None:
+    """All pushes are on one side: the fit may move the outline along it, up to a corner, for nothing."""
+    recording = replace(bag(MANY), **{name: held(getattr(bag(MANY), name), rate)})
+    assert [*found(recording, rig_of(MANY))] == [f"repeated_poses_{name}"]
 
 
 # --- noise and speed -------------------------------------------------------------------------------------------------

@@ -67,7 +67,7 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
         found.append(_tip_offset(cause.fit))
     if _is_turned(cause.fit):
         found.append(_turned(value_of(cause.fit, YAW, "rad")))
-    if _is_shifted(cause.fit):
+    if _is_shifted(cause.fit) and _shift_explains(contacts, rig, cause):
         found.append(_shifted(cause.fit, rig))
     if cause.name == "proportions":
         found.append(_proportions(cause.fit, rig))
@@ -336,6 +336,17 @@ def _is_resized(fit: OutlineFit, rig: Rig) -> bool:
 
 def _is_shifted(fit: OutlineFit) -> bool:
     return _exceeds(fit, X, LENGTH_ALLOWANCE) or _exceeds(fit, Y, LENGTH_ALLOWANCE)
+
+
+def _shift_explains(contacts: Contacts, rig: Rig, cause: Cause) -> bool:
+    """Whether the contacts lie farther off without a component of the shift.
+
+    Along a single side they do not, up to its corner: a fit that ends there has a small standard deviation.
+    """
+    shifts = [each for each in (X, Y) if _exceeds(cause.fit, each, LENGTH_ALLOWANCE)]
+    same = TIP if cause.name == "tip_radius" else LAG
+    without = [refit(cause.fit, contacts, rig, same, without=each) for each in shifts]
+    return any(_penalised(cause.fit) < _penalised(each) for each in without)
 
 
 def _is_turned(fit: OutlineFit) -> bool:
