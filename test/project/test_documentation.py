@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib.util
 import re
@@ -197,6 +198,34 @@ def test_the_push_page_gives_the_size_of_every_standard_outline():
         extent = 2.0 * np.abs(shape_outline(name).vertices).max(axis=0)
         sizes = [float(size) for size in re.findall(r"\d+\.\d+", text)]
         assert sizes[0] == pytest.approx(extent[0] / 2.0 if name == "hex" else extent[0], rel=1e-3), name
+
+
+OF_VARIABLES = {  # prefix and pattern of names that stand elsewhere in the module
+    "stage.py: name": ("", r'^ +"(\w+)": Mirror\('),
+    "table_signs.py: name": ("", r'_finding\("(\w+)"'),
+    "units.py: f'units_{name.split()[0]}'": ("units_", r'_column\("(\w+)'),
+}
+
+
+def names_of_findings() -> Iterator[str]:
+    """The name of every finding in the code; NAME stands for a stream."""
+    for path in sorted((REPOSITORY / "push_predictor" / "recordings" / "checks").rglob("*.py")):
+        code = path.read_text()
+        for call in ast.walk(ast.parse(code)):
+            if isinstance(call, ast.Call) and ast.unparse(call.func) == "Finding":
+                name = ast.unparse(call.args[0])
+                if plain := re.fullmatch(r"f?'(\w+?)(\{name\})?'", name):
+                    yield plain[1] + ("NAME" if plain[2] else "")
+                else:
+                    prefix, pattern = OF_VARIABLES[f"{path.name}: {name}"]
+                    yield from (prefix + each for each in re.findall(pattern, code, re.MULTILINE))
+
+
+def test_the_page_of_findings_has_one_row_for_each_that_the_code_reports():
+    rows = re.findall(r"^\| (`.+?) \|", (REFERENCE / "check.md").read_text(), re.MULTILINE)
+    documented = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
+    assert len(documented) > 70
+    assert sorted(documented) == sorted(set(names_of_findings()))
 
 
 def test_the_example_rig_has_every_key_and_loads():

@@ -29,7 +29,7 @@ LABORATORY = {
     "How do I record my topics, and what does the line say?": "docs/how_to/your_own_data.md#record",
     "Which message types and tf frames can be read?": "docs/reference/recordings.md#topics-and-types",
     "My force sensor turns with the tip. What now?": "docs/reference/recordings.md#axes-of-the-wrench",
-    "What does a finding of check mean?": "docs/reference/command_line.md#check",
+    "What does a finding of check mean?": "docs/reference/check.md#streams",
     "Does the model fit my pushes?": "docs/reference/command_line.md#validate",
     "How do I validate while the robot works?": "docs/how_to/live_devices.md#start-the-nodes",
     "What remains when the recorder is killed?": "docs/how_to/your_own_data.md#what-remains-after-a-crash",
