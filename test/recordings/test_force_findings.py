@@ -13,9 +13,14 @@ import pytest
 from checked_bags import bag, rig_of
 from mistakes import force_scaled, force_turned
 
-from push_predictor.recordings.checks.check import check_recording
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.checks.check import check_recording, evidence_of
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.force.stage import wrench_findings
+from push_predictor.recordings.checks.force.timing import rate_finding
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.streams import Recording, WrenchStream, taken
+from push_predictor.recordings.windows.finder import find_windows
 
 NAME = "ellipse_plywood"  # 15 pushes at 20 to 50 mm/s
 ONE_SIDE = "square_abs_repeats"  # 80 short pushes
@@ -48,6 +53,54 @@ def test_a_force_that_is_late_or_early_is_named_with_its_lag(name: str, seconds:
     assert finding.name == "wrench_lag" and lag.sd is not None
     assert abs(lag.value - seconds) < 3.0 * lag.sd and lag.sd < 0.008
     assert (" after " in finding.sentence) == (seconds > 0.0)
+
+
+@pytest.mark.parametrize("seconds", [0.12, -0.12])
+def test_what_follows_gets_the_force_without_its_lag(seconds: float) -> None:
+    """So that its axes and its zero are judged in the contacts."""
+    recording = evidence_of(altered(NAME, late(seconds)), rig_of(NAME)).recording
+    sound = bag(NAME).wrench
+    assert recording.wrench is not None and sound is not None
+    assert np.max(np.abs(recording.wrench.stamp - sound.stamp)) < 20_000_000
+
+
+def test_a_wrong_outline_shows_no_lag() -> None:
+    """It shows touches elsewhere: nothing is said about the clock of the force, and no windows are kept."""
+    rig = rig_of(NAME)
+    larger = replace(rig, outline=Outline(1.1 * rig.outline.vertices))
+    evidence = evidence_of(altered(NAME, late(0.12)), larger)
+    assert evidence.findings and not evidence.has("wrench_lag") and evidence.windows is None
+    assert evidence_of(bag(NAME), rig).windows is not None
+
+
+def test_the_windows_of_a_check_are_those_of_the_recording_as_given() -> None:
+    """Those of a recording without its wrong samples are not."""
+    for recording in (bag(NAME), altered(NAME, late(0.12))):
+        shared = evidence_of(recording, rig_of(NAME)).windows
+        expected = find_windows(recording, rig_of(NAME))
+        assert shared is not None
+        assert [(each.start, each.end) for each in shared] == [(each.start, each.end) for each in expected]
+    stuck = altered(NAME, lambda wrench: replace(wrench, fx=np.full(len(wrench), 1.5), fy=np.full(len(wrench), -0.5)))
+    assert evidence_of(stuck, rig_of(NAME)).windows is None
+
+
+@pytest.mark.parametrize(("spread", "named"), [(0.1, True), (0.7, False)])
+def test_a_zero_that_varies_as_much_as_it_is_off_is_no_constant(spread: float, named: bool) -> None:
+    rig, rng = rig_of(NAME), np.random.default_rng(0)
+    motion = motion_of(bag(NAME), rig)
+    assert motion is not None
+    free = ~motion.contact[:, None]
+    zero = [0.8, 0.0] + rng.uniform(-spread, spread, (len(motion.time), 1)) * [1.0, 0.0]
+    force = np.where(free, zero, motion.force + [0.8, 0.0])
+    found = wrench_findings(replace(motion, force=force), rig)
+    assert [each.name for each in found] == (["wrench_zero"] if named else [])
+
+
+@pytest.mark.parametrize(("rate", "named"), [(19.0, True), (21.0, False)])
+def test_a_force_below_20_hz_is_rare(rate: float, named: bool) -> None:
+    stamp = np.arange(0, 10_000_000_000, round(1e9 / rate))
+    still = np.zeros(len(stamp))
+    assert (rate_finding(WrenchStream(stamp, still, still, still)) is not None) == named
 
 
 def test_a_filter_is_a_lag() -> None:

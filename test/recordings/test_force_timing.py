@@ -11,14 +11,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from checked_bags import bag
+from contact_portions import samples_at
 from synthetic import windows_of
 
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
+from push_predictor.recordings.windows.contact import SLOWEST
+from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.force_timing import FEWEST, UNSEEN, force_delay
+from push_predictor.recordings.windows.force_timing import FEWEST, UNSEEN, ForceTiming, force_delay
 
 NAME = "ellipse_plywood"  # 15 pushes
+MANY = "square_abs_repeats"  # 80 pushes
 
 
 def wrench_of(recording: Recording) -> WrenchStream:
@@ -38,8 +42,18 @@ def scaled(recording: Recording, factor: float) -> Recording:
 
 def at_rate(recording: Recording, rate: float) -> Recording:
     wrench = wrench_of(recording)
-    step = round(1e9 / rate / float(np.median(np.diff(wrench.stamp))))
-    return replace(recording, wrench=taken(wrench, slice(None, None, step)))
+    stamp = np.arange(wrench.stamp[0], wrench.stamp[-1], round(1e9 / rate))
+    values = {name: np.interp(stamp, wrench.stamp, getattr(wrench, name)) for name in ("fx", "fy", "torque")}
+    return replace(recording, wrench=replace(wrench, stamp=stamp, **values))
+
+
+def poses_late(recording: Recording, seconds: float) -> Recording:
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, stamp=slider.stamp + round(1e9 * seconds)))
+
+
+def ids(recording: Recording) -> set[str]:
+    return {window.push_id for window in windows_of(recording)}
 
 
 def later_pushes(recording: Recording) -> tuple[np.ndarray, int]:
@@ -141,10 +155,58 @@ def test_a_force_is_apart_only_if_that_is_clear(delays: list[float], apart: bool
 
 
 def test_a_silent_force_costs_three_pushes_at_most() -> None:
-    sound, silent = (
-        {window.push_id for window in windows_of(recording)} for recording in (bag(NAME), scaled(bag(NAME), 0.0))
-    )
+    sound, silent = (ids(recording) for recording in (bag(NAME), scaled(bag(NAME), 0.0)))
     assert len(sound) - UNSEEN <= len(silent) < len(sound)
+
+
+def test_a_force_that_falls_silent_costs_three_pushes_at_most() -> None:
+    """However many touches showed it before."""
+    sound = bag(MANY)
+    wrench = wrench_of(sound)
+    last = np.arange(len(wrench)) < len(wrench) // 2
+    silent = replace(sound, wrench=replace(wrench, fx=last * wrench.fx, fy=last * wrench.fy))
+    assert len(ids(sound)) - UNSEEN <= len(ids(silent)) <= len(ids(sound))
+
+
+def touch_of(length: float, late: float, portion: int) -> float:
+    """The delay (s) that is found at a touch of some length (s), of a force that is late (s)."""
+    time = 0.01 * np.arange(400)
+    after = time - 2.0
+    gap = np.where(after < 0.0, -0.05 * after, np.where(after <= length, 0.0, 0.05 * (after - length)))
+    force = np.where((after - late > -0.005) & (after - late < length + 0.005), 1.2, 0.02)
+    speed = np.where(after < length + 0.1, 0.05, 0.0)
+    samples = samples_at(time, gap, force, speed, way=0.05 * np.clip(after, 0.0, length))
+    timing = ForceTiming()
+    for begin in range(0, len(time), portion):
+        part = taken_samples(samples, slice(begin, begin + portion))
+        every = np.ones(len(part), dtype=np.bool_)
+        timing.take(part, (part.gap < 0.0005) & (part.time > 1.995), every, lambda _: np.zeros((5, 2)), lambda _: 0.3)
+    ((_, delay),) = timing.touches
+    return delay
+
+
+@pytest.mark.parametrize("portion", [1, 30, 400])
+@pytest.mark.parametrize("late", [-0.2, 0.0, 0.1])
+@pytest.mark.parametrize("length", [0.06, 0.15, 0.3, 1.0])  # s; 1.5 cm at 10 cm/s take 0.15 s
+def test_the_force_of_a_short_contact_is_seen(length: float, late: float, portion: int) -> None:
+    assert touch_of(length, late, portion) == pytest.approx(late, abs=0.01)
+
+
+def test_late_poses_do_not_depose_the_force() -> None:
+    """The tip reaches the place of a slider at rest when the force rises: of the three, the slider's clock is off."""
+    for seconds in (0.035, 0.08):
+        finder = WindowFinder(require_rig(bag(MANY)))
+        found = finder.find(poses_late(bag(MANY), seconds))
+        delay = force_delay([delay for _, delay in finder.force_touches])
+        assert delay.touches > FEWEST and not delay.apart
+        assert len({window.push_id for window in found}) >= len(ids(bag(MANY))) - 1
+
+
+def test_a_force_of_another_time_is_apart_from_late_poses_too() -> None:
+    for seconds in (0.12, -0.12):
+        finder = WindowFinder(require_rig(bag(MANY)))
+        finder.find(delayed(poses_late(bag(MANY), 0.035), seconds))
+        assert force_delay([delay for _, delay in finder.force_touches]).shifted
 
 
 @pytest.mark.parametrize(
@@ -170,6 +232,9 @@ def test_windows_are_the_same_online(alter: Callable[[Recording], Recording]) ->
 
 
 def test_a_rare_force_begins_and_ends_no_window() -> None:
-    """At 10 Hz its line between two samples begins up to 0.1 s before the touch."""
-    rare, blind = (windows_of(each) for each in (at_rate(bag(NAME), 10.0), replace(bag(NAME), wrench=None)))
-    assert [(window.start, window.end) for window in rare] == [(window.start, window.end) for window in blind]
+    """Below 20 Hz its line between two samples begins up to 0.05 s before the touch."""
+    assert SLOWEST == 0.05
+    blind = [(window.start, window.end) for window in windows_of(replace(bag(NAME), wrench=None))]
+    for rate, geometry in ((10.0, True), (19.0, True), (21.0, False)):
+        windows = windows_of(at_rate(bag(NAME), rate))
+        assert ([(window.start, window.end) for window in windows] == blind) == geometry

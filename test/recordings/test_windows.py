@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_portions import samples_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.contact import ContactSamples
 from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -174,26 +174,6 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     assert first.velocity == pytest.approx(0.02, rel=0.5)  # the fit may include the start of the motion
     assert abs(first.angle) < 0.45
     assert first.displacement[0] > 0.9 * 0.004
-
-
-def samples_at(time: np.ndarray, gap: np.ndarray, force: np.ndarray, speed: np.ndarray) -> ContactSamples:
-    """Samples (n,) of a slider at rest, with a force along x; a tip that moves has its speed."""
-    still, never = np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_)
-    return ContactSamples(
-        stamp=np.rint(1e9 * time).astype(np.int64),
-        time=time,
-        place=np.zeros((len(time), 2)),
-        gap=gap,
-        height=still,
-        closing_speed=still,
-        opening_speed=still,
-        force=np.column_stack([force, still]),
-        speed=speed,
-        at_speed=speed > 0.0,
-        in_break=never,
-        after_break=never,
-        repositioned=never,
-    )
 
 
 @pytest.mark.parametrize("portion", [1, 7, 100])

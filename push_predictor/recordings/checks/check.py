@@ -28,12 +28,17 @@ STAGES = (loss_stage, stream_stage, frame_stage, clock_stage, geometry_stage, fo
 
 def check_recording(recording: Recording, rig: Rig) -> tuple[Finding, ...]:
     """The probable mistakes of a recording, none if it is sound."""
+    return evidence_of(recording, rig).findings
+
+
+def evidence_of(recording: Recording, rig: Rig) -> Evidence:
+    """What the stages know of a recording: its probable mistakes, and what they found on the way."""
     evidence = Evidence(recording, rig, recorded=recording)
     for stage in STAGES:
         evidence = stage(evidence)
         if evidence.refused:
             break
-    return evidence.findings
+    return evidence
 
 
 def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:

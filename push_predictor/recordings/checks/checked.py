@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.check import check_table, evidence_of
 from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.motion import ContactFit, contact_fit
@@ -59,10 +59,13 @@ def checked_data(path: Path, rig: Rig | None = None, topics: Topics = Topics()) 
 def checked_recording(recording: Recording) -> CheckedData:
     """Check a recording, and the coverage of its windows if nothing is refused. Raises RigError without a rig."""
     rig = require_rig(recording)
-    found = check_recording(recording, rig)
+    evidence = evidence_of(recording, rig)
+    found = evidence.findings
     if any(finding.severity == "refused" for finding in found):
         return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
-    used, windows = recording, find_windows(recording, rig)
+    used, windows = recording, evidence.windows
+    if windows is None:
+        windows = find_windows(recording, rig)
     if any(finding.name in HIDING for finding in found):
         some, used = windows, replace(recording, wrench=None)
         windows = find_windows(used, rig)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,6 +14,7 @@ from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.checks.streams.facts import StreamFacts
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.windows.push_window import PushWindow
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,8 @@ class Evidence:
     facts: of the streams "slider" and "pusher", where they have enough samples; empty before the stage of streams.
     A stage takes it and returns it with its own findings. It does not look for what an earlier finding explains.
     recorded: the recording as it was given, None if it is the same. synchronous: whether single pushes show that the
-    accepted stamps of slider and tip are on one clock.
+    accepted stamps of slider and tip are on one clock. windows: of the recording as it was given, None where no stage
+    looked for them.
     """
 
     recording: Recording
@@ -32,6 +34,7 @@ class Evidence:
     facts: Mapping[str, StreamFacts] = field(default_factory=dict)
     recorded: Recording | None = None
     synchronous: bool = False
+    windows: Sequence[PushWindow] | None = None
 
     @property
     def refused(self) -> bool:
@@ -50,4 +53,7 @@ class Evidence:
     def found(self, more: Iterable[Finding | None], recording: Recording | None = None) -> Evidence:
         """With further findings; recording: what is accepted from here on, as before if None."""
         findings = (*self.findings, *(finding for finding in more if finding is not None))
-        return replace(self, findings=findings, recording=recording or self.recording)
+        after = replace(self, findings=findings, recording=recording or self.recording)
+        if after.recording is self.recording and "motion" in self.__dict__:
+            after.__dict__["motion"] = self.motion  # of the same samples: it need not be found again
+        return after

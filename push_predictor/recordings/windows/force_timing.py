@@ -158,7 +158,7 @@ class ForceTiming:
         approach = NEAR * max(float(samples.closing_speed[touch]), 0.0) / float(samples.speed[touch])
         share = 0.5 * min((_parted(time, samples.gap, touch) - time[touch]) / SEARCHED, 1.0)
         begin = time[touch] + approach
-        # Of poses that are late by one time the tip enters the outline before the slider starts: it and the force agree.
+        # If the slider's poses are late, the tip enters the outline before the slider starts: tip and force agree then.
         reached = min(_reached(time, samples.gap, touch) - begin, 0.0)
         delay = _delay(time - begin, np.hypot(x, y), 1.0 - HIGH * share, reached, least_force)
         self.touches.append((float(time[touch]), delay))

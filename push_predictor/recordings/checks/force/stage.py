@@ -14,7 +14,12 @@ from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.force.direction import FEWEST_PUSHES, TOPIC, direction_findings
 from push_predictor.recordings.checks.force.presence import presence_findings
-from push_predictor.recordings.checks.force.timing import force_delays, rate_finding, timing_finding, unseen_finding
+from push_predictor.recordings.checks.force.timing import (
+    rate_finding,
+    timing_finding,
+    unseen_finding,
+    windows_and_delays,
+)
 from push_predictor.recordings.checks.geometry.stage import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.dropouts import NANOSECOND
@@ -50,7 +55,8 @@ def force_stage(evidence: Evidence) -> Evidence:
     outlined = all(finding.severity == "note" for finding in evidence.findings)
     found, kept = presence_findings(recording, motion)
     # A wrong outline shows touches elsewhere.
-    delays = force_delays(kept, rig) if outlined else []
+    windows, delays = windows_and_delays(kept, rig) if outlined else (None, [])
+    windows = windows if kept is evidence.recorded else None
     late = timing_finding(delays)
     if late is not None and kept.wrench is not None:
         stamp = kept.wrench.stamp - round(late.values["lag"].value / NANOSECOND)
@@ -60,7 +66,7 @@ def force_stage(evidence: Evidence) -> Evidence:
     found += [each for each in (rate_finding(recording.wrench), late) if each is not None]
     directed = not evidence.has(*MIRRORS, "frames_apart")
     found += wrench_findings(motion, rig, outlined, kept, directed)
-    return evidence.found(found or [unseen_finding(delays)], kept)
+    return replace(evidence.found(found or [unseen_finding(delays)], kept), windows=windows)
 
 
 def wrench_findings(

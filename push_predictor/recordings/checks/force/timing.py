@@ -15,17 +15,17 @@ from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.windows.contact import SLOWEST
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.force_timing import DOUBT, FEWEST, LATEST, ForceDelay, force_delay
+from push_predictor.recordings.windows.push_window import PushWindow
 
 LOWEST_RATE = 1.0 / SLOWEST  # Hz: four samples in a window of 0.2 s
 PARTS = 3  # of a recording, of which the first and the last show a drift
 BY_GEOMETRY = "Windows come from the geometry then, but their forces are those of another time."
 
 
-def force_delays(recording: Recording, rig: Rig) -> list[float]:
-    """How late the force rises at each touch that slider and tip show, s; NaN where it does not show it."""
+def windows_and_delays(recording: Recording, rig: Rig) -> tuple[list[PushWindow], list[float]]:
+    """The windows, and how late the force rises at each touch that slider and tip show, s; NaN where it does not."""
     finder = WindowFinder(rig)
-    finder.find(recording)
-    return [delay for _, delay in finder.force_touches]
+    return finder.find(recording), [delay for _, delay in finder.force_touches]
 
 
 def timing_finding(delays: list[float]) -> Finding | None:
