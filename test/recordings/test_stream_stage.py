@@ -17,7 +17,6 @@ from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.repairs.bursts import burst_period, missing_in_bursts
 from push_predictor.recordings.windows.repairs.chain import StreamRepairs
-from push_predictor.recordings.windows.repairs.continued import continued
 from push_predictor.recordings.windows.repairs.flips import HeadingFlips
 from push_predictor.recordings.windows.repairs.held import HeldPoses
 from push_predictor.recordings.windows.repairs.resolution import Resolution
@@ -217,13 +216,6 @@ def test_poses_continued_by_a_tracker_are_cut(sound: Recording, windows: list[Pu
     spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
     again = find_windows(recording, rig_of(NAME))
     assert sum(any(w.start < end and w.end > begin for begin, end in spans) for w in again) <= 1
-
-
-def test_a_motion_on_a_line_without_noise_is_no_continued_one() -> None:
-    time = np.arange(300) * 0.01
-    x = 0.05 * np.clip(time - 1.0, 0.0, 1.0)
-    stream = PoseStream(np.rint(1e9 * time).astype(np.int64), x, 0.0 * x, 0.0 * x, 0.0 * x)
-    assert not continued(stream, angle=True).any()
 
 
 def test_a_body_at_rest_without_noise_keeps_its_poses() -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -231,9 +232,10 @@ def moving_slider(time: Array, pose: Array, rig: Rig) -> BoolArray:
     return np.asarray(_SliderSpeed(time, pose, rig).moving)
 
 
-def noise_of(values: Array) -> Array:
-    """Standard deviations (k,) of the noise of n samples (n, k), from their second differences."""
-    return np.asarray(SD * np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / np.sqrt(6.0))
+def noise_of(values: Array, order: int = 2) -> Array:
+    """Standard deviations (k,) of the noise of n > order samples (n, k), from their differences of this order."""
+    changes = np.abs(np.diff(values, order, axis=0))
+    return np.asarray(SD * np.median(changes, axis=0) / np.sqrt(comb(2 * order, order)))
 
 
 def _speed_noise(values: Array, span: float) -> float:

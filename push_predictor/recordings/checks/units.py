@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames.orientation import OUTRUN, STEEP, TRAVEL, tilt_of, turn_and_path
+from push_predictor.recordings.checks.frames.orientation import OUTRUN, STEEP, TRAVEL, every, tilt_of, turn_and_path
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
@@ -99,7 +99,7 @@ def _speed(name: str, stream: PoseStream) -> Finding | None:
 
     Steps of SPEED_SPAN: between two samples, stamps of receipt and poses of a slower source show no speed.
     """
-    rows = _every(stream, SPEED_SPAN)
+    rows = every(stream, SPEED_SPAN)
     step, time = np.hypot(np.diff(stream.x[rows]), np.diff(stream.y[rows])), 1e-9 * np.diff(stream.stamp[rows])
     known = np.isfinite(step) & (time > 0.0)
     if not known.any():
@@ -118,13 +118,6 @@ def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
         return None
     sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
     return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})
-
-
-def _every(stream: PoseStream, span: float) -> slice:
-    """Samples about `span` s apart."""
-    step = np.diff(stream.stamp)
-    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
-    return slice(None, None, max(1, round(span / max(period, 1e-6))))
 
 
 def _weighted_median(values: Array, weights: Array) -> float:

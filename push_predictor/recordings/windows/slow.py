@@ -29,15 +29,15 @@ LEAST = 2e-4  # m in one interval: less is noise
 class SlowPoses:
     """Takes the samples of one stream in order and returns them with poses between those of a slow stream.
 
-    fill: put poses between all samples, for a body whose contact is asked for at each; else only at start and stop. A
-    sample of a slow stream waits for the next.
+    Those of a body with a heading, whose contact is asked for at each pose, are put between all samples; of the tip,
+    only at start and stop. A sample of a slow stream waits for the next.
     """
 
-    def __init__(self, is_jump: IsJump, fill: bool, angle: int | None = None) -> None:
+    def __init__(self, is_jump: IsJump, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
         self._is_jump = is_jump
-        self._fill, self._angle = fill, angle
-        self._samples: OrderedSamples | None = None  # those that wait, after USUAL before them
+        self._angle = angle
+        self._samples: OrderedSamples | None = None  # one that waits, after those that show the usual interval
         self._returned = 0
 
     @property
@@ -50,16 +50,13 @@ class SlowPoses:
         samples = new if self._samples is None else joined(self._samples, new)
         slow = self._slow(samples)
         end = len(samples.stamp) - (0 if final or not len(slow) or not slow[-1] else 1)
-        rows = np.arange(self._returned, max(end, self._returned))
-        found = taken(samples, rows)
-        if slow[rows].any():  # never the first samples of a stream
-            first, rows = rows[:1], rows[1:] if rows[0] == 0 else rows
-            found = self._with_poses(samples, rows, slow)
-            found = joined(taken(samples, first), found) if first[0] == 0 else found
+        found = taken(samples, slice(self._returned, end))
+        if slow[self._returned : end].any():
+            first = max(self._returned, 1)
+            before = taken(samples, slice(self._returned, first))
+            found = joined(before, self._with_poses(samples, np.arange(first, end), slow))
         keep = max(len(samples.stamp) - USUAL - 3, 0)
-        keep = min(keep, max(int(rows[-1]) + 1 if len(rows) else self._returned, 0))
-        self._returned = (int(rows[-1]) + 1 if len(rows) else self._returned) - keep
-        self._samples = taken(samples, slice(keep, None))
+        self._samples, self._returned = taken(samples, slice(keep, None)), end - keep
         return found
 
     def _slow(self, samples: OrderedSamples) -> BoolArray:
@@ -78,11 +75,11 @@ class SlowPoses:
         """The samples in these consecutive rows, with the poses that are put in before those of a slow stream."""
         before = np.arange(int(rows[0]) - 1, int(rows[-1]) + 1)
         stamp, values, slowly = samples.stamp[before], samples.values[before], slow[before]
-        at, joint, knots = _knots(samples, rows[slow[rows]], self._angle)
+        at, joint, knots = _knots(samples, rows[slow[rows]], slow, self._angle)
         at = at - before[0]
         time, pose = np.insert(stamp, at, joint), np.insert(values, at, knots, axis=0)
         parts = np.ones(len(time) - 1, dtype=np.int64)
-        if self._fill:
+        if self._angle is not None:
             parts = np.where(np.insert(slowly, at, True)[1:], -(-np.diff(time) // FINE), 1)
         end = np.cumsum(parts)
         part = np.arange(1, int(end[-1]) + 1) - np.repeat(end - parts, parts)
@@ -92,12 +89,16 @@ class SlowPoses:
         interrupted[measured] = samples.interrupted[rows]
         known = (time - time[0]).astype(np.float64)
         poses = np.column_stack([np.interp((stamps - time[0]).astype(np.float64), known, of) for of in pose.T])
-        poses[measured] = values[1:]
         return OrderedSamples(stamps, poses, interrupted, samples.clock_set)
 
 
-def _knots(samples: OrderedSamples, rows: IntArray, angle: int | None) -> tuple[IntArray, IntArray, Array]:
-    """Starts and stops before some samples: the sample's index, their stamps (ns) and values."""
+def _knots(
+    samples: OrderedSamples, rows: IntArray, slow: BoolArray, angle: int | None
+) -> tuple[IntArray, IntArray, Array]:
+    """Starts and stops before some samples: the sample's index, their stamps (ns) and values.
+
+    slow (n,): the intervals before each of the n samples that are usual ones: over a break nothing moves.
+    """
     stamp, values = samples.stamp, samples.values
     interval = np.diff(stamp).astype(np.float64)
     rows = rows[rows + 1 < len(stamp)]
@@ -106,8 +107,8 @@ def _knots(samples: OrderedSamples, rows: IntArray, angle: int | None) -> tuple[
     before, now, after = velocity[rows - 2], velocity[rows - 1], velocity[rows]
     stop, start = _share(now, before, after), _share(now, after, before)
     way = interval[rows - 1]
-    stops = (stop < FULL) & (np.linalg.norm(before, axis=1) * way > LEAST)
-    starts = (start < FULL) & (np.linalg.norm(after, axis=1) * way > LEAST) & ~stops
+    stops = slow[rows - 1] & (stop < FULL) & (np.linalg.norm(before, axis=1) * way > LEAST)
+    starts = slow[rows + 1] & (start < FULL) & (np.linalg.norm(after, axis=1) * way > LEAST) & ~stops
     joint = np.where(stops, stamp[rows - 1] + np.rint(stop * way), stamp[rows] - np.rint(start * way)).astype(np.int64)
     found = (starts | stops) & (joint > stamp[rows - 1]) & (joint < stamp[rows])
     return rows[found], joint[found], np.where(starts[:, None], values[rows - 1], values[rows])[found]

@@ -52,10 +52,16 @@ def has_heading(slider: PoseStream) -> bool:
 def turn_and_path(slider: PoseStream) -> tuple[float, float]:
     """How far the slider turns (rad) and moves (m) in all; a pushed one turns about as far, in terms of its size."""
     usable = np.isfinite(slider.x + slider.y + slider.heading)
-    period = 1e-9 * float(np.median(np.diff(slider.stamp))) if len(slider) > 1 else TURN_SPAN
     pose = np.column_stack([slider.x, slider.y, slider.heading])[usable]
-    step = np.diff(pose[:: max(1, round(TURN_SPAN / max(period, 1e-6)))], axis=0)
+    step = np.diff(pose[every(slider, TURN_SPAN)], axis=0)
     return float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
+
+
+def every(stream: PoseStream, span: float) -> slice:
+    """Samples about `span` s apart."""
+    step = np.diff(stream.stamp)
+    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
+    return slice(None, None, max(1, round(span / max(period, 1e-6))))
 
 
 def _tilted(slider: PoseStream, rig: Rig, tilt: float) -> Finding:

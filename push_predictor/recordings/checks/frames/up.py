@@ -16,9 +16,9 @@ import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames.orientation import OVERTURNED, tilt_of
+from push_predictor.recordings.checks.motion import noise_of
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.repairs.regular_stamps import SD
 from push_predictor.types import Array, BoolArray
 
 STEPS = (0.1, 0.2, 0.5)  # s between the positions whose difference is a step of the motion: the first that noise allows
@@ -127,7 +127,7 @@ def _ups(recording: Recording) -> dict[str, Up | None]:
 def _span(slider: PoseStream) -> tuple[float, float]:
     """The time (s) of a step, and the length (m) from which on a step is a motion, whatever the tracker's noise."""
     place = np.column_stack([slider.x, slider.y, slider.z])
-    noise = NOISE * float(np.max(SD * np.median(np.abs(np.diff(place, 2, axis=0)), axis=0))) / np.sqrt(3.0)
+    noise = NOISE * float(np.max(noise_of(place))) * np.sqrt(2.0)
     return next((span for span in STEPS if noise * STEPS[0] < QUIET * span), STEPS[-1]), max(noise, LEAST_STEP)
 
 

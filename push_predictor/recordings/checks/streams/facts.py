@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.recordings.checks.motion import noise_of
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.repairs.held import HeldPoses
-from push_predictor.recordings.windows.repairs.regular_stamps import SD
-from push_predictor.recordings.windows.repairs.resolution import LEVER, Resolution, lengths
+from push_predictor.recordings.windows.repairs.resolution import LEVER, Resolution, changes, lengths
 from push_predictor.recordings.windows.repairs.smoothing import SHORTEST, SmoothedPoses, fit_span
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
-from push_predictor.recordings.windows.track import Track
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 LEAST_SHARE = 1.0 / 6.0  # of the poses in motion are repeats: the source is slower than its messages
 MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
@@ -25,7 +24,6 @@ FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is e
 AROUND = 25  # samples on either side that show whether a body moves: more than a slow source repeats a pose
 STEPS, LEAST_WAY = 3.0, 5e-5  # steps of the resolution, m: a body moves by more in one interval
 ROUNDED = np.sqrt(12.0)  # standard deviations of a rounding error in one step
-THIRD = np.sqrt(20.0)  # standard deviations of a third difference in one of a sample
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,6 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
 
     The stamps must increase.
     """
-    track = Track(4, position=True, angle=3 if angle else None)
     values = np.column_stack([stream.x, stream.y, stream.z, np.unwrap(stream.heading)])
     column = 3 if angle else None
     pose = lengths(values, column)
@@ -76,10 +73,11 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
     )
     held = HeldPoses(column)
     kept = held.take(samples, final=True)
-    smoothed = SmoothedPoses(track.is_jump, column).take(kept, final=True)
+    smoothed = SmoothedPoses(column).take(kept, final=True)
     period = float(np.median(np.diff(stream.stamp))) * NANOSECOND
     source_period = _source_period(pose, quantum, period, len(held.dropouts))
-    noise = _noise(values[_changed(pose)] if source_period > period else values)
+    measured = values[changes(pose)] if source_period > period else values
+    noise = noise_of(measured[:, [0, 1, 3]], order=3)  # of third differences: motion hardly changes them
     facts = StreamFacts(
         samples=len(stream),
         period=period,
@@ -115,14 +113,3 @@ def _source_period(pose: Array, quantum: float, period: float, holds: int) -> fl
     if holds > MOST_HOLDS * runs:  # single losses, not a slow source
         return period
     return period / (1.0 - share) if count >= FEWEST_MOVING and LEAST_SHARE < share < 1.0 else period
-
-
-def _changed(pose: Array) -> IntArray:
-    """The samples whose pose is not that of the one before."""
-    return np.flatnonzero(np.append(True, np.any(pose[1:] != pose[:-1], axis=1)))
-
-
-def _noise(values: Array) -> Array:
-    """Standard deviations (3,) of x, y (m) and heading (rad), from third differences: motion hardly changes them."""
-    third = np.diff(values[:, [0, 1, 3]], 3, axis=0)
-    return SD * np.median(np.abs(third), axis=0) / THIRD if len(third) else np.zeros(3)

@@ -14,6 +14,7 @@ from push_predictor.recordings.checks.streams.facts import StreamFacts
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.cut import FIT_SAMPLES
 from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.recordings.windows.repairs.resolution import LEVER
 
 WINDOW = WindowOptions().duration  # s
 TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
@@ -22,7 +23,6 @@ ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
 SPEED_NOISE, TOO_NOISY = 0.006, 0.01  # m/s of the tip: a third and half of those of a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
 FEWEST_HOLDS = 2
-LEVER = 0.05  # m of an outline from its centre
 DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
 
 

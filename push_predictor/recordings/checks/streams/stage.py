@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.frames.orientation import has_heading
@@ -23,7 +25,7 @@ from push_predictor.recordings.checks.streams.stamp_noise import regular_in_burs
 from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, stamps_of, unset_stamps
 from push_predictor.recordings.checks.units import stream_rates, stream_units
 from push_predictor.recordings.streams import Recording, taken
-from push_predictor.recordings.windows.repairs.continued import continued, continued_runs
+from push_predictor.recordings.windows.repairs.continued import continued
 
 CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
 FEWEST_RUNS = 2
@@ -51,7 +53,7 @@ def stream_stage(evidence: Evidence) -> Evidence:
     lost, sound = _without_continued(sound, headed)
     found += lost
     facts, sound = _facts(sound, headed)
-    found += [*quality_findings(facts), *stamp_findings(recording)]
+    found += [*quality_findings(facts), *stamp_findings(stamps)]
     return replace(evidence.found(found, sound), facts=facts)
 
 
@@ -59,15 +61,14 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
     """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
     found = list[Finding]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
-        runs = continued_runs(stream, headed and name == "slider")
-        if len(runs) < FEWEST_RUNS:
-            continue
         lost = continued(stream, headed and name == "slider")
+        if (runs := int(np.sum(np.diff(lost, prepend=False) & lost))) < FEWEST_RUNS:
+            continue
         sentence = (
-            f"The {name}'s pose is continued on an exact line {len(runs)} times, without the noise of a measurement: "
+            f"The {name}'s pose is continued on an exact line {runs} times, without the noise of a measurement: "
             f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
         )
-        values = {"runs": Value(float(len(runs)), "1"), "share": Value(float(lost.mean()), "1")}
+        values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
         found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
         recording = replace(recording, **{name: taken(stream, ~lost)})  # type: ignore[arg-type]
     return found, recording

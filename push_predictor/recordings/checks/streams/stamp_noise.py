@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.streams.stamps import Stamps
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.repairs.bursts import TOGETHER, burst_period
+from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.windows.repairs.bursts import LEAST_TOGETHER, TOGETHER, burst_period
 from push_predictor.recordings.windows.repairs.regular_stamps import DECIDING, RegularStamps, stamp_noise
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.types import IntArray
 
 LEAST_BURSTS = 0.5  # of the blocks of a stream
-LEAST_TOGETHER = 0.1  # of the intervals of a stream whose samples arrive together
 LOST = 0.02  # share of the time in dropouts, from which irregular stamps are named
 REGULAR = "Windows use regular stamps in their place."
 BETTER = "Stamp each sample when it is measured, not at receipt."
@@ -33,10 +33,8 @@ def regular_in_bursts(stream: PoseStream) -> PoseStream:
     return replace(stream, stamp=RegularStamps().take(samples, final=True).stamp)
 
 
-def stamp_findings(recording: Recording) -> list[Finding]:
+def stamp_findings(stamps: Stamps) -> list[Finding]:
     """Findings about streams with stamps in bursts, and with other jitter; empty without any."""
-    streams = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
-    stamps = {name: stream.stamp for name, stream in streams.items() if stream is not None}
     bursts = {name: found for name, stamp in stamps.items() if (found := _burst_finding(name, stamp)) is not None}
     jitter = _jitter_finding({name: stamp for name, stamp in stamps.items() if name not in bursts})
     return [*bursts.values(), *([] if jitter is None else [jitter])]
@@ -51,19 +49,15 @@ def _burst_finding(name: str, stamp: IntArray) -> Finding | None:
     together = float(np.mean(step < TOGETHER * mean))
     lost = float(np.sum(step[step > longest_interval(mean)]) / np.sum(step))
     values = {"together": Value(together, "1"), "lost": Value(lost, "1")}
-    if together < LEAST_TOGETHER:
-        return None
-    regular = _in_bursts(stamp)
-    if not regular and lost < LOST:
+    if together < LEAST_TOGETHER or (not (regular := _in_bursts(stamp)) and lost < LOST):
         return None
     sentence = (
         f"The {name}'s stamps come in bursts: {100.0 * together:.0f} % of the intervals are under a quarter of their "
         f"mean, {1e3 * mean:.0f} ms."
     )
-    if regular:
-        return Finding("stamp_bursts", "warning", sentence, f"{REGULAR} {BETTER}", values)
-    sentence += f" {100.0 * lost:.0f} % of the time are gaps, which no window spans."
-    return Finding("stamp_bursts", "warning", sentence, BETTER, values)
+    if not regular:
+        sentence += f" {100.0 * lost:.0f} % of the time are gaps, which no window spans."
+    return Finding("stamp_bursts", "warning", sentence, f"{REGULAR} {BETTER}" if regular else BETTER, values)
 
 
 def _in_bursts(stamp: IntArray) -> bool:
@@ -73,7 +67,7 @@ def _in_bursts(stamp: IntArray) -> bool:
     return bool(found) and float(np.mean(found)) >= LEAST_BURSTS
 
 
-def _jitter_finding(stamps: dict[str, IntArray]) -> Finding | None:
+def _jitter_finding(stamps: Stamps) -> Finding | None:
     """A note on streams whose stamps the window finder replaces by regular ones."""
     noise = {name: stamp_noise(stamp) for name, stamp in stamps.items()}
     noisy = {name: each for name, each in noise.items() if each is not None and each.corrected}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.types import IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 TOGETHER = 0.25  # of the period: intervals below it are of samples that arrive together
 LEAST_TOGETHER = 0.1  # of the intervals
@@ -54,13 +54,8 @@ def missing_in_bursts(stamp: IntArray, period: float) -> IntArray:
     return found
 
 
-def floor_at(stamp: IntArray, number: IntArray, period: float, begin: int, end: int, around: int) -> IntArray:
-    """Stamps (end - begin,) in ns at samples from begin to end, on the line of those around each that arrived soon."""
-    at = np.arange(begin, end)[:, None] + np.arange(-around, around + 1)
-    inside = (at >= 0) & (at < len(stamp))
-    at = np.clip(at, 0, max(len(stamp) - 1, 0))
-    middle = slice(begin, end)
-    late = (stamp[at] - stamp[middle, None]) - 1e9 * period * (number[at] - number[middle, None])
+def low_of(late: Array, inside: BoolArray) -> Array:
+    """The deviation (m,) of those that arrived soon, among the deviations (m, k) that are inside a run."""
     late = np.sort(np.where(inside, late, np.inf), axis=1)
     low = (0.01 * LOW * (inside.sum(axis=1) - 1)).astype(np.int64)
-    return np.asarray(stamp[middle] + np.rint(late[np.arange(len(late)), low]).astype(np.int64))
+    return np.asarray(late[np.arange(len(late)), low])

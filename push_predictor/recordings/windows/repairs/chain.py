@@ -29,8 +29,8 @@ class StreamRepairs:
         """
         self.regular = RegularStamps()
         self.held = None if is_jump is None else HeldPoses(angle)
-        self.smoothed = None if is_jump is None else SmoothedPoses(is_jump, angle)
-        self.slow = None if is_jump is None else SlowPoses(is_jump, fill=angle is not None, angle=angle)
+        self.smoothed = None if is_jump is None else SmoothedPoses(angle)
+        self.slow = None if is_jump is None else SlowPoses(is_jump, angle)
         self._resolution = Resolution(2 if angle is None else 3)
         self._angle = angle
         self._heading: Array = np.empty(0)  # the last one, rad

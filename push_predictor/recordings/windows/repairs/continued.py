@@ -22,29 +22,19 @@ SHORTEST = 4  # poses in a run: a coincidence of so many does not happen
 LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
 
 
-def continued_runs(stream: PoseStream, angle: bool) -> list[slice]:
-    """The runs of continued poses in a stream, by index; angle: whether its headings count."""
-    columns = [stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])]
-    pose = np.column_stack(columns)
-    off, moves = _off_line(stream, pose)
-    marked = (off < EXACT) & moves
-    edges = np.diff(np.concatenate([[0], marked.astype(np.int8), [0]]))
-    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-    # The first continued pose is off the line of the measured ones before.
-    found = [
-        slice(begin - 1, end)
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
-        if end - begin >= SHORTEST and _noise(off, begin - 1) > NOISE
-    ]
-    rounded = bool(found) and np.max(Resolution(pose.shape[1]).take(pose)[-1]) > NOISE
-    return [] if rounded else found  # rounded poses may lie on a line
-
-
 def continued(stream: PoseStream, angle: bool) -> BoolArray:
-    """Which poses (n,) of a stream are continued, not measured."""
-    found = np.zeros(len(stream), dtype=np.bool_)
-    for run in continued_runs(stream, angle):
-        found[run] = True
+    """Which poses (n,) of a stream are continued, not measured; angle: whether its headings count."""
+    columns = [stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])]
+    pose, found = np.column_stack(columns), np.zeros(len(stream), dtype=np.bool_)
+    if not len(pose):
+        return found
+    off, moves = _off_line(stream, pose)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], ((off < EXACT) & moves).astype(np.int8), [0]])))
+    for begin, end in edges.reshape(-1, 2).tolist():
+        if end - begin >= SHORTEST and _noise(off, begin - 1) > NOISE:
+            found[begin - 1 : end] = True  # the first one is off the line of the measured ones before
+    if found.any() and np.max(Resolution(pose.shape[1]).take(pose)[-1]) > NOISE:  # rounded poses may lie on a line
+        return np.zeros(len(stream), dtype=np.bool_)
     return found
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.resolution import lengths
+from push_predictor.recordings.windows.repairs.resolution import changes, lengths
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -29,14 +29,12 @@ class HeldPoses:
     """Takes the samples of one stream in order and returns them without stale ones.
 
     A repeat waits until the body has changed its pose twice, or for LONGEST_HOLD. The result does not depend on the
-    portions. stale: number of stale samples; updates: intervals (s) between the poses of a slow source; dropouts:
-    intervals (s) of a source that was silent for longer than usual.
+    portions. stale: number of stale samples; dropouts: intervals (s) of a source that was silent for longer than usual.
     """
 
     def __init__(self, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
         self.stale = 0
-        self.updates: list[float] = []
         self.dropouts: list[float] = []
         self._angle = angle
         self._samples: OrderedSamples | None = None  # those that wait, after the first sample of the same pose
@@ -53,7 +51,7 @@ class HeldPoses:
         """Add samples and return those that are decided; with `final` all are."""
         samples = new if self._samples is None else joined(self._samples, new)
         pose = lengths(samples.values, self._angle)
-        begins = np.flatnonzero(np.append(True, np.any(pose[1:] != pose[:-1], axis=1))[: len(pose)])
+        begins = changes(pose)
         keep, values, decided = self._judge(samples, pose, begins, final)
         rows = np.arange(self._returned, decided)
         found = taken(with_values(samples, values), rows[keep[rows]])
@@ -80,11 +78,11 @@ class HeldPoses:
                 interval = float(stamp[end] - stamp[begin]) * NANOSECOND
                 self.stale += len(rows)
                 slow = interval <= longest_interval(float(np.median(np.diff(usual))) * NANOSECOND)
-                (self.updates if slow else self.dropouts).append(interval)
                 if slow:
                     share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
                     values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
                 else:
+                    self.dropouts.append(interval)
                     keep[rows] = False
         return keep, values, len(pose)
 

@@ -15,7 +15,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.bursts import WIDTH, burst_period, floor_at, missing_in_bursts
+from push_predictor.recordings.windows.repairs.bursts import (
+    LEAST_TOGETHER,
+    TOGETHER,
+    WIDTH,
+    burst_period,
+    low_of,
+    missing_in_bursts,
+)
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -95,8 +102,10 @@ class RegularStamps:
         blocks = stamps[: len(stamps) // DECIDING * DECIDING].reshape(-1, DECIDING)
         self._block = stamps[blocks.size :]
         interval = np.diff(blocks) * NANOSECOND
-        jitter = _jitter(interval, np.median(interval, axis=1, keepdims=True))
-        for number in [*np.flatnonzero(jitter > LEAST).tolist(), *range(len(blocks))[-1:]]:
+        usual, mean = np.median(interval, axis=1, keepdims=True), np.mean(interval, axis=1, keepdims=True)
+        together = np.mean(interval < 2.0 * TOGETHER * np.maximum(usual, mean), axis=1)  # all with bursts, at least
+        suspect = np.flatnonzero((_jitter(interval, usual) > LEAST) | (together >= LEAST_TOGETHER))
+        for number in [*suspect.tolist(), *range(len(blocks))[-1:]]:
             self.noise = stamp_noise(blocks[number])
             if self.corrected:
                 end = DECIDING * (number + 1 if known or number else 0)
@@ -151,9 +160,14 @@ class _Segment:
         return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
 
     def _line_at(self, stamp: IntArray, begin: int, end: int) -> IntArray:
-        if self._noise.bursts:
-            return floor_at(stamp, self._number, self._noise.period, begin, end, AROUND)
-        return _line_at(stamp, self._number, begin, end)
+        """Stamps (end - begin,) in ns at these samples, of lines through the AROUND samples on either side of each."""
+        at = np.arange(begin, end)[:, None] + np.arange(-AROUND, AROUND + 1)
+        inside: BoolArray = (at >= 0) & (at < len(stamp))
+        at, middle = np.clip(at, 0, max(len(stamp) - 1, 0)), slice(begin, end)
+        number, late = self._number[at] - self._number[middle, None], stamp[at] - stamp[middle, None]
+        bursts, period = self._noise.bursts, 1e9 * self._noise.period
+        line = low_of(late - period * number, inside) if bursts else _lines_at(number, late, inside)
+        return np.asarray(stamp[middle] + np.rint(line).astype(np.int64))
 
     def _count(self, closed: bool) -> None:
         """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
@@ -183,22 +197,14 @@ class _Segment:
         self._returned -= count
 
 
-def _line_at(stamp: IntArray, number: IntArray, begin: int, end: int) -> IntArray:
-    """Stamps (end - begin,) in ns at the samples from begin to end of lines through the AROUND samples on either side.
-
-    stamp, number (n,): of the run as far as it is known.
-    """
-    at = np.arange(begin, end)[:, None] + np.arange(-AROUND, AROUND + 1)
-    inside: BoolArray = (at >= 0) & (at < len(stamp))
-    at = np.clip(at, 0, max(len(stamp) - 1, 0))
-    middle = slice(begin, end)
-    x = np.where(inside, number[at] - number[middle, None], 0).astype(np.float64)
-    y = np.where(inside, stamp[at] - stamp[middle, None], 0).astype(np.float64)
+def _lines_at(number: IntArray, late: IntArray, inside: BoolArray) -> Array:
+    """The values (m,) at number 0 of lines through those (m, k) that are inside a run."""
+    x, y = (np.where(inside, of, 0).astype(np.float64) for of in (number, late))
     count = inside.sum(axis=1)
     mean_x, mean_y = x.sum(axis=1) / count, y.sum(axis=1) / count
     spread = (np.where(inside, x - mean_x[:, None], 0.0) ** 2).sum(axis=1)
     slope = (np.where(inside, x - mean_x[:, None], 0.0) * y).sum(axis=1) / np.where(spread > 0.0, spread, 1.0)
-    return np.asarray(stamp[middle] + np.rint(mean_y - slope * mean_x).astype(np.int64))
+    return np.asarray(mean_y - slope * mean_x)
 
 
 def stamp_noise(stamp: IntArray) -> StampNoise | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 LEVER = 0.05  # m: a turn moves the outline of a slider by this for each radian
 ROUNDING = 1e-9  # m, rad: smaller differences are those of floating-point numbers
@@ -41,6 +41,11 @@ class Resolution:
         self._last, self._step, self._least = values[-1:], step[-1:], least[-1:]
         self._moves, self._changes = moves[-1:], changes[-1:]
         return np.where((changes >= EVIDENCE) & (changes >= VARYING * moves), least, 0.0)
+
+
+def changes(pose: Array) -> IntArray:
+    """The samples whose pose, of n rows, is not that of the one before; the first is one."""
+    return np.flatnonzero(np.append(True, np.any(pose[1:] != pose[:-1], axis=1))[: len(pose)])
 
 
 def lengths(values: Array, angle: int | None) -> Array:

@@ -14,13 +14,12 @@ import numpy as np
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.windows.parts import part_means, part_rows
 from push_predictor.recordings.windows.repairs.resolution import EVIDENCE, LEVER
-from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, joined, taken, with_values
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
+from push_predictor.types import Array, IntArray
 
 SPEED_ERROR = 0.0015  # m/s: of a line's slope, standard deviation; a slower tip counts as resting
 SHORTEST, LONGEST = 0.020, 0.2  # s: a window's velocity is fitted over the one; the other is a window
-LONGEST_GAP = 0.1  # s without samples that no line spans
-KINK = 3.0  # times the mean square of rounding: what a line leaves where the motion changes within its span
+KINK = 3.0  # times the mean square of rounding: what a line leaves where the motion changes, or jumps, within its span
 AT_ONCE = 4096  # samples that get their lines at once: each needs its neighbours' in memory
 
 
@@ -40,10 +39,9 @@ class SmoothedPoses:
     the newest samples, m; 0 if it is fine.
     """
 
-    def __init__(self, is_jump: IsJump, angle: int | None = None) -> None:
+    def __init__(self, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
         self._columns = [0, 1] if angle is None else [0, 1, angle]
-        self._is_jump = is_jump
         self.resolution = 0.0
         self._first: IntArray = np.empty(0, np.int64)  # stamps (ns) that determine the period
         self._samples: OrderedSamples | None = None
@@ -91,11 +89,9 @@ class SmoothedPoses:
         """
         stamp, values = samples.stamp, samples.values[:, self._columns]
         half = (1e9 * self._half[rows]).astype(np.int64)
-        piece = self._pieces(samples)
-        begin, end = np.searchsorted(piece, piece[rows]), np.searchsorted(piece, piece[rows], side="right")
         spans = ((half, half), (2 * half, 0), (0, 2 * half))
-        first = [np.maximum(np.searchsorted(stamp, stamp[rows] - before), begin) for before, _ in spans]
-        last = [np.minimum(np.searchsorted(stamp, stamp[rows] + after, side="right"), end) for _, after in spans]
+        first = [np.searchsorted(stamp, stamp[rows] - before) for before, _ in spans]
+        last = [np.searchsorted(stamp, stamp[rows] + after, side="right") for _, after in spans]
         found, misfit = _lines_at(stamp, values, rows, first[0], last[0])
         rounding = samples.values[rows, -1] ** 2 / 12.0
         kinks = np.flatnonzero(self._total(misfit) > KINK * rounding)
@@ -111,13 +107,6 @@ class SmoothedPoses:
     def _total(self, misfit: Array) -> Array:
         """The misfit (m,) m^2 of all columns, from their mean squares (m, c)."""
         return np.asarray(misfit @ np.array([1.0, 1.0, LEVER**2])[: len(self._columns)])
-
-    def _pieces(self, samples: OrderedSamples) -> IntArray:
-        """Numbers (n,) of the pieces between breaks, which no line spans."""
-        elapsed = np.diff(samples.stamp) * NANOSECOND
-        breaks: BoolArray = samples.interrupted[1:] | (elapsed > LONGEST_GAP)
-        breaks = breaks | self._is_jump(samples.values[:-1], samples.values[1:], elapsed)
-        return np.concatenate([[0], np.cumsum(breaks)]) if len(samples.stamp) else np.empty(0, np.int64)
 
 
 def _lines_at(stamp: IntArray, values: Array, rows: IntArray, first: IntArray, last: IntArray) -> tuple[Array, Array]:

@@ -1,0 +1,239 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the check says of a stream by itself, and where it is silent: single faults, other causes, few samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checked_bags import bag, found, rig_of
+from stream_faults import at_rate, extrapolated, held, in_bursts, lost, rounded, with_another
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import ellipse, square
+from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
+from push_predictor.recordings.checks.streams.flips import without_flips
+from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
+from push_predictor.recordings.checks.streams.session import in_order, repeated_samples
+from push_predictor.recordings.checks.streams.stamp_noise import regular_in_bursts, stamp_findings
+from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, unset_stamps
+from push_predictor.recordings.streams import PoseStream, Recording, taken
+from push_predictor.types import Array, IntArray
+
+NAME = "ellipse_plywood"
+MS, SECOND = 1_000_000, 1_000_000_000
+MM = 1e-3
+BODIES = ("slider", "pusher")
+
+
+def times(count: int, period: float = 10.0) -> IntArray:
+    return SECOND + np.rint(period * MS * np.arange(count)).astype(np.int64)
+
+
+def body(x: Array, heading: Array | None = None, period: float = 10.0) -> PoseStream:
+    return PoseStream(times(len(x), period), x, 0.0 * x, 0.0 * x, 0.0 * x if heading is None else heading)
+
+
+def recording_of(slider: PoseStream, pusher: PoseStream | None = None) -> Recording:
+    return Recording("made", None, slider, slider if pusher is None else pusher, None)
+
+
+def noise(count: int, sd: float, seed: int = 0) -> Array:
+    return sd * np.random.default_rng(seed).standard_normal(count)
+
+
+def facts(x: Array) -> StreamFacts:
+    return pose_facts(body(x), angle=False)[0]
+
+
+# --- facts ------------------------------------------------------------------------------------------------------------
+
+MOVES = 0.05 * np.sin(np.linspace(0.0, 4.0 * np.pi, 600))
+
+
+def test_a_slow_source_repeats_many_poses_of_a_body_that_moves() -> None:
+    source = np.repeat(MOVES[::4], 4) + np.repeat(noise(150, 1e-4), 4)
+    slow = facts(source)
+    assert slow.slower_source and slow.source_period == pytest.approx(0.04, rel=0.05)
+    assert slow.noise == pytest.approx(1e-4, rel=0.2)
+    rests = np.repeat(1e-6 * np.arange(30), 20)
+    assert not facts(np.concatenate([rests, MOVES])).slower_source
+    single = MOVES.copy()
+    single[20::20] = single[19:-1:20]
+    assert not facts(single).slower_source
+
+
+def test_a_body_that_was_lost_often_has_no_slow_source() -> None:
+    x = MOVES.copy()
+    for begin in range(30, 580, 40):
+        x[begin : begin + 12] = x[begin - 1]
+    known = facts(x)
+    assert not known.slower_source and len(known.holds) >= 12 and known.held == 12 * len(known.holds)
+
+
+def test_rounding_is_noise_too_and_its_steps_are_smoothed() -> None:
+    slow = facts(MM * np.round(0.03 * np.arange(2000)))
+    assert slow.noise == pytest.approx(MM / np.sqrt(12.0)) and slow.coarse
+    true = 1.3 * MM * np.arange(600)  # none is repeated
+    known, repaired = pose_facts(body(MM * np.round(true / MM)), angle=False)
+    assert not known.held and np.max(np.abs(repaired.x - true)[50:]) < 0.4 * MM
+
+
+# --- flips ------------------------------------------------------------------------------------------------------------
+
+SQUARE, OVAL = square(0.1), ellipse(0.05, 0.04)
+
+
+def flips(heading: Array, outline: Outline = OVAL) -> tuple[str, str] | None:
+    finding, _ = without_flips(recording_of(body(noise(len(heading), 1e-5), heading)), outline)
+    return None if finding is None else (finding.severity, finding.sentence)
+
+
+def flipped(turn: float, length: int = 5, period: int = 100) -> Array:
+    return np.where((np.arange(2000) + 50) % period < length, turn, 0.0)
+
+
+def test_headings_that_jump_by_any_angle_are_no_flips_and_a_single_flip_has_no_finding() -> None:
+    assert flips(np.repeat(np.random.default_rng(0).uniform(-np.pi, np.pi, 100), 20)) is None
+    assert flips(np.where(np.abs(np.arange(2000) - 1000) < 5, np.pi, 0.0)) is None
+
+
+def test_usual_flips_are_listed_and_many_of_them_are_refused_unless_the_outline_is_symmetric() -> None:
+    found_flips = flips(flipped(np.pi) + np.where(np.abs(np.arange(2000) - 1050) < 5, np.pi / 2, 0.0))
+    assert found_flips is not None and "by 180 degrees while" in found_flips[1] and found_flips[0] == "warning"
+    often = flipped(np.pi / 2, 40)
+    assert [(flips(often, of) or ("", ""))[0] for of in (SQUARE, OVAL)] == ["warning", "refused"]
+
+
+# --- places -----------------------------------------------------------------------------------------------------------
+
+
+def two_places(length: int, period: int, away: float = 0.3, count: int = 2000) -> Array:
+    return np.where(np.arange(count) % period < length, away, 0.0) + noise(count, 1e-4)
+
+
+def returns(x: Array, period: float = 10.0) -> int:
+    return places_of(body(x, period=period)).returns
+
+
+def test_returns_to_a_place_that_was_just_left_are_counted() -> None:
+    assert returns(two_places(2, 100)) == pytest.approx(20, abs=2)
+    assert returns(two_places(200, 400)) == 0  # put back after seconds
+    zeros = np.where(np.arange(2000) % 50 < 2, 0.0, 0.3 + noise(2000, 1e-4))
+    assert returns(zeros) == 0  # lost
+    assert returns(1e3 * (1e-4 * np.arange(2000) + noise(2000, 1e-4))) == 0  # in mm
+    three = np.tile([0.0, 0.0, 0.025, 0.025, 0.008, 0.008, 0.033, 0.033], 200)
+    assert returns(three + 0.1 * np.repeat(np.arange(200), 8)) == 0
+
+
+def test_few_returns_are_no_second_body() -> None:
+    stream = body(two_places(2, 100, count=450))
+    assert 0 < places_of(stream).returns < 5 and two_bodies("slider", stream, places_of(stream)) is None
+
+
+def swaps(spans: list[tuple[int, int]], late: int = 0) -> Recording:
+    """Slider at 0 and tip at 0.2 m that take each other's place for some samples; the tip so many samples later."""
+    k = np.arange(2000)
+    slider, tip = np.zeros(2000), np.full(2000, 0.2)
+    for begin, end in spans:
+        slider[(k >= begin) & (k < end)] = 0.2
+        tip[(k >= begin + late) & (k < end + late)] = 0.0
+    return recording_of(body(slider + noise(2000, 1e-4)), body(tip + noise(2000, 1e-4, 1)))
+
+
+def is_exchanged(recording: Recording) -> bool:
+    return exchanged(recording, places_of(recording.slider), places_of(recording.pusher)) is not None
+
+
+def test_bodies_are_exchanged_in_one_instant_more_than_once() -> None:
+    assert is_exchanged(swaps([(300, 600)])) and is_exchanged(swaps([(300, 600), (900, 1000)]))
+    assert not is_exchanged(swaps([(1500, 2001)])) and not is_exchanged(swaps([(300, 600), (900, 1000)], late=50))
+
+
+# --- repeats ----------------------------------------------------------------------------------------------------------
+
+
+def test_samples_are_in_order_once_and_few_repeats_are_no_finding() -> None:
+    stream = body(MOVES)
+    for often, severity in ((30, None), (10, "sent_twice")):
+        again = taken(stream, np.sort(np.concatenate([np.arange(600), np.arange(0, 600, often)])))
+        finding = repeated_samples(recording_of(again, stream))
+        assert (None if finding is None else finding.name) == severity
+        assert np.array_equal(in_order(again).stamp, stream.stamp)
+
+
+# --- stamps -----------------------------------------------------------------------------------------------------------
+
+
+def test_stamps_that_may_be_measured_are_set() -> None:
+    soon = 5 * SECOND + 100_000 * np.arange(20)  # in the first 2 ms of a second
+    whole = SECOND * np.arange(20)  # one a second
+    assert unset_stamps({"slider": soon, "pusher": whole}) is None
+
+
+def test_no_clock_is_blamed_where_all_count_from_a_start() -> None:
+    (finding,) = clocks_never_meet({"slider": times(100), "pusher": times(100) + 100 * SECOND})
+    assert "simulation" not in finding.sentence
+    (finding,) = clocks_never_meet({"slider": times(100), "pusher": times(100) + 10**9 * SECOND})
+    assert "The time of slider counts from the start of a simulation" in finding.sentence
+
+
+def bursts(stamp: IntArray) -> str | None:
+    found_bursts = stamp_findings({"slider": stamp})
+    return found_bursts[0].sentence if found_bursts and found_bursts[0].name == "stamp_bursts" else None
+
+
+def test_stamps_together_are_bursts_where_they_cost_something() -> None:
+    rng = np.random.default_rng(0)
+    close = SECOND + np.cumsum(np.where(rng.random(2000) < 0.3, 1 * MS, 14 * MS))
+    assert bursts(close) is None  # no gap, no grid
+    assert "of the time are gaps" in (bursts(SECOND + np.cumsum(rng.exponential(10.0, 2000) * MS).astype(int)) or "")
+    pause = times(1000)
+    pause[500:] += 1000 * SECOND
+    assert bursts(pause) is None
+    once = times(1010, 20.0)
+    once[300:400] = in_bursts(once[300:400])
+    assert bursts(once) is None and regular_in_bursts(replace(body(np.zeros(1010)), stamp=once)).stamp is once
+
+
+# --- the same faults of slider and tip --------------------------------------------------------------------------------
+
+
+def another(stream: PoseStream, rate: int) -> PoseStream:
+    return with_another(stream, np.arange(stream.stamp[0] + 3 * MS, stream.stamp[-1], SECOND // rate))
+
+
+def in_pushes(stream: PoseStream) -> IntArray:
+    return np.arange(300, len(stream) - 300, 40)
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize(
+    ("fault", "finding", "severity"),
+    [
+        (lambda of: lost(of, in_pushes(of), 12), "held_poses_{}", "warning"),
+        (lambda of: held(of, 30.0), "repeated_poses_{}", "warning"),
+        (lambda of: another(of, 10), "two_bodies_{}", "warning"),
+        (lambda of: another(of, 60), "two_bodies_{}", "refused"),
+        (lambda of: replace(of, stamp=in_bursts(of.stamp)), "stamp_bursts", "warning"),
+        (lambda of: rounded(of, 2e-4, 1e-3), "resolution_{}", "warning"),
+        (lambda of: rounded(of, 1e-3, 1e-2), "resolution_{}", "refused"),
+        (lambda of: at_rate(of, 15.0), "rate_{}", "warning"),
+        (lambda of: replace(of, stamp=np.zeros_like(of.stamp)), "stamps_unset", "refused"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_named_for_the_body_that_has_it(name: str, fault, finding: str, severity: str) -> None:  # type: ignore[no-untyped-def]
+    recording = replace(bag(NAME), **{name: fault(getattr(bag(NAME), name))})
+    named = found(recording, rig_of(NAME))
+    assert {key: each.severity for key, each in named.items()} == {finding.format(name): severity}
+    assert name in named[finding.format(name)].sentence
+
+
+def test_a_single_continued_run_has_no_finding() -> None:
+    slider = bag(NAME).slider
+    moving = np.flatnonzero(np.abs(np.diff(slider.x, prepend=slider.x[0])) > 3e-4)
+    once = extrapolated(slider, moving[200:201], 12)
+    assert not found(replace(bag(NAME), slider=once), rig_of(NAME))

@@ -1,0 +1,318 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Repairs of a stream, each by itself: what it changes, and what it leaves as it was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.windows.repairs.continued import continued
+from push_predictor.recordings.windows.repairs.flips import HeadingFlips
+from push_predictor.recordings.windows.repairs.held import HeldPoses
+from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps, stamp_noise
+from push_predictor.recordings.windows.repairs.resolution import Resolution
+from push_predictor.recordings.windows.repairs.smoothing import SmoothedPoses
+from push_predictor.recordings.windows.slow import SlowPoses
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, taken
+from push_predictor.recordings.windows.track import Track
+from push_predictor.types import Array, IntArray
+
+MS = 1_000_000
+MM = 1e-3
+
+
+def samples(x: Array, period: float = 10.0, quantum: float = 0.0) -> OrderedSamples:
+    """Samples of a body at places x (n,) m on a line, as the repairs get them; period in ms."""
+    none = np.zeros(len(x))
+    values = np.column_stack([x, none, none, none, none + quantum])
+    return OrderedSamples(times(len(x), period), values, np.zeros(len(x), np.bool_), False)
+
+
+def times(count: int, period: float = 10.0) -> IntArray:
+    return np.rint(period * MS * np.arange(count)).astype(np.int64)
+
+
+def is_jump(before: Array, after: Array, elapsed: Array) -> Array:
+    return Track(4, position=True, angle=3).is_jump(before[:, :4], after[:, :4], elapsed)
+
+
+def steps(*runs: tuple[int, float]) -> Array:
+    """Places that begin at 0 and change by so many times a step (mm)."""
+    return MM * np.cumsum([0.0, *(step for count, step in runs for _ in range(count))])
+
+
+# --- stale poses ------------------------------------------------------------------------------------------------------
+
+
+def held(x: Array, quantum: float = 0.0) -> tuple[OrderedSamples, OrderedSamples]:
+    """What is recorded, and what is left of it."""
+    recorded = samples(x, quantum=quantum)
+    return recorded, HeldPoses(3).take(recorded, final=True)
+
+
+@pytest.mark.parametrize(
+    ("x", "quantum"),
+    [
+        (steps((30, 0.0), (1, 200.0), (30, 1.0)), 0.0),  # put elsewhere: farther than it moves afterwards
+        (steps(*[(9, 0.0), (1, 1.0)] * 20), MM),  # a slow motion in coarse steps
+        (steps((120, 0.0), (1, 2.0), (30, 0.5)), 0.0),  # at rest for longer than a source is silent
+        (steps((20, 1.0), (1, 0.0), (1, 0.9), (20, 0.1)), 0.0),  # slower than before
+        (steps((20, 0.5), (20, 0.0), (1, 100.0), (150, 0.0), (1, 1000.0), (20, 0.5)), 0.0),  # put elsewhere twice
+    ],
+)
+def test_poses_that_may_be_measured_stay(x: Array, quantum: float) -> None:
+    recorded, left = held(x, quantum)
+    assert np.array_equal(left.stamp, recorded.stamp) and np.array_equal(left.values, recorded.values)
+
+
+def test_stale_poses_of_a_slow_source_are_on_the_line_to_the_next_and_those_of_a_lost_body_are_no_poses() -> None:
+    moves = steps((99, 0.5))
+    slow, left = held(np.repeat(moves[::3], 3)[: len(moves)])
+    inside = slice(0, 95)
+    assert np.array_equal(left.stamp, slow.stamp)
+    np.testing.assert_allclose(left.values[inside, 0], moves[inside], atol=1e-9)
+    lost = moves.copy()
+    lost[41:50] = lost[40]
+    assert np.array_equal(held(lost)[1].stamp, np.delete(times(len(moves)), slice(41, 50)))
+
+
+@pytest.mark.parametrize("portion", [1, 7])
+def test_what_is_stale_does_not_depend_on_the_portions(portion: int) -> None:
+    rng = np.random.default_rng(0)
+    runs = [(int(rng.integers(1, 20)), float(rng.choice([0.0, 0.5, 1.0]))) for _ in range(60)]
+    recorded = samples(np.concatenate([steps(*runs), steps((150, 0.0)) + 5.0, steps((20, 0.5)) + 7.0]))
+    taker, parts = HeldPoses(3), []
+    for first in range(0, len(recorded.stamp), portion):
+        rows = slice(first, first + portion)
+        parts.append(taker.take(taken(recorded, rows), final=first + portion >= len(recorded.stamp)))
+    whole = HeldPoses(3)
+    left = whole.take(recorded, final=True)
+    assert np.array_equal(np.concatenate([part.stamp for part in parts]), left.stamp)
+    assert np.array_equal(np.concatenate([part.values for part in parts]), left.values)
+    assert taker.stale == whole.stale > 0 and taker.dropouts == whole.dropouts != []
+
+
+# --- flips ------------------------------------------------------------------------------------------------------------
+
+
+def flips(heading: Array, period: float = 10.0, x: Array | None = None, stamp: IntArray | None = None) -> Array:
+    x = np.zeros(len(heading)) if x is None else x
+    stamp = times(len(heading), period) if stamp is None else stamp
+    return HeadingFlips().take(stamp, np.column_stack([x, 0.0 * x, heading]))
+
+
+def turned(count: int, begin: int, end: int, turn: float = np.pi) -> Array:
+    found = np.zeros(count)
+    found[begin:end] = turn
+    return found
+
+
+def test_a_flip_ends_with_a_flip_back_whatever_its_way() -> None:
+    heading = turned(60, 10, 20, np.pi / 2) + turned(60, 15, 20, np.pi / 2) + turned(60, 20, 60, 2.0 * np.pi)
+    found = flips(heading)
+    assert np.all(found[10:20] != 0.0) and not found[:10].any() and not found[20:].any()
+
+
+def test_a_body_that_seems_flipped_for_long_has_this_heading() -> None:
+    assert np.array_equal(np.flatnonzero(flips(turned(400, 50, 400))), np.arange(50, 150))
+
+
+def test_a_gap_or_another_place_ends_a_flip() -> None:
+    stamp = times(60)
+    stamp[30:] += 160 * MS
+    assert np.array_equal(np.flatnonzero(flips(turned(60, 20, 60), stamp=stamp)), np.arange(20, 30))
+    x = np.where(np.arange(60) < 30, 0.0, 0.05)
+    assert np.array_equal(np.flatnonzero(flips(turned(60, 20, 60), x=x)), np.arange(20, 30))
+    assert not flips(turned(60, 30, 60), stamp=stamp).any()  # turned in the gap
+
+
+def test_a_body_that_is_pushed_fast_stays_in_its_place_between_two_samples() -> None:
+    assert np.all(flips(turned(60, 20, 40), period=20.0, x=0.003 * np.arange(60))[20:40] != 0.0)
+
+
+# --- continued poses --------------------------------------------------------------------------------------------------
+
+
+def body(x: Array) -> PoseStream:
+    return PoseStream(times(len(x)), x, 0.0 * x, 0.0 * x, 0.0 * x)
+
+
+def measured(count: int = 100) -> Array:
+    return steps((count - 1, 0.5)) + 5e-5 * np.random.default_rng(0).standard_normal(count)
+
+
+def on_a_line(x: Array, begin: int, count: int) -> Array:
+    x = x.copy()
+    x[begin : begin + count] = x[begin - 1] + 4e-4 * np.arange(1, count + 1)
+    return x
+
+
+def test_continued_poses_are_marked_from_the_first_on_where_a_coincidence_is_excluded() -> None:
+    assert np.array_equal(np.flatnonzero(continued(body(on_a_line(measured(), 50, 6)), False)), np.arange(50, 56))
+    assert not continued(body(on_a_line(measured(), 50, 4)), False).any()
+
+
+def test_repeated_and_rounded_poses_and_a_steady_motion_without_noise_are_not_continued() -> None:
+    assert not continued(body(steps((100, 0.0), (100, 0.5), (100, 0.0))), False).any()
+    still = measured()
+    still[50:70] = still[50]
+    assert not continued(body(still), False).any()
+    counts = [*np.random.default_rng(0).integers(0, 4, 80), *[1] * 12]
+    assert not continued(body(MM * np.cumsum(counts)), False).any()
+
+
+# --- resolution -------------------------------------------------------------------------------------------------------
+
+
+def resolution(x: Array) -> float:
+    return float(Resolution(1).take(x[:, None])[-1, 0])
+
+
+def test_a_resolution_is_known_from_steps_that_vary() -> None:
+    assert resolution(MM * np.cumsum(np.tile([10, 11, 10, 12], 20))) == pytest.approx(MM)  # no step is that small
+    assert resolution(MM * np.cumsum([1, 2, 1, 3, 1, 2, 1])) == 0.0  # too few
+    assert resolution(steps(*[(8, 0.5), (8, 0.7)] * 13)) == 0.0  # steady motions at some speeds
+
+
+# --- smoothed poses ---------------------------------------------------------------------------------------------------
+
+COARSE = 4e-4
+
+
+def smoothed(x: Array) -> Array:
+    """Errors (n,) m of the smoothed places of what is rounded to COARSE."""
+    recorded = samples(np.round(x / COARSE) * COARSE, quantum=COARSE)
+    return np.asarray(np.abs(SmoothedPoses(3).take(recorded, final=True).values[:, 0] - x))
+
+
+def test_lines_end_where_a_motion_begins() -> None:
+    assert smoothed(steps((60, 0.0), (60, 0.5)))[55:65].max() < COARSE
+
+
+def test_no_line_spans_a_jump() -> None:
+    jump = np.where(np.arange(80) < 40, 0.0, 0.1)
+    assert smoothed(jump).max() < 1e-9
+
+
+def test_a_motion_that_changes_all_the_time_keeps_its_lines() -> None:
+    time = 0.01 * np.arange(300)
+    assert np.sqrt(np.mean(smoothed(0.01 * np.sin(2.0 * np.pi * time)) ** 2)) < 0.4 * COARSE
+
+
+def test_noise_beyond_the_rounding_is_no_kink() -> None:
+    x = steps((400, 0.5))
+    recorded = samples(np.round((x + COARSE * np.random.default_rng(0).standard_normal(401)) / COARSE) * COARSE)
+    recorded.values[:, -1] = COARSE
+    left = SmoothedPoses(3).take(recorded, final=True).values[:, 0] - x
+    assert np.std(left) < 0.45 * COARSE
+
+
+def test_lines_do_not_depend_on_the_portions_however_coarse_the_poses_are() -> None:
+    recorded = samples(0.005 * np.round(steps((200, 0.5)) / 0.005), quantum=0.005)
+    taker, whole = SmoothedPoses(3), SmoothedPoses(3).take(recorded, final=True)
+    parts = [taker.take(taken(recorded, slice(k, k + 30)), final=k == 180) for k in range(0, 201, 30)]
+    np.testing.assert_allclose(np.concatenate([part.values for part in parts]), whole.values, atol=1e-12)
+
+
+# --- slow streams -----------------------------------------------------------------------------------------------------
+
+SLOW = 50.0  # ms
+
+
+def filled(recorded: OrderedSamples, angle: int | None = 3) -> OrderedSamples:
+    return SlowPoses(is_jump, angle).take(recorded, final=True)
+
+
+def inside(found: OrderedSamples, begin: int, end: int) -> int:
+    """How many poses lie between two stamps (ns)."""
+    return int(np.sum((found.stamp > begin) & (found.stamp < end)))
+
+
+def test_poses_are_put_between_those_of_a_slow_stream_but_not_where_it_breaks() -> None:
+    plain = samples(steps((40, 2.0)), SLOW)
+    late = plain.stamp + np.where(np.arange(41) < 20, 0, 1000 * MS)
+    gap = OrderedSamples(late, plain.values, plain.interrupted, False)
+    jump = samples(steps((19, 2.0), (1, 200.0), (20, 2.0)), SLOW)
+    missing = OrderedSamples(plain.stamp, plain.values, np.arange(41) == 20, False)
+    for recorded in (gap, jump, missing):
+        found = filled(recorded)
+        assert inside(found, int(recorded.stamp[19]), int(recorded.stamp[20])) == 0
+        assert inside(found, int(recorded.stamp[20]), int(recorded.stamp[21])) == 4
+        assert inside(found, int(recorded.stamp[18]), int(recorded.stamp[19])) == 4
+    assert np.array_equal(found.stamp[found.interrupted], [plain.stamp[20]])
+
+
+@pytest.mark.parametrize(("angle", "period"), [(3, 25.0), (None, 25.0), (None, SLOW)])
+def test_a_start_is_placed_between_samples_far_apart(angle: int | None, period: float) -> None:
+    """The body starts half an interval before the sample 21."""
+    x = steps((20, 0.0), (1, 1.0), (20, 2.0))
+    found = filled(samples(x, period), angle)
+    middle = round(20.5 * period * MS)
+    at_middle = np.interp(middle, found.stamp, found.values[:, 0])
+    assert at_middle == pytest.approx(0.0 if period == SLOW else 0.5 * MM, abs=1e-9)
+    if angle is None:
+        assert len(found.stamp) == len(x) + (period == SLOW)
+
+
+def test_a_stop_is_placed_and_a_slower_motion_is_none() -> None:
+    x = steps((20, 2.0), (1, 1.0), (20, 0.0))
+    found = filled(samples(x, SLOW), None)
+    assert len(found.stamp) == len(x) + 1
+    assert np.interp(20.5 * SLOW * MS, found.stamp, found.values[:, 0]) == pytest.approx(41.0 * MM)
+    for after in ([(1, 1.98), (20, 0.0)], [(1, 1.999), (20, 0.0)], [(21, 1.0)]):  # nearly all of an interval; slower
+        x = steps((20, 2.0), *after)
+        assert len(filled(samples(x, SLOW), None).stamp) == len(x)
+
+
+def test_poses_of_a_slow_stream_do_not_depend_on_the_portions() -> None:
+    recorded = samples(steps((15, 0.0), (1, 1.0), (15, 2.0), (1, 0.5), (15, 0.0)), SLOW)
+    taker, whole = SlowPoses(is_jump, 3), filled(recorded)
+    parts = [taker.take(taken(recorded, slice(k, k + 1))) for k in range(len(recorded.stamp))]
+    parts.append(taker.take(taken(recorded, slice(0, 0)), final=True))
+    assert np.array_equal(np.concatenate([part.stamp for part in parts]), whole.stamp)
+    np.testing.assert_allclose(np.concatenate([part.values for part in parts]), whole.values, atol=1e-12)
+    assert len(whole.stamp) > 100 and taker.waiting == 0
+
+
+def test_a_body_that_turns_off_at_once_is_at_its_end_from_the_turn_on() -> None:
+    x, y = steps((20, 2.0), (1, 1.0), (20, 0.0)), steps((20, 0.0), (1, 1.0), (20, 2.0))
+    recorded = samples(x, SLOW)
+    recorded.values[:, 1] = y
+    found = filled(recorded, None)
+    (put_in,) = np.flatnonzero(found.stamp % round(SLOW * MS))
+    assert np.array_equal(found.values[put_in, :2], recorded.values[21, :2])
+
+
+def test_poses_that_arrive_together_lie_on_the_line_of_those_that_arrived_soon() -> None:
+    true = times(606, 20.0)
+    late = np.where(np.arange(606) % 6 < 3, 0, 1) * (19 - 20 * (np.arange(606) % 6 - 3)) * MS
+    late[300:305] = (160 - 20 * np.arange(5)) * MS + np.arange(5)  # held up for eight periods
+    stamp = np.maximum.accumulate(true + np.maximum(late, 0)) + np.arange(606)
+    recorded = OrderedSamples(stamp, np.zeros((606, 1)), np.zeros(606, np.bool_), False)
+    taker, whole = RegularStamps(), RegularStamps().take(recorded, final=True).stamp
+    parts = [taker.take(taken(recorded, slice(k, k + 50)), final=k == 600) for k in range(0, 606, 50)]
+    assert taker.noise is not None and taker.noise.bursts
+    assert np.array_equal(np.concatenate([part.stamp for part in parts]), whole)
+    assert np.abs(whole - true).max() < 2 * MS
+
+
+# --- stamps -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_noise_of_stamps_is_that_of_the_last_block() -> None:
+    rng = np.random.default_rng(0)
+    stamp = times(300) + np.where(np.arange(300) < 101, 0, 300_000 * rng.standard_normal(300)).astype(np.int64)
+    taker = RegularStamps()
+    taker.take(OrderedSamples(stamp, np.zeros((300, 1)), np.zeros(300, np.bool_), False), final=True)
+    assert taker.noise is not None and not taker.corrected
+    assert taker.noise.jitter == pytest.approx(3e-4, rel=0.4)
+
+
+def test_repeated_stamps_have_the_period_of_the_others_and_stamps_without_an_order_stay() -> None:
+    noise = stamp_noise(np.repeat(times(100), 3))
+    assert noise is not None and noise.period == pytest.approx(0.01)
+    lost = stamp_noise(times(100) + (40 * MS * np.random.default_rng(0).standard_normal(100)).astype(np.int64))
+    assert lost is not None and lost.jitter > lost.period and not lost.corrected
