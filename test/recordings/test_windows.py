@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.contact import ContactSamples
 from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -198,6 +199,37 @@ def test_a_window_may_end_with_the_last_sample_of_a_push() -> None:
     )
     found = PushSegmenter(WindowOptions(duration=0.2)).take(samples)
     assert [each[:2] for each in found] == [(5 * period, 25 * period)]
+
+
+def random_samples(rng: np.random.Generator, n: int) -> ContactSamples:
+    """A tip that comes and goes, with a force that is missing at times, and breaks."""
+    near = np.abs(np.cumsum(rng.normal(0.0, 2e-4, n))) - 1e-3
+    gap = np.where(np.sin(0.02 * np.arange(n)) > 0.9, 0.02, near)
+    force = np.where(gap < 1e-3, 1.5, 0.0) + rng.normal(0.0, 0.02, n)
+    samples = samples_at(0.01 * np.arange(n), gap, force, np.abs(rng.normal(0.03, 0.02, n)), way=3e-4 * np.arange(n))
+    rare = {name: rng.random(n) < 0.003 for name in ("in_break", "after_break", "repositioned")}
+    return replace(
+        samples,
+        height=np.where(rng.random(n) < 0.02, 0.05, 0.0),
+        closing_speed=rng.normal(0.0, 0.004, n),
+        opening_speed=rng.normal(0.0, 0.004, n),
+        force=np.where((rng.random(n) < 0.01)[:, None], np.nan, samples.force),
+        **rare,
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_segments_do_not_depend_on_the_portions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    samples, results = random_samples(rng, 4000), []
+    for portion in (1, 13, 500, 4000):
+        segmenter, found = PushSegmenter(WindowOptions(duration=0.05)), []
+        for begin in range(0, len(samples), portion):
+            found += segmenter.take(taken_samples(samples, slice(begin, begin + portion)))
+        windows = [(start, end, push.push_id, push.dwell, push.tare) for start, end, push in found]
+        timing = [(time, str(delay)) for time, delay in segmenter.timing.touches]
+        results.append((windows, segmenter.counts, segmenter.touching, segmenter.samples, timing))
+    assert len(results[0][0]) > 5 and all(result == results[0] for result in results)
 
 
 def test_two_contacts_are_two_pushes() -> None:
