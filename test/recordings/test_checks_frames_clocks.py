@@ -19,6 +19,8 @@ from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.clocks.push_lags import push_lags
+from push_predictor.recordings.checks.clocks.stage import clock_stage
+from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed
@@ -179,6 +181,15 @@ def test_a_clock_that_was_set_is_named_with_size_and_time(name: str, size: float
     when = 1e-9 * float(stamp[round(0.4 * len(stamp))] - recording.slider.stamp[0])
     assert finding.values["time"].value == pytest.approx(when, abs=0.1)
     assert f"the {name}'s {'forward' if size > 0.0 else 'back'}" in finding.sentence
+
+
+def test_a_clock_that_was_set_back_is_corrected_from_the_right_sample_on() -> None:
+    corrected = clock_stage(Evidence(stepped(bag(MANY), "slider", {0.4: -0.4}), rig_of(MANY))).recording
+    np.testing.assert_allclose(corrected.slider.stamp - bag(MANY).slider.stamp, 0.0, atol=5e6)
+
+
+def test_a_clock_that_was_set_back_by_seconds_is_named_too() -> None:
+    assert "clock_step" in found(stepped(bag(MANY), "slider", {0.4: -5.0}), rig_of(MANY))
 
 
 def test_several_steps_are_named_each() -> None:

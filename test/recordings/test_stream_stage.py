@@ -340,3 +340,4 @@ def test_a_sample_that_is_missing_in_bursts_is_counted() -> None:
     stamp = in_bursts(np.delete(grid, [50, 51]))
     missing = missing_in_bursts(stamp, 0.02)
     assert missing.sum() == 2 and abs(int(np.flatnonzero(missing)[0]) - 50) <= 4
+    assert missing_in_bursts(np.delete(grid, [50, 51]), 0.02).sum() == 2  # the steps around it are equal
