@@ -17,6 +17,7 @@ from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.repairs.bursts import burst_period, missing_in_bursts
 from push_predictor.recordings.windows.repairs.chain import StreamRepairs
+from push_predictor.recordings.windows.repairs.continued import continued
 from push_predictor.recordings.windows.repairs.flips import HeadingFlips
 from push_predictor.recordings.windows.repairs.held import HeldPoses
 from push_predictor.recordings.windows.repairs.resolution import Resolution
@@ -212,10 +213,24 @@ def test_poses_continued_by_a_tracker_are_cut(sound: Recording, windows: list[Pu
     begins = in_push(windows, stream, every=8)
     recording = replace(sound, **{name: extrapolated(stream, begins, 12)})
     finding = found(recording, rig_of(NAME))[f"continued_poses_{name}"]
-    assert finding.severity == "warning" and finding.values["runs"].value == pytest.approx(len(begins), abs=1)
+    left = len(begins) - finding.values["runs"].value  # their end is where the body is
+    assert finding.severity == "warning" and -1 <= left <= 0.3 * len(begins)
     spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
     again = find_windows(recording, rig_of(NAME))
-    assert sum(any(w.start < end and w.end > begin for begin, end in spans) for w in again) <= 1
+    assert sum(any(w.start < end and w.end > begin for begin, end in spans) for w in again) <= 1 + 2 * max(left, 0)
+
+
+@pytest.mark.parametrize("name", ["slider", "pusher"])
+def test_poses_on_a_line_between_two_measured_ones_are_kept(
+    sound: Recording, windows: list[PushWindow], name: str
+) -> None:
+    stream = getattr(sound, name)
+    begin = int(in_push(windows, stream, every=8)[0])
+    inner, ends = np.arange(begin, begin + 8), [begin - 1, begin + 8]
+    columns = {key: getattr(stream, key).copy() for key in ("x", "y")}
+    for column in columns.values():
+        column[inner] = np.interp(stream.stamp[inner], stream.stamp[ends], column[ends])
+    assert not continued(replace(stream, **columns), angle=False)[inner].any()
 
 
 def test_a_body_at_rest_without_noise_keeps_its_poses() -> None:
