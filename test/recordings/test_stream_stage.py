@@ -190,7 +190,7 @@ def test_poses_held_by_a_tracker_that_lost_the_body_are_cut(
     finding = found(recording, rig_of(NAME))[f"held_poses_{name}"]
     assert finding.severity == "warning"
     assert finding.values["holds"].value == pytest.approx(len(begins), abs=2)
-    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
+    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 29])) for k in begins.tolist()]
     again = find_windows(recording, rig_of(NAME))
     crossing = [w for w in again if any(w.start < end and w.end > begin for begin, end in spans)]
     assert len(crossing) <= 2 and worst(nearest(windows, again)) < 2e-4
@@ -211,11 +211,11 @@ def test_a_slow_source_republished_is_named_with_its_rate(
 def test_poses_continued_by_a_tracker_are_cut(sound: Recording, windows: list[PushWindow], name: str) -> None:
     stream = getattr(sound, name)
     begins = in_push(windows, stream, every=8)
-    recording = replace(sound, **{name: extrapolated(stream, begins, 12)})
+    recording = replace(sound, **{name: extrapolated(stream, begins, 30)})
     finding = found(recording, rig_of(NAME))[f"continued_poses_{name}"]
     left = len(begins) - finding.values["runs"].value  # their end is where the body is
     assert finding.severity == "warning" and -1 <= left <= 0.3 * len(begins)
-    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
+    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 29])) for k in begins.tolist()]
     again = find_windows(recording, rig_of(NAME))
     assert sum(any(w.start < end and w.end > begin for begin, end in spans) for w in again) <= 1 + 2 * max(left, 0)
 

@@ -19,7 +19,7 @@ EXACT = 1e-8  # m off the line of the two poses before: rounding of a continued 
 NOISE = 1e-5  # m off it, as the median of the BEFORE poses before a run: less may be a motion without noise
 BEFORE = 20
 SHORTEST = 4  # poses in a run: a coincidence of so many does not happen
-CORRECTED = 3.0 * NOISE  # m off the line, of the next measured pose: one that is nearer may be on it by its noise
+CORRECTED = 3.0  # times this noise, of the next measured pose off the line: else the body is where the line leads
 LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
 
 
@@ -32,8 +32,8 @@ def continued(stream: PoseStream, angle: bool) -> BoolArray:
     off, moves = _off_line(stream, pose)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], ((off < EXACT) & moves).astype(np.int8), [0]])))
     for begin, end in edges.reshape(-1, 2).tolist():
-        ends_off = end < len(off) and off[end] > CORRECTED
-        if ends_off and end - begin >= SHORTEST and _noise(off, begin - 1) > NOISE:
+        noise = _noise(off, begin - 1)
+        if end - begin >= SHORTEST and noise > NOISE and end < len(off) and off[end] > CORRECTED * noise:
             found[begin - 1 : end] = True  # the first one is off the line of the measured ones before
     if found.any() and np.max(Resolution(pose.shape[1]).take(pose)[-1]) > NOISE:  # rounded poses may lie on a line
         return np.zeros(len(stream), dtype=np.bool_)
