@@ -117,17 +117,15 @@ class ForceTiming:
             end = int(np.searchsorted(known.time, known.time[touch] + SEARCHED, side="right"))
             broken = int(np.searchsorted(unusable, touch))
             if broken < len(unusable) and unusable[broken] <= end:
-                begin = int(unusable[broken])
-            elif end == len(known):
+                continue
+            if end == len(known):
                 self._touch = touch
                 break
-            else:
-                begin = end + 1
-                since = max(_begin(known.time, touch), int(unusable[broken - 1]) + 1 if broken else 0)
-                self._judge(
-                    taken(known, slice(since, end + 1)), touch - since, zero(end - first), least_force(end - first)
-                )
-                apart[end - first :] = self.apart
+            begin = end + 1
+            since = max(_begin(known.time, touch), int(unusable[broken - 1]) + 1 if broken else 0)
+            around, at = taken(known, slice(since, end + 1)), end - first
+            self._judge(around, touch - since, zero(at), least_force(at))
+            apart[at:] = self.apart
         self._keep(known, int(unusable[-1]) + 1 if len(unusable) else 0)
         return apart
 
