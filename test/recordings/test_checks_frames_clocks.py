@@ -25,7 +25,7 @@ from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, taken
+from push_predictor.recordings.streams import PoseStream, Recording, joined, taken
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.slider import Slider
@@ -88,6 +88,18 @@ def test_a_slider_that_a_hand_lifts_at_times_shows_the_plane_of_the_pushes() -> 
     lift = np.where(time % 10.0 < 2.0, 0.02 * (1.0 - np.cos(np.pi * time)), 0.0)
     recording = replace(bag(HEXAGON), slider=replace(slider, x=slider.x + 0.5 * lift, z=slider.z + lift))
     assert not {"world_up", "world_tilted"} & set(found(recording, rig_of(HEXAGON)))
+
+
+def test_a_slider_that_is_carried_back_for_longer_than_it_is_pushed_shows_no_world_upside_down() -> None:
+    """While the tip is lifted it moves about, and a hand carries the slider."""
+    recording, time = bag(HEXAGON), np.arange(0.0, 60.0, 0.01)
+    carried, angle = recording.slider, 2.0 * np.pi * time
+    end, stamp = int(carried.stamp[-1]), np.rint(1e9 * (time + 1.0)).astype(np.int64)
+    x, y = 0.05 * np.cos(0.2 * angle) + 0.02 * np.cos(0.9 * angle), 0.05 * np.sin(0.2 * angle)
+    tip = PoseStream(end + stamp, 0.05 * np.sin(0.3 * angle), 0.05 * np.cos(0.13 * angle), 0.0 * x + 0.06, 0.0 * x)
+    slider = PoseStream(end + stamp, x, y, 0.0 * x + float(carried.z[-1]), 0.0 * x)
+    longer = replace(recording, slider=joined([carried, slider]), pusher=joined([recording.pusher, tip]))
+    assert not {"world_up", "world_tilted"} & set(found(longer, rig_of(HEXAGON)))
 
 
 def test_a_body_frame_upside_down_is_no_world_upside_down() -> None:

@@ -27,6 +27,7 @@ NOISE = 5.0  # standard deviations of a step at rest: what moves farther moves
 QUIET = 0.001  # m; of a step at rest, beyond which pushes are hidden in it
 MOST_STEPS = 4000  # evenly drawn
 FEWEST_STEPS = 20
+ALIKENESS = 8  # power of the agreement that outweighs the number of steps: twice as many for 9 % less
 FLAT = 3.0  # the steps spread so many times farther in the plane, in its narrower direction, than out of it
 ROUNDS = 12  # of the robust fit of the plane
 NARROWEST = 0.02  # of the steps, in that direction: along one line they show no plane
@@ -117,7 +118,9 @@ def _ups(recording: Recording) -> dict[str, Up | None]:
     moved = (length > least) & (tip_length > LEAST_STEP)
     one, other = _plane(step[moved]), _plane(tip_step[moved])
     if other is not None:
-        other = _lifted(tip @ other.normal, moved, other)
+        height = tip @ other.normal
+        moved = moved if one is None else _pushes(one, other, step, tip_step, height, moved)
+        other = _lifted(height, moved, other)
     if one is not None and other is not None:
         pushed = moved & (length > ALIKE[0] * tip_length) & (length < ALIKE[1] * tip_length)
         one = _as_seen_with(other, one, step[pushed], tip_step[pushed], slider)
@@ -157,6 +160,21 @@ def _plane(steps: Array) -> Up | None:
         return None
     normal = axes[:, 0]
     return Up(normal * np.sign(normal[np.argmax(np.abs(normal))]))
+
+
+def _pushes(slider: Up, tip: Up, steps: Array, tip_steps: Array, height: Array, moved: BoolArray) -> BoolArray:
+    """The steps (n,) that are pushes: of those on either side of the middle height, where more go the same way.
+
+    A hand may carry the slider back while the tip is lifted, for longer than all pushes last.
+    """
+
+    def alike(side: BoolArray) -> float:
+        one, other = _seen_along(slider.normal, steps[side]), _seen_along(tip.normal, tip_steps[side])
+        agreement = max(abs(np.sum(np.conj(one) * other)), abs(np.sum(one * other))) / max(len(one), 1)
+        return float(len(one) * agreement**ALIKENESS)
+
+    upper = height > 0.5 * (height[moved].min() + height[moved].max())
+    return max((moved & ~upper, moved & upper), key=alike) if np.ptp(height[moved]) > LIFT else moved
 
 
 def _lifted(height: Array, moved: BoolArray, up: Up) -> Up:
