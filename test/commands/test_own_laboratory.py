@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 def commands() -> list[list[str]]:
     """The commands of README for a recording of one's own."""
     text = (REPOSITORY / "README.md").read_text()
-    block = text[text.index("A recording of your own laboratory") :]
+    block = text[text.index("## Use a recording of your own") :]
     return [shlex.split(line)[1:] for line in re.findall(r"^    (push_predictor .*)$", block, re.MULTILINE)[:4]]
 
 

@@ -148,9 +148,18 @@ def is_exchanged(recording: Recording) -> bool:
     return exchanged(recording, places_of(recording.slider), places_of(recording.pusher)) is not None
 
 
-def test_bodies_are_exchanged_in_one_instant_more_than_once() -> None:
-    assert is_exchanged(swaps([(300, 600)])) and is_exchanged(swaps([(300, 600), (900, 1000)]))
-    assert not is_exchanged(swaps([(1500, 2001)])) and not is_exchanged(swaps([(300, 600), (900, 1000)], late=50))
+def test_bodies_are_exchanged_in_one_instant_for_a_while_or_for_good() -> None:
+    for spans, share, severity in (
+        ([(300, 400)], 0.05, "warning"),
+        ([(300, 400), (900, 1000)], 0.1, "warning"),
+        ([(1500, 2001)], 0.25, "refused"),
+    ):
+        recording = swaps(spans)
+        finding = exchanged(recording, places_of(recording.slider), places_of(recording.pusher))
+        assert finding is not None and finding.severity == severity
+        assert finding.values["share"].value == pytest.approx(share, abs=0.01)
+        assert finding.values["begin"].value == pytest.approx(0.01 * spans[0][0], abs=0.02)
+    assert not is_exchanged(swaps([(300, 600), (900, 1000)], late=50))
 
 
 # --- repeats ----------------------------------------------------------------------------------------------------------

@@ -190,7 +190,7 @@ def test_poses_held_by_a_tracker_that_lost_the_body_are_cut(
     finding = found(recording, rig_of(NAME))[f"held_poses_{name}"]
     assert finding.severity == "warning"
     assert finding.values["holds"].value == pytest.approx(len(begins), abs=2)
-    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 29])) for k in begins.tolist()]
+    spans = [(int(stream.stamp[k]), int(stream.stamp[k + 11])) for k in begins.tolist()]
     again = find_windows(recording, rig_of(NAME))
     crossing = [w for w in again if any(w.start < end and w.end > begin for begin, end in spans)]
     assert len(crossing) <= 2 and worst(nearest(windows, again)) < 2e-4

@@ -119,8 +119,11 @@ def _ups(recording: Recording) -> dict[str, Up | None]:
     one, other = _plane(step[moved]), _plane(tip_step[moved])
     if other is not None:
         height = tip @ other.normal
-        moved = moved if one is None else _pushes(one, other, step, tip_step, height, moved)
-        other = _lifted(height, moved, other)
+        lifted = _lifted(height, moved, other)
+        if one is not None:  # where both do not agree, a hand or a clock moves one of them
+            pushed = _lifted(height, _pushes(one, other, step, tip_step, height, moved), other)
+            lifted = lifted if np.array_equal(pushed.normal, lifted.normal) else other
+        other = lifted
     if one is not None and other is not None:
         pushed = moved & (length > ALIKE[0] * tip_length) & (length < ALIKE[1] * tip_length)
         one = _as_seen_with(other, one, step[pushed], tip_step[pushed], slider)
