@@ -82,6 +82,7 @@ def test_an_axis_other_than_z_that_is_up_is_named(
     assert f"`--up={option}`" in finding.advice
 
 
+@pytest.mark.long
 def test_a_slider_that_a_hand_lifts_at_times_shows_the_plane_of_the_pushes() -> None:
     slider = bag(HEXAGON).slider
     time = 1e-9 * (slider.stamp - slider.stamp[0])
@@ -146,6 +147,7 @@ def test_a_flange_above_the_tip_is_named_with_its_height() -> None:
     assert finding.values["height"].value == pytest.approx(0.12, abs=0.012) and "not of the flange" in finding.advice
 
 
+@pytest.mark.long
 def test_a_point_above_and_away_from_the_tip_is_named_with_both() -> None:
     findings = found(with_tracked_point(bag(HEXAGON), (0.06, 0.0, 0.12)), rig_of(HEXAGON))
     assert list(findings) == ["tip_height", "frames_apart"]
@@ -153,6 +155,7 @@ def test_a_point_above_and_away_from_the_tip_is_named_with_both() -> None:
     assert "not of the flange" in findings["frames_apart"].advice
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", [(0.004, -0.002, 0.0), (0.05, 0.02, 0.0)])
 def test_the_tips_place_along_the_axes_of_a_tool_that_turns_is_found(place: tuple[float, float, float]) -> None:
     (finding,) = check_recording(with_tracked_point(bag(HEXAGON), place, turns=True), rig_of(HEXAGON))
@@ -259,6 +262,7 @@ def test_the_noise_of_a_tracker_is_no_fault_of_outline_or_clock(length: float, d
     assert not [name for name in findings if name.startswith(("outline", "clock", "tip", "frames", "wrench"))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.15, 0.3])
 def test_fast_pushes_are_no_fault_of_the_outline(speed: float) -> None:
     slider = Slider("oval", ellipse(0.05, 0.04), 0.8)
