@@ -189,7 +189,7 @@ def stepped(recording: Recording, name: str, sizes: dict[float, float]) -> Recor
 def test_a_clock_that_was_set_is_named_with_size_and_time(name: str, size: float) -> None:
     recording = bag(MANY)
     (finding,) = check_recording(stepped(recording, name, {0.4: size}), rig_of(MANY))
-    assert (finding.name, finding.severity) == ("clock_step", "warning")
+    assert (finding.name, finding.severity) == ("clock_step", "refused" if abs(size) > 0.1 else "warning")
     relative = size if name == "slider" else -size
     assert finding.values["step"].value == pytest.approx(relative, abs=0.005)
     stamp = getattr(recording, name).stamp

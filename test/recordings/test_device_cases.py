@@ -136,7 +136,7 @@ CASES = (
     Case("c14_rigid_bodies", options=("--slider-topic", "/rigid_bodies.rigidbodies[1].pose")),
     Case("c14_rigid_bodies", options=("--slider-topic", "/rigid_bodies.rigidbodies[block].pose")),
     Case("c15_clock_drift", ("clock_drift",)),
-    Case("c15_clock_step", ("clock_step",), windows=0.65),
+    Case("c15_clock_step", ("clock_step",), windows=None),
     Case("c15_commanded_tip", ("clocks_apart",), windows=1.05),
     Case("c15_csv"),
     Case("c15_csv_3_decimals", ("resolution_pusher", "resolution_slider"), windows=None),

@@ -32,6 +32,7 @@ LEAST_SHARE = 0.2  # of the slider's motions that are pushes at the outline, for
 LEAST_PART = 4  # pushes between two steps of a clock
 CONSISTENT = 0.02  # s; lags that differ more are those of something else than clocks
 ROUNDING = 0.5 * FINE  # s: of a lag
+LARGEST_STEP = 0.1  # s: half a window of the default duration; beyond it windows on one side are of another moment
 SAME_STEP = 0.3  # a jump of a stream's stamps is the step if it differs by less than this share
 
 SYNCHRONISE = "Synchronise the clocks (chrony, PTP) before the recording starts"
@@ -159,7 +160,8 @@ def _steps(steps: tuple[Step, ...]) -> Finding:
     for number, step in enumerate(steps, 1):
         end = f"_{number}" if len(steps) > 1 else ""
         values |= {f"step{end}": Value(step.size, "s", step.sd), f"time{end}": Value(step.time, "s")}
-    return Finding("clock_step", "warning", sentence, advice, values)
+    largest = max(abs(step.size) for step in steps)
+    return Finding("clock_step", "refused" if largest > LARGEST_STEP else "warning", sentence, advice, values)
 
 
 def _clock(step: Step) -> str:
