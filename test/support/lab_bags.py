@@ -70,8 +70,10 @@ class Lab:
     def add(self, topic: str, kind: str, stamps: Any, filled: Iterator[Mapping[str, object]]) -> None:
         """Messages of a type: zeros, with some fields set by their dotted path."""
         self.kinds[topic] = kind
+        message, paths = None, None
         for stamp, values in zip(np.asarray(stamps).tolist(), filled, strict=True):
-            message = zeros(self.store, kind)
+            if values.keys() != paths:  # else all that the last message has is set anew
+                message, paths = zeros(self.store, kind), values.keys()
             for path, value in values.items():
                 assign(message, path, value)
             self.messages.append((stamp + LATENCY, topic, bytes(self.store.serialize_cdr(message, kind))))
