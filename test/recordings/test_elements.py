@@ -20,7 +20,14 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import parse_definitions, steps_of, type_at
 from push_predictor.recordings.fields.pose_numbers import pose_rows_of
 from push_predictor.recordings.fields.pose_rows import normalised, turned
-from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_TARGET, WRENCH_TARGET, Source, field_to_read
+from push_predictor.recordings.fields.sources import (
+    POSE_TARGET,
+    SCALAR_TARGET,
+    WRENCH_TARGET,
+    Source,
+    field_to_read,
+    fields_in,
+)
 from push_predictor.recordings.fields.up_axis import UP_AXES
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
@@ -71,6 +78,11 @@ def shuffled(tmp_path_factory: pytest.TempPathFactory) -> Path:
         return both if number % 7 else [other] if number % 14 else [block]
 
     return bodies_lab(chosen).mcap(tmp_path_factory.mktemp("bodies") / "a.mcap", original().rig)
+
+
+def test_a_plus_in_a_name_joins_no_fields() -> None:
+    assert fields_in("bodies[tip+flange].pose") == ["bodies[tip+flange].pose"]
+    assert fields_in("bodies[a+b].position+turn") == ["bodies[a+b].position", "turn"]
 
 
 @pytest.mark.parametrize("choice", ["block", "name=block", "id=7", "id=7.0"])

@@ -63,6 +63,14 @@ def test_poses_are_those_of_the_world_with_z_up(up: str, bodies: bool) -> None:
     np.testing.assert_allclose(np.hstack([found[:, :3], sign * found[:, 3:]]), rows, atol=1e-12)
 
 
+@pytest.mark.parametrize("up", [up for up in UP_AXES if up not in ("z", "-z")])
+def test_a_body_upside_down_still_has_the_axis_that_is_up(up: str) -> None:
+    """A finding names it as upside down; its heading is about the vertical."""
+    upside_down = np.array([[0.1, 0.2, 0.0, 1.0, 0.0, 0.0, 0.0]])
+    found = bodies_z_up(z_up(as_seen(upside_down, up, bodies=True), up), up)
+    np.testing.assert_allclose(turned(found[:, 3:], np.array([[0.0, 0.0, 1.0]])), [[0.0, 0.0, -1.0]], atol=1e-12)
+
+
 def lab_with(up: str, bodies: bool, streams: tuple[str, ...]) -> Lab:
     """The original as trackers see it; streams: those with another axis up."""
     lab, whole = Lab(), original()
