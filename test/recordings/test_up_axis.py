@@ -139,6 +139,21 @@ def test_a_sensor_with_the_axes_of_the_tip_is_turned_with_it(tmp_path: Path) -> 
     assert not np.allclose(wanted[0, :2], force)
 
 
+@pytest.mark.parametrize("up", ["y", "-z"])
+def test_a_sensor_known_to_tf_is_turned_with_the_world(tmp_path: Path, up: str) -> None:
+    mounted, found = np.array([[0.02, -0.01, 0.05, 0.36, 0.48, 0.48, 0.64]]), []
+    for axis in ("z", up):
+        lab, whole = lab_with(axis, False, ("slider", "pusher")), original()
+        stamps = whole.pusher.stamp[::10]
+        lab.transform("/tf", "world", "ft", stamps, np.repeat(as_seen(mounted, axis, False), len(stamps), axis=0))
+        path = lab.mcap(tmp_path / axis, whole.rig)
+        found.append(read_recording(path, topics=Topics(wrench_frame="ft", up=axis)).wrench)
+    plain, turned_world = found
+    assert plain is not None and turned_world is not None and np.ptp(plain.fx) > 0.1
+    for name in ("fx", "fy", "torque"):
+        np.testing.assert_allclose(getattr(turned_world, name), getattr(plain, name), atol=1e-9)
+
+
 @pytest.mark.parametrize("up", ["q", "y,q", "tip=y", "slider=", "slider=y=z", "=="])
 def test_another_axis_or_stream_is_refused_with_those_that_are_accepted(tmp_path: Path, up: str) -> None:
     with pytest.raises(RequestError, match=r"up: .* is not accepted, give x, y, z, -x, -y or -z, of some streams"):
