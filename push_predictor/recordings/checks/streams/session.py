@@ -35,15 +35,16 @@ def of_one_body(stream: PoseStream) -> PoseStream:
 
 def repeated_samples(recording: Recording) -> Finding | None:
     """A warning if samples are in the recording twice: from two publishers, or from a loop that was recorded."""
-    streams = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
-    twice = {name: repeated(stream) for name, stream in streams.items() if stream is not None and len(stream)}
+    every = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
+    streams = {name: stream for name, stream in every.items() if stream is not None and len(stream)}
+    twice = {name: repeated(stream) for name, stream in streams.items()}
     often = {name: again for name, again in twice.items() if np.mean(again) > LEAST_SHARE}
     if not often:
         return None
     listed = ", ".join(f"{name} {100.0 * np.mean(again):.0f} %" for name, again in often.items())
     values = {f"{name}_share": Value(float(np.mean(again)), "1") for name, again in often.items()}
     sentence = f"Samples are recorded twice, with the same stamp and value: {listed}."
-    loop = any(bool(np.any(np.diff(streams[name].stamp) < -CLOCK_SET)) for name in often)  # type: ignore[union-attr]
+    loop = any(bool(np.any(np.diff(streams[name].stamp) < -CLOCK_SET)) for name in often)
     if loop:
         advice = "A loop was recorded. Its windows count once. Record a replay only once."
         return Finding("loop_recorded", "warning", sentence, advice, values)

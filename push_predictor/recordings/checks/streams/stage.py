@@ -59,7 +59,7 @@ def stream_stage(evidence: Evidence) -> Evidence:
 
 def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:
     """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
-    found = list[Finding]()
+    found, sound = list[Finding](), dict[str, Any]()
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
         lost = continued(stream, headed and name == "slider")
         if (runs := int(np.sum(np.diff(lost, prepend=False) & lost))) < FEWEST_RUNS:
@@ -70,8 +70,8 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
         )
         values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
         found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
-        recording = replace(recording, **{name: taken(stream, ~lost)})  # type: ignore[arg-type]
-    return found, recording
+        sound[name] = taken(stream, ~lost)
+    return found, replace(recording, **sound)
 
 
 def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
