@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.repairs.continued import continued
+from push_predictor.recordings.windows.repairs.continued import ContinuedPoses, continued
 from push_predictor.recordings.windows.repairs.flips import HeadingFlips
 from push_predictor.recordings.windows.repairs.held import HeldPoses
 from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps, stamp_noise
@@ -153,6 +153,33 @@ def on_a_line(x: Array, begin: int, count: int) -> Array:
 def test_continued_poses_are_marked_from_the_first_on_where_a_coincidence_is_excluded() -> None:
     assert np.array_equal(np.flatnonzero(continued(body(on_a_line(measured(), 50, 6)), False)), np.arange(50, 56))
     assert not continued(body(on_a_line(measured(), 50, 4)), False).any()
+
+
+@pytest.mark.parametrize("portion", [1, 7, 53])
+def test_continued_poses_are_left_out_portion_by_portion(portion: int) -> None:
+    stream = body(on_a_line(on_a_line(measured(200), 50, 6), 120, 30))
+    rows = np.column_stack([stream.x, stream.y, np.zeros((200, 2))])
+    step, found = ContinuedPoses(None), []
+    for begin in range(0, 200, portion):
+        now = slice(begin, begin + portion)
+        found.append(step.take(OrderedSamples(stream.stamp[now], rows[now], np.zeros(200, np.bool_)[now], False)))
+        assert step.waiting <= 31
+    found.append(step.take(OrderedSamples(stream.stamp[:0], rows[:0], np.zeros(0, np.bool_), False), final=True))
+    wanted = ~continued(stream, angle=False)
+    assert np.sum(~wanted) == 36 and step.waiting == 0
+    assert np.array_equal(np.concatenate([each.stamp for each in found]), stream.stamp[wanted])
+
+
+def test_a_line_of_over_two_seconds_is_a_motion_and_is_not_waited_for() -> None:
+    stream = body(on_a_line(measured(400), 50, 300))
+    rows = np.column_stack([stream.x, stream.y, np.zeros((400, 2))])
+    step = ContinuedPoses(None)
+    given = [
+        step.take(OrderedSamples(stream.stamp[k : k + 1], rows[k : k + 1], np.zeros(1, np.bool_), False))
+        for k in range(300)
+    ]
+    assert step.waiting <= 1 and sum(len(each.stamp) for each in given) >= 299
+    assert not continued(stream, angle=False).any()
 
 
 def test_repeated_and_rounded_poses_and_a_steady_motion_without_noise_are_not_continued() -> None:

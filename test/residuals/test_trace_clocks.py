@@ -8,19 +8,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+from checked_bags import bag, rig_of
 from made_up_traces import pushes, slippery
+from mistakes import late
 from synthetic import square_rig
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
+from push_predictor.recordings.checks.data_checks import DataChecks
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.channels.clocks import NAMES, clock_errors
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.outcome import Trace, trace_json
 from push_predictor.residuals.reporting.sentences import answer
-from push_predictor.residuals.trace import trace
+from push_predictor.residuals.trace import trace, trace_data
 
 LATE = Finding("wrench_lag", "warning", "The force is late.", "Synchronise.", {"lag": Value(0.12, "s", 0.002)})
 
@@ -55,6 +60,17 @@ def test_without_an_effect_a_clock_that_is_off_is_a_note() -> None:
     sound, off = traced((), False), traced((LATE,), False)
     assert sound.verdict == off.verdict != "measurement"
     assert set(off.notes) - set(sound.notes) and not set(sound.notes) - set(off.notes)
+
+
+def test_what_the_checks_find_about_clocks_reaches_the_trace(tmp_path: Path) -> None:
+    recording, rig, notes = bag("square_abs_test"), rig_of("square_abs_test"), []
+    model = train_model(pushes(10, 1), rig, "analytical", name="deployed")
+    for given in (recording, late(recording, 0.06)):
+        path = tmp_path / f"bag_{len(notes)}"
+        write_recording(path, given)
+        checks = DataChecks(False, lambda text: None)
+        notes.append(trace_data([path], model, rig=rig, covariates=["push_index"], checks=checks).notes)
+    assert [any("no model is extended" in note for note in each) for each in notes] == [False, True]
 
 
 def test_every_finding_about_clocks_has_a_size() -> None:

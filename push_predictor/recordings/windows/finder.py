@@ -22,7 +22,6 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, Stream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.repairs.continued import continued
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
 from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray
@@ -78,15 +77,14 @@ class WindowFinder:
     def find(self, recording: Recording) -> list[PushWindow]:
         """All windows of a recording; see find_windows.
 
-        A sample that it has twice, as in a loop, counts once. Poses that the tracker continued are no samples.
+        A sample that it has twice, as in a loop, counts once.
         """
         for name, stream in recording.scalars.items():
             self.add_scalar(name, stream)
         if recording.wrench is not None:
             self.add_wrench(self._once("wrench", recording.wrench))
-        slider, pusher = self._once("slider", recording.slider), self._once("pusher", recording.pusher)
-        self.add_pusher(taken(pusher, ~continued(pusher, angle=False)))
-        self.add_slider(taken(slider, ~continued(slider, angle=True)))
+        self.add_pusher(self._once("pusher", recording.pusher))
+        self.add_slider(self._once("slider", recording.slider))
         return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:

@@ -71,7 +71,7 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
         values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
         found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
         sound[name] = taken(stream, ~lost)
-    return found, replace(recording, **sound)
+    return found, replace(recording, **sound) if sound else recording
 
 
 def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:

@@ -1,12 +1,13 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is repaired in a stream in order: stale poses, stamps with jitter, a coarse resolution, and a low rate."""
+"""What is repaired in a stream in order: poses continued or stale, jitter of stamps, a coarse resolution, low rate."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.recordings.windows.repairs.continued import ContinuedPoses
 from push_predictor.recordings.windows.repairs.held import HeldPoses
 from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps
 from push_predictor.recordings.windows.repairs.resolution import Resolution, lengths
@@ -19,7 +20,7 @@ from push_predictor.types import Array
 class StreamRepairs:
     """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
 
-    held, smoothed, slow: None for a stream without a position. The result does not depend on the portions.
+    continued, held, smoothed, slow: None for a stream without a position. The result does not depend on the portions.
     """
 
     def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
@@ -28,6 +29,7 @@ class StreamRepairs:
         angle: index of the column with a heading, rad, which is unwrapped; None without one.
         """
         self.regular = RegularStamps()
+        self.continued = None if is_jump is None else ContinuedPoses(angle)
         self.held = None if is_jump is None else HeldPoses(angle)
         self.smoothed = None if is_jump is None else SmoothedPoses(angle)
         self.slow = None if is_jump is None else SlowPoses(is_jump, angle)
@@ -39,18 +41,18 @@ class StreamRepairs:
     def waiting(self) -> int:
         """How many samples wait."""
         return self.regular.waiting + sum(
-            step.waiting for step in (self.held, self.smoothed, self.slow) if step is not None
+            step.waiting for step in (self.continued, self.held, self.smoothed, self.slow) if step is not None
         )
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        if self.held is None or self.smoothed is None or self.slow is None:
+        if self.continued is None or self.held is None or self.smoothed is None or self.slow is None:
             return self.regular.take(new, final)
         values = self._unwrapped(new.values)
         # The repair of one must not hide the resolution from the next: they get it as a further column.
         quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
         new = with_values(new, np.column_stack([values, quantum]))
-        for step in (self.held, self.regular, self.smoothed, self.slow):
+        for step in (self.continued, self.held, self.regular, self.smoothed, self.slow):
             new = step.take(new, final)
         return with_values(new, new.values[:, :-1])
 
