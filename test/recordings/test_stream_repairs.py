@@ -187,7 +187,7 @@ def test_repeated_and_rounded_poses_and_a_steady_motion_without_noise_are_not_co
     still = measured()
     still[50:70] = still[50]
     assert not continued(body(still), False).any()
-    counts = [*np.random.default_rng(0).integers(0, 4, 80), *[1] * 12]
+    counts = [*np.random.default_rng(0).integers(0, 4, 80), *[1] * 12, 9, 0]
     assert not continued(body(MM * np.cumsum(counts)), False).any()
 
 
