@@ -50,10 +50,17 @@ class Evidence:
         """Whether one of these was found."""
         return any(finding.name in names for finding in self.findings)
 
-    def found(self, more: Iterable[Finding | None], recording: Recording | None = None) -> Evidence:
-        """With further findings; recording: what is accepted from here on, as before if None."""
+    def found(
+        self, more: Iterable[Finding | None], recording: Recording | None = None, *, synchronous: bool = False
+    ) -> Evidence:
+        """With further findings; recording: accepted from here on, as before if None; synchronous: shown by them."""
         findings = (*self.findings, *(finding for finding in more if finding is not None))
-        after = replace(self, findings=findings, recording=recording or self.recording)
+        after = replace(
+            self,
+            findings=findings,
+            recording=recording or self.recording,
+            synchronous=self.synchronous or synchronous,
+        )
         if after.recording is self.recording and "motion" in self.__dict__:
             after.__dict__["motion"] = self.motion  # of the same samples: it need not be found again
         return after

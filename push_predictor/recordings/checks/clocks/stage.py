@@ -84,7 +84,7 @@ def clock_stage(evidence: Evidence) -> Evidence:
     corrected = with_course_corrected(recording, course)
     if found and not _explains(recording, corrected, rig):
         return evidence
-    return replace(evidence.found(found, corrected if found else recording), synchronous=True)
+    return evidence.found(found, corrected if found else recording, synchronous=True)
 
 
 def course_of(lags: PushLags, recording: Recording, recorded: Recording) -> Course:
