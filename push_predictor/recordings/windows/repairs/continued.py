@@ -67,8 +67,9 @@ def _judged(stamp: IntArray, pose: Array, quantum: Array, first: int) -> tuple[B
     off, moves = _off_line(stamp, pose)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], ((off < EXACT) & moves).astype(np.int8), [0]])))
     for begin, end in edges.reshape(-1, 2).tolist():
-        noise = _noise(off, begin - 1)  # the first of a run is off the line of the measured ones before
-        if begin - 1 < first or noise <= NOISE or stamp[end - 1] - stamp[begin - 1] > LONGEST:
+        if begin - 1 < first or stamp[end - 1] - stamp[begin - 1] > LONGEST:
+            continue
+        if (noise := _noise(off, begin - 1)) <= NOISE:  # the first of a run is off the line of those before
             continue
         if end == count:
             return lost, begin - 1
