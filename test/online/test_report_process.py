@@ -44,6 +44,6 @@ def test_validator_passes_its_alarm_to_the_report(tmp_path: Path, alarm: Any, ex
     live = SimpleNamespace(names=[], windows=[1], predicted=lambda: [1], reported=lambda: ("reported",))
     run: Any = SimpleNamespace(validation=live, alarm=alarm, write=lambda folder: [folder / "validation.json"])
     writer = ResultWriter(str(tmp_path), SimpleNamespace(info=lambda text: None))
-    writer.report = SimpleNamespace(start=lambda *arguments: started.extend(arguments))  # type: ignore[assignment]
+    writer.report = SimpleNamespace(start=lambda *arguments: started.extend(arguments))  # type: ignore[assignment]  # a fake
     assert not writer.write(run, with_report=True)
     assert started == ["reported", tmp_path, expected]
