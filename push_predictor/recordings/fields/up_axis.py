@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.recordings.fields.pose_rows import composed, turned
+from push_predictor.recordings.fields.pose_rows import composed, in_world_axes, inverted
 from push_predictor.types import Array
 
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
@@ -30,7 +30,6 @@ _TURNS = MappingProxyType(
         "-z": (1.0, 0.0, 0.0, 0.0),
     }
 )
-_CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 def z_up(poses: Array, up: str) -> Array:
@@ -40,8 +39,7 @@ def z_up(poses: Array, up: str) -> Array:
 
 def wrenches_z_up(wrenches: Array, up: str) -> Array:
     """Wrenches (n, 6) along the axes of a world with this up axis, along those of the turned world."""
-    quaternions = _turns(up, len(wrenches))[:, 3:]
-    return np.hstack([turned(quaternions, wrenches[:, :3]), turned(quaternions, wrenches[:, 3:])])
+    return in_world_axes(wrenches, _turns(up, len(wrenches)))
 
 
 def bodies_z_up(poses: Array, up: str) -> Array:
@@ -51,9 +49,7 @@ def bodies_z_up(poses: Array, up: str) -> Array:
     """
     if up == Z_UP:
         return poses
-    back = _turns(up, len(poses))
-    back[:, 3:] *= _CONJUGATE
-    own = composed(poses, back)
+    own = composed(poses, inverted(_turns(up, len(poses))))
     one, other = _upward(poses), _upward(own)
     # Half a turn keeps the z axis vertical: which of the two points up decides. Else the one that is vertical.
     is_own = other > one if up == Z_DOWN else np.abs(other) > np.abs(one)
