@@ -118,10 +118,10 @@ def motion_effects(
 
 def _rows(model: PushModel, evidence: Evidence, baseline: Baseline, inputs: InputsBasis) -> FitRows:
     """The windows of the fits: with those of training where a learnt base may have missed a function of its inputs."""
-    _, few = evidence.thinned
+    few = evidence.thinned
     if not (inputs.learnt and inputs.absorbs):
         return FitRows(few)
-    _, before = baseline.evidence.thinned
+    before = baseline.evidence.thinned
     return FitRows(few, before, inputs_basis(model, concatenate([few.table, before.table])).columns)
 
 
@@ -166,7 +166,7 @@ def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> li
     """Whether each term differs from what the same fit finds in training; of a learnt base every one does."""
     if not found.terms or inputs.learnt or len(baseline.evidence.table.pushes) < FEWEST_PUSHES:
         return [inputs.learnt] * len(found.terms)
-    _, before = baseline.evidence.thinned
+    before = baseline.evidence.thinned
     recorded = [
         k
         for k, effect in enumerate(found.fit.effects)

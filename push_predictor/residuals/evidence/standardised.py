@@ -71,10 +71,9 @@ class Evidence:
         return {}
 
     @cached_property
-    def thinned(self) -> tuple[IntArray, Evidence]:
-        """Indices of at most MOST_FITTED windows spread over the session, and their evidence; enough for a fit."""
-        rows = np.linspace(0, len(self.table) - 1, min(MOST_FITTED, len(self.table))).astype(np.int64)
-        return rows, self.take(rows)
+    def thinned(self) -> Evidence:
+        """Of at most MOST_FITTED windows spread over the session; enough for a fit."""
+        return self.take(np.linspace(0, len(self.table) - 1, min(MOST_FITTED, len(self.table))).astype(np.int64))
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""
