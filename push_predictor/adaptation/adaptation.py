@@ -26,7 +26,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import NOISE_WINDOWS, ProcessNoise, normal_draws, window_weights
+from push_predictor.models.mechanics.prior import NOISE_WINDOWS, ProcessNoise, normal_draws
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import (
@@ -132,7 +132,7 @@ class Adaptation:
         check_pushes(self.deployed, windows)
         push = self.deployed.predictor.completed(Push.of(windows))
         mean, covariance = self._deployed_moments(push)
-        observed = Observed(windows.outcomes - mean, covariance, window_weights(np.zeros(len(windows), dtype=np.intp)))
+        observed = Observed(windows.outcomes - mean, covariance)
         view = _View(self._mechanics, self._old, self._names, push)
         log_density = np.empty(len(self._groups))
         for k, own in enumerate(self._groups):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ class Followed:
         """The mean NLPD of each model by stage, and the parameters at the end, to be printed."""
         count = len(self.parameters)
         ends = [*(stage for stage in STAGES if stage < count), count]
-        spans = [(low, high) for low, high in zip(ends[:-1], ends[1:], strict=True)]
+        spans = list(pairwise(ends))
         titles = [f"{low + 1}-{high}" for low, high in spans]
         rows = [f"NLPD of pushes   {''.join(f'{title:>10}' for title in titles)}"]
         for name, values in self.nlpd.items():

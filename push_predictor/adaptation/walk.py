@@ -21,9 +21,10 @@ import numpy as np
 from push_predictor.models.mechanics.fit import DEGREES
 from push_predictor.types import Array
 
-SPEEDS = {0.0: 0.6, 0.03: 0.37, 0.3: 0.03}  # standard deviations of a change per push, and how often: none, wear, jumps
+SPEEDS = {0.0: 0.8, 0.02: 0.18, 0.3: 0.02}  # standard deviations of a change per push, and how often: none, wear, jumps
 STEADY = 0.8  # probability that the speed stays, else it is drawn again: a jump takes some five pushes
 LINEARISED = 3  # times per push
+CORRELATION = 0.8  # of the windows of a push: they share the friction under it and what a model misses there
 LARGEST_SQUARE = 9.0  # of a residual in standard deviations: one bad window says little about the noise of others
 MEMORY = 200.0  # independent windows that the noise is averaged over
 REFUSED = 2.0  # posterior standard deviations beyond the plausible range from which a push is not explained
@@ -33,11 +34,18 @@ Shift: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
 
 class Observed(NamedTuple):
-    """The windows of a push: residual (n, 3) of the deployed mean, covariance (n, 3, 3), weight (n,) of each."""
+    """The windows of a push: residual (n, 3) of the deployed mean, covariance (n, 3, 3).
+
+    They share their deviation: each counts for a `share` of an independent one.
+    """
 
     residual: Array
     covariance: Array
-    weight: Array
+
+    @property
+    def share(self) -> float:
+        """1 / (1 + (n - 1) r) with a correlation r."""
+        return 1.0 / (1.0 + (len(self.residual) - 1.0) * CORRELATION)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +60,12 @@ class Noise:
     usual_square: Array
     factor: Array = field(default_factory=lambda: np.ones(3))
 
-    def after(self, square: Array, weight: Array) -> Noise:
-        """After a push with squared residuals (n, 3) over the deployed variances, and weights (n,) of its windows."""
-        count = float(weight.sum())
+    def after(self, square: Array, share: float) -> Noise:
+        """After a push with squared residuals (n, 3) over the deployed variances; share: see Observed."""
+        count = share * len(square)
         windows = min(self.windows + count, MEMORY)
         cut_off = np.minimum(square / self.factor, LARGEST_SQUARE)
-        growth = (weight @ cut_off / self.usual_square - count) / windows
+        growth = (np.mean(cut_off, axis=0) / self.usual_square - 1.0) * count / windows
         return replace(self, windows=windows, factor=self.factor * (1.0 + growth))
 
 
@@ -132,7 +140,7 @@ class Walk:
 
     def _updated(self, seen: Observed, shift: Shift) -> tuple[Array, Array, Array]:
         """Log density (s,) of a push under each filter, means (s, p), covariances (s, p, p) after it."""
-        noise = _blocks(seen.covariance / seen.weight[:, None, None])
+        noise = _blocks(seen.covariance / seen.share)
         about, means, covariances, likelihood = self.mean, self.means, self.covariances, np.zeros(len(self.speeds))
         for _ in range(LINEARISED if len(self.spread) else 1):
             moved, slopes = shift(np.clip(about, self.low, self.high))
@@ -156,7 +164,7 @@ class Walk:
         unsure = np.einsum("nkp,pq,nkq->nk", slopes, self.covariance, slopes)
         variance = np.diagonal(observed.covariance, axis1=1, axis2=2)
         square = (observed.residual - moved) ** 2 + unsure
-        return replace(self, noise=self.noise.after(square / variance, observed.weight))
+        return replace(self, noise=self.noise.after(square / variance, observed.share))
 
 
 def _kalman(
@@ -169,7 +177,7 @@ def _kalman(
     gain = covariance @ jacobian.T
     lower = np.linalg.cholesky(noise + jacobian @ gain)
     whitened = np.linalg.solve(lower, innovation)
-    square, count = float(whitened @ whitened), 3.0 * float(seen.weight.sum())
+    square, count = float(whitened @ whitened), seen.share * len(innovation)
     log_density = -np.log(np.diagonal(lower)).sum() - 0.5 * (DEGREES + count) * np.log1p(square / DEGREES)
     weight = min((DEGREES + count) / (DEGREES + square), 1.0)
     lower = np.linalg.cholesky(noise / weight + jacobian @ gain)
