@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -22,18 +21,19 @@ from synthetic import square_rig
 
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.geometry.frames import rotate, to_body
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.gym import ID
+from push_predictor.gym.task import push_task
 from push_predictor.models.effects.traced_session import TracedSession
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.persistence import persistence_of, root_of
-from push_predictor.resources import DEFAULT_MODEL, share_path
+from push_predictor.recordings.table import empty_table
 from push_predictor.types import Array
 
-SHIPPED = load_served(share_path(*DEFAULT_MODEL))
+SHIPPED = push_task("default", [0.0, 0.0, 0.0]).model
 START = np.array([-0.12, 0.03, 0.4])
 FORWARD = np.array([-0.8, 0.1, 0.5])  # an action: pushes at 0.4 of the first side
 BLOCK = np.array([[0.0, -0.2], [0.05, -0.2], [0.05, 0.2], [0.0, 0.2]])
@@ -46,9 +46,14 @@ def one(**options: Any) -> Any:
     return gymnasium.make(ID, **{"model": SHIPPED, "start": START, **options})
 
 
+def stepped(env: Any, action: Array = FORWARD) -> tuple[Any, ...]:
+    """The first step of an episode."""
+    env.reset(seed=0)
+    return env.step(action)
+
+
 def many(count: int, **options: Any) -> Any:
-    mode = gymnasium.VectorizeMode.VECTOR_ENTRY_POINT
-    return gymnasium.make_vec(ID, num_envs=count, vectorization_mode=mode, **{"model": SHIPPED, **options})
+    return gymnasium.make_vec(ID, num_envs=count, **{"model": SHIPPED, **options})
 
 
 def inputs_of(action: Array, model: TabulatedModel = SHIPPED) -> Array:
@@ -80,12 +85,11 @@ def pushed(actions: list[Array], count: int, model: TabulatedModel = SHIPPED) ->
     return found
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("options", [{}, {"obstacles": [BLOCK], "goal": FAR}])
 def test_the_checks_of_gymnasium_pass(options: dict[str, Any]):
     env = gymnasium.make(ID, **options)  # of the shipped model, about the origin
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(env.unwrapped)
+    check_env(env.unwrapped)
 
 
 def test_the_code_in_the_documentation_runs():
@@ -125,10 +129,10 @@ def test_a_seed_decides_what_happens_and_without_one_the_episodes_go_on_differen
 def test_actions_span_the_domain_and_those_beyond_are_clipped():
     env = one()
     for action in (np.array([-0.5, -1.0, -1.0]), np.array([-0.5, 3.0, 2.0])):
-        env.reset(seed=0)
-        *_, info = env.step(action)
-        assert info["in_domain"] is True
+        assert stepped(env, action)[4]["in_domain"] is True
         np.testing.assert_allclose(env.unwrapped._one._sliders.inputs, inputs_of(np.clip(action, -1.0, 1.0)))
+    (first,), (last,) = (pushed([np.array([contact, 0.0, 0.0])], 2) for contact in (-1.0, 1.0))
+    np.testing.assert_array_equal(first, last)  # once around the outline
 
 
 def test_observed_is_the_goal_in_the_sliders_frame_and_reward_is_how_much_nearer_it_is_in_tolerances():
@@ -147,12 +151,8 @@ def test_observed_is_the_goal_in_the_sliders_frame_and_reward_is_how_much_nearer
     (0.0045, 0.09, 0.1, True), (0.0055, 0.0, 0.1, False), (0.0, 0.11, 0.1, False), (0.0, 3.0, None, True),
 ])  # fmt: skip
 def test_success_is_within_5_mm_and_a_tenth_of_a_radian_unless_the_goal_has_tolerances(away, turned, turn, success):
-    env = one()
-    env.reset(seed=0)
-    pose = env.step(FORWARD)[4]["slider"] + [away, 0.0, turned]
-    env = one(goal=pose if turn else Goal(pose, distance=0.005))
-    env.reset(seed=0)
-    _, reward, terminated, _, info = env.step(FORWARD)
+    pose = stepped(one())[4]["slider"] + [away, 0.0, turned]
+    _, reward, terminated, _, info = stepped(one(goal=pose if turn else Goal(pose, distance=0.005)))
     assert terminated is info["is_success"] is success
     assert (reward > 10.0) == success and not info["touches"] and not info["off_table"]
 
@@ -170,12 +170,22 @@ def test_touching_an_obstacle_and_leaving_the_table_end_an_episode(reason: str, 
     assert first > 1 and [name for name in ("is_success", "touches", "off_table") if info[name]] == [reason]
 
 
+def test_success_is_no_touch_and_of_a_circle_any_heading():
+    beside = push_task(SHIPPED, [-0.046, 0.0, 0.0], [BLOCK])
+    pose = np.array([[-0.043, 0.0, 0.0]])
+    assert beside.goal.reached(beside.goal.ahead(pose)) and beside.ends(pose)["touches"]
+    assert not beside.ends(pose)["is_success"]
+    rig = replace(square_rig(), outline=shape_outline("ellip1"))
+    assert push_task(train_model(empty_table(), rig, "prior", name="round"), FAR).goal.turn is None
+
+
 def test_an_episode_lasts_100_windows():
     env, one_side_then_the_other = many(1, goal=FAR, start=START), [[[0.9, 0.0, -1.0]], [[-0.1, 0.0, -1.0]]]
-    env.reset(seed=0)
+    _, first = env.reset(seed=0)
     steps = [env.step(np.array(one_side_then_the_other[k % 2])) for k in range(100)]
     assert not any(step[2] for step in steps) and [bool(step[3]) for step in steps] == [False] * 99 + [True]
     assert one().spec.max_episode_steps == 100
+    assert not first["in_domain"]  # the info of a step is not that of a later one
 
 
 def test_random_starts_are_spread_over_the_free_part_of_the_table():
@@ -196,6 +206,8 @@ def test_outcomes_have_the_models_mean_and_covariance_and_the_errors_of_a_push_l
     for found in z:
         np.testing.assert_allclose(found.mean(axis=0), 0.0, atol=4.5 / np.sqrt(count))
         np.testing.assert_allclose(np.cov(found.T), np.eye(3), atol=4.5 * np.sqrt(2.0 / count))
+    around = pushed([np.array([end * (1.0 - 0.4 * radius), 0.0, 0.0]) for end in (-1.0, 1.0)], count)
+    assert np.mean(around[0] * around[1], axis=0).min() > 0.15  # from the begin of the outline to its end
     one, two = (inputs_of(action)[0, 0] * SHIPPED.model.usual_duration for action in (FORWARD, slow))
     known = persistence_of(SHIPPED.model).correlation(np.array([one, two, one + two]))
     assert known[:2].min() > 0.15 and np.abs(known[0] - known[1]).min() > 0.1
@@ -209,9 +221,7 @@ def test_a_slider_without_a_finite_prediction_stays(monkeypatch: pytest.MonkeyPa
         return np.full((1, 3), np.nan), np.ones(1, dtype=bool)
 
     monkeypatch.setattr("push_predictor.gym.pushed_sliders.sampled_displacements", unknown)
-    env = one(goal=FAR)
-    env.reset(seed=0)
-    _, reward, terminated, _, info = env.step(FORWARD)
+    _, reward, terminated, _, info = stepped(one(goal=FAR))
     assert reward == 0.0 and not terminated and not info["in_domain"]
     np.testing.assert_array_equal(info["slider"], START)
 
@@ -243,7 +253,7 @@ def test_what_cannot_be_is_refused_with_its_name_and_value(options: dict[str, An
         many(2, **{"start": START, **options}).reset(seed=0)
 
 
-def test_other_refusals():
+def test_other_refusals_name_what_is_wrong_too():
     with pytest.raises(ModelFileError, match="nowhere"):
         one(model="nowhere.pushmodel")
     with pytest.raises(RequestError, match=r"^model: 'base' .* it needs elapsed_time$"):
@@ -261,5 +271,4 @@ def test_the_picture_changes_with_the_slider():
     env.reset(seed=0)
     before = env.render()
     env.step(FORWARD)
-    assert before.dtype == np.uint8 and before.ndim == 3 and before.shape[2] == 3
-    assert np.abs(before.astype(int) - env.render()).max() > 100
+    assert before.dtype == np.uint8 and before.shape[2] == 3 and np.abs(before.astype(int) - env.render()).max() > 100
