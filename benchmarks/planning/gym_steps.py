@@ -32,7 +32,6 @@ from push_predictor.gym import ID
 from push_predictor.gym.task import push_task
 from push_predictor.models.push_model import PushModel
 from push_predictor.planning.straight_drive import start_drive
-from push_predictor.resources import SHIPPED
 from push_predictor.types import Array
 
 ROUNDS, SINGLE, STEPS = 5, 300, 20
@@ -52,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=4096, help="sliders at once (default %(default)s)")
     parser.add_argument("--timestep", type=float, default=0.002, help="of MuJoCo, s (default %(default)s, its own)")
     options = parser.parse_args(arguments)
-    task = push_task(SHIPPED, [0.0, 0.0, 0.0])
+    task = push_task()
     model, duration = task.model.model, task.model.model.usual_duration
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (options.count, 3))
     pushes, steps = task.inputs(actions), round(duration / options.timestep)

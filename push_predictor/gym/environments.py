@@ -20,8 +20,7 @@ from push_predictor.errors import RequestError
 from push_predictor.gym import MOST_STEPS
 from push_predictor.gym.picture import frame
 from push_predictor.gym.pushed_sliders import PushedSliders
-from push_predictor.gym.task import AnyGoal, AnyModel, push_task
-from push_predictor.resources import SHIPPED
+from push_predictor.gym.task import push_task
 from push_predictor.types import Array, BoolArray, ByteArray
 
 Info = dict[str, Any]
@@ -50,22 +49,16 @@ class PushEnv(gymnasium.Env[Array, Array]):
     goal (x, y m, heading rad) in the world.
 
     model: a model file, a model, or "default" for the shipped one. goal: a pose (x, y m, heading rad) or a `Goal`.
-    obstacles: convex polygons, table: one, by default a square of 0.5 m about the origin; corners counter-clockwise, m.
-    start: a pose; by default each episode starts at a random one. Raises RequestError, and ModelFileError for a file.
+    obstacles: convex polygons, above which the tip may pass; table: one, by default a square of 0.5 m about the origin;
+    corners counter-clockwise, m. start: a pose; by default each episode starts at a random one.
+
+    Raises RequestError, and ModelFileError for a file.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 5}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(
-        self,
-        model: AnyModel = SHIPPED,
-        goal: AnyGoal = (0.0, 0.0, 0.0),
-        obstacles: Sequence[Array] = (),
-        table: Array | None = None,
-        start: Sequence[float] | Array | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        self._one = PushVectorEnv(1, model, goal, obstacles, table, start, sys.maxsize, render_mode)
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
+        self._one = PushVectorEnv(1, sys.maxsize, **arguments)
         self.render_mode = render_mode
         self.action_space, self.observation_space = self._one.single_action_space, self._one.single_observation_space
 
@@ -82,14 +75,13 @@ class PushEnv(gymnasium.Env[Array, Array]):
 
     def render(self) -> ByteArray | None:
         """The scene as pixels (height, width, 3), with the render mode rgb_array."""
-        return self._one.render()[0] if self.render_mode else None
+        return frame(self._one._sliders, 0) if self.render_mode else None
 
 
 class PushVectorEnv(VectorEnv[Array, Array, Array]):
     """`num_envs` environments like PushEnv, computed together; an episode that ended begins again at the next step.
 
-    Slider k of `reset(seed=s)` behaves exactly as a PushEnv with the seed s + k. The other arguments are those of
-    PushEnv. Raises RequestError, and ModelFileError for a file.
+    Slider k of `reset(seed=s)` behaves exactly as a PushEnv with the seed s + k. The other arguments are PushEnv's.
     """
 
     metadata = {**PushEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -97,20 +89,16 @@ class PushVectorEnv(VectorEnv[Array, Array, Array]):
     def __init__(
         self,
         num_envs: int = 1,
-        model: AnyModel = SHIPPED,
-        goal: AnyGoal = (0.0, 0.0, 0.0),
-        obstacles: Sequence[Array] = (),
-        table: Array | None = None,
-        start: Sequence[float] | Array | None = None,
         max_episode_steps: int = MOST_STEPS,
         render_mode: str | None = None,
+        **arguments: Any,
     ) -> None:
         for name, value in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
             if value < 1:
                 raise RequestError(name, value, "a number above 0")
-        task = push_task(model, goal, obstacles, table, start)
+        task = push_task(**arguments)
         window = task.model.model.input_limits.velocity[1] * task.model.model.usual_duration
-        far = np.hypot(*np.ptp(task.scene.table.vertices, axis=0)) + 2.0 * window  # about a window beyond the table
+        far = np.hypot(*np.ptp(task.scene.table.vertices, axis=0)) + 2.0 * window  # a window beyond the table, at most
         high = np.array([far, far, 1.0, 1.0], dtype=np.float32)
         self.single_action_space, self.single_observation_space = Box(-1.0, 1.0, (3,)), Box(-high, high)
         self.action_space = batch_space(self.single_action_space, num_envs)

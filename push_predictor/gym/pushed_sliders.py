@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.geometry.touch import displaced
-from push_predictor.gym.task import PushTask
+from push_predictor.gym.task import FLAGS, PushTask
 from push_predictor.planning.particles import sampled_displacements
 from push_predictor.planning.persistence import persistence_of
 from push_predictor.planning.push_windows import windows_of
@@ -34,7 +34,7 @@ class PushedSliders:
     def __init__(self, task: PushTask, count: int) -> None:
         self.task = task
         self.poses, self.before, self.inputs = np.full((3, count, 3), np.nan)
-        self.flags = {name: np.zeros(count, dtype=np.bool_) for name in (*task.ends(self.poses), "in_domain")}
+        self.flags = {name: np.zeros(count, dtype=np.bool_) for name in FLAGS}
         self.generators: list[np.random.Generator | None] = [None] * count
         self._drawn, self._used = np.empty((count, BLOCK, 3, 3)), np.full(count, BLOCK)
         self._persistent, self._decaying = np.zeros((2, count, 3))  # standard deviates of the pushes
@@ -67,7 +67,7 @@ class PushedSliders:
         contact = start_drive(rig.outline, rig.pusher_radius, before, inputs)[1]
         deviates = self._deviates(rows, inputs)
         moved, known = sampled_displacements(task.model, before, contact, self._windows, deviates)
-        finite = np.isfinite(moved).all(axis=1)
+        finite = np.isfinite(moved.sum(axis=1))
         after = displaced(before, contact.touch.heading, np.where(finite[:, None], moved, 0.0))
         self.poses[rows], self.before[rows], self.inputs[rows] = after, before, inputs
         ends = task.ends(after)
@@ -79,7 +79,7 @@ class PushedSliders:
         """Standard deviates (k, 3) of the next windows: of new pushes, or correlated with those of their pushes."""
         fresh, change, persistent = self._normals(rows).transpose(1, 0, 2)
         new = ~self._goes_on(self.inputs[rows], inputs)[:, None]
-        travelled = np.nan_to_num(self.inputs[rows, 0]) * self._windows.duration
+        travelled = self.inputs[rows, 0] * self._windows.duration
         decayed = self._persistence.decayed(self._decaying[rows], travelled, change)
         self._decaying[rows] = decaying = np.where(new, change, decayed)
         self._persistent[rows] = persistent = np.where(new, persistent, self._persistent[rows])
@@ -97,4 +97,4 @@ class PushedSliders:
             self.generators[row].standard_normal(out=self._drawn[row])
             self._used[row] = 0
         self._used[rows] += 1
-        return self._drawn[rows, self._used[rows] - 1]
+        return np.asarray(self._drawn[rows, self._used[rows] - 1])

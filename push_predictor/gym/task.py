@@ -24,10 +24,10 @@ from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
 from push_predictor.types import Array, BoolArray
 
 AnyModel = TabulatedModel | PushModel | str | os.PathLike[str]
-AnyGoal = Goal | Sequence[float] | Array
 DISTANCE, TURN = 0.005, 0.1  # m, rad: tolerances of a goal that is given as a pose
 TABLE = 0.25 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # m, unless a table is given
 BONUS = 10.0  # for reaching the goal
+FLAGS = ("is_success", "touches", "off_table", "in_domain")  # of a window
 MOST_DRAWS = 1000  # of a start that is safe
 
 
@@ -91,12 +91,12 @@ class PushTask:
 
     def free(self, sliders: Array) -> BoolArray:
         """Whether no episode ends at sliders (n, 3), (n,)."""
-        return ~np.any(list(self.ends(sliders).values()), axis=0)
+        return np.asarray(~np.any(list(self.ends(sliders).values()), axis=0))
 
 
 def push_task(
-    model: AnyModel,
-    goal: AnyGoal,
+    model: AnyModel = SHIPPED,
+    goal: Goal | Sequence[float] | Array = (0.0, 0.0, 0.0),
     obstacles: Sequence[Array] = (),
     table: Array | None = None,
     start: Sequence[float] | Array | None = None,

@@ -33,7 +33,7 @@ from push_predictor.planning.persistence import persistence_of, root_of
 from push_predictor.recordings.table import empty_table
 from push_predictor.types import Array
 
-SHIPPED = push_task("default", [0.0, 0.0, 0.0]).model
+SHIPPED = push_task().model
 START = np.array([-0.12, 0.03, 0.4])
 FORWARD = np.array([-0.8, 0.1, 0.5])  # an action: pushes at 0.4 of the first side
 BLOCK = np.array([[0.0, -0.2], [0.05, -0.2], [0.05, 0.2], [0.0, 0.2]])
