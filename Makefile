@@ -82,7 +82,7 @@ $(VENV)/.dependencies: $(VENV)/.python setup.py push_predictor_paper/setup.py sc
 	touch $@
 
 $(VENV)/.tools: $(VENV)/.dependencies
-	$(BIN)/pip install -qq --no-compile '.[import,test]'
+	$(BIN)/pip install -qq --no-compile '.[gym,import,test]'
 	touch $@
 
 # Four workers that import everything at once would each compile it: half a minute of two cores. Once, beside mypy;

@@ -118,6 +118,7 @@ setup(
         "live": ["rich>=13"],
         "completion": ["argcomplete>=3"],
         "parquet": ["pyarrow>=14"],
+        "gym": ["gymnasium>=1.1"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [

@@ -13,4 +13,5 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.int64]
+ByteArray: TypeAlias = NDArray[np.uint8]
 TextArray: TypeAlias = NDArray[np.str_]

@@ -12,18 +12,18 @@ import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benchmarks.planning.risk import SEED, STRIDE, WINDOW, plan, repertoires, trained
 from benchmarks.planning.risk_table import VARIANTS
 from benchmarks.planning.risk_tasks import TASKS, Problem, problem
-from push_predictor.geometry.frames import to_world
 from push_predictor.models.store.model_file import load_model
 from push_predictor.planning.obstacles.around_obstacles import PlannedPushes
 from push_predictor.planning.obstacles.targets import PoseTarget
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, draw, outside_legend
+from push_predictor.reporting.slider_picture import GOAL_COLOUR, OBSTACLE_COLOUR, paint_outline
 from push_predictor.simulation.interactive_rig import push_motion
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
@@ -38,7 +38,6 @@ TASK = TASKS[2]
 RUNS = 40
 CLOUD = 200  # samples shown
 SPREAD = 1e-6  # m, rad; below it a plan was made without uncertainty
-GOAL_COLOUR, WALL_COLOUR = "#009E73", "#8a8a8a"
 SHOWN = (-0.19, 0.19, -0.13, 0.13)  # m
 
 
@@ -109,7 +108,7 @@ def _paint(figure: Figure, shown: Problem, pair: list[Repeats]) -> None:
 
 def _scene(axes: Axes, shown: Problem) -> None:
     for obstacle in shown.scene.obstacles:
-        axes.fill(*(1e3 * obstacle.vertices.T), color=WALL_COLOUR)
+        axes.fill(*(1e3 * obstacle.vertices.T), color=OBSTACLE_COLOUR)
     if isinstance(shown.target, PoseTarget):
         circle = np.linspace(0.0, 2.0 * np.pi, 80)
         ring = shown.target.goal.distance * np.column_stack([np.cos(circle), np.sin(circle)])
@@ -120,12 +119,16 @@ def _scene(axes: Axes, shown: Problem) -> None:
 
 
 def _plan(axes: Axes, shown: Problem, repeats: Repeats) -> None:
-    vertices = shown.scene.outline.vertices
-    _outline(axes, vertices, repeats.plan.poses[0], color="black", linewidth=1.4, label="start")
+    paint_outline(axes, shown.scene.outline, repeats.plan.poses[0], color="black", linewidth=1.4, label="start")
     for pose in repeats.plan.poses[1:-1]:
-        _outline(axes, vertices, pose, color=PREDICTED, linewidth=0.7, alpha=0.4)
-    _outline(
-        axes, vertices, repeats.plan.poses[-1], color=PREDICTED, linewidth=1.2, label="planned: slider after each push"
+        paint_outline(axes, shown.scene.outline, pose, color=PREDICTED, linewidth=0.7, alpha=0.4)
+    paint_outline(
+        axes,
+        shown.scene.outline,
+        repeats.plan.poses[-1],
+        color=PREDICTED,
+        linewidth=1.2,
+        label="planned: slider after each push",
     )
     if repeats.plan.samples[-1].std() > SPREAD:
         cloud = 1e3 * repeats.plan.samples[-1][:CLOUD, :2].T
@@ -140,11 +143,6 @@ def _plan(axes: Axes, shown: Problem, repeats: Repeats) -> None:
             markersize=6,
             label="simulated: the next push hits the wall",
         )
-
-
-def _outline(axes: Axes, vertices: Array, pose: Array, **style: Any) -> None:
-    corners = to_world(np.vstack([vertices, vertices[:1]]), pose)
-    axes.plot(*(1e3 * corners.T), **style)
 
 
 if __name__ == "__main__":

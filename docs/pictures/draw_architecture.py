@@ -26,6 +26,7 @@ ROWS = (
         ("benchmarks, examples", "figures and demos", OUTSIDE, 2),
     ),
     (
+        ("gym", "Gymnasium\nenvironment", LIBRARY, 1.1),
         ("api, commands", "Python interface, command line", LIBRARY, 2),
         ("nodes", "predict_server, push_replay,\npush_recorder, push_validator", ROS, 2.6),
         ("msg_adapters", "ROS messages ↔ arrays", ROS, 1.6),

@@ -67,7 +67,7 @@ def push_particles(
             check_cancelled()
         if window:
             contact = drive.contact_at(sliders, contact, window * windows.duration, windows.duration)
-        moved, known = _displacements(predictor, sliders, contact, windows, deviations.next(), covariates)
+        moved, known = sampled_displacements(predictor, sliders, contact, windows, deviations.next(), covariates)
         sliders, in_domain = displaced(sliders, contact.touch.heading, moved), in_domain & known
     return PushedSamples(sliders, contact.in_contact, in_domain)
 
@@ -77,15 +77,18 @@ def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
     return predictor.model if isinstance(predictor, TabulatedModel) else predictor
 
 
-def _displacements(
+def sampled_displacements(
     predictor: PushModel | TabulatedModel,
     sliders: Array,
     contact: TipContact,
     windows: PushWindows,
     deviation: Array,
-    given: Mapping[str, float],
+    given: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Array, BoolArray]:
-    """Displacements (p, 3) in the push frame for standard deviates (p, 3), and which are in the domain."""
+    """Displacements (p, 3) of a window in the push frame for standard deviates (p, 3); which are in the domain.
+
+    given: the covariates that the poses do not give, see push_particles.
+    """
     moved, known = np.zeros((len(sliders), 3)), np.ones(len(sliders), dtype=np.bool_)
     in_contact = np.flatnonzero(contact.in_contact)
     if not len(in_contact):
@@ -111,14 +114,12 @@ class Deviations:
     """Standard normal deviates (p, 3) per window, correlated along the push; step (p,): m of the tip's path."""
 
     def __init__(self, persistence: Persistence, step: Array, rng: np.random.Generator) -> None:
-        self._parts = persistence.persistent, persistence.decaying, 1.0 - persistence.persistent - persistence.decaying
-        self._keeps, self._rng = np.exp(-step[:, None] / persistence.decay_length), rng
+        self._persistence, self._step, self._rng = persistence, step, rng
         self._persistent, self._decaying = rng.standard_normal((2, len(step), 3))
 
     def next(self) -> Array:
         """Draw the deviates of the next window; the first call draws those of the first window."""
-        persistent, decaying, new = (np.sqrt(np.maximum(part, 0.0)) for part in self._parts)
         fresh, change = self._rng.standard_normal((2, *self._persistent.shape))
-        deviation = persistent * self._persistent + decaying * self._decaying + new * fresh
-        self._decaying = self._keeps * self._decaying + np.sqrt(1.0 - self._keeps**2) * change
-        return np.asarray(deviation)
+        deviation = self._persistence.deviates(self._persistent, self._decaying, fresh)
+        self._decaying = self._persistence.decayed(self._decaying, self._step, change)
+        return deviation

@@ -45,6 +45,17 @@ class Persistence:
         """Correlation (n, 3) of standardised residuals at a distance (n,) > 0 m along the tip's path."""
         return np.asarray(self.persistent + self.decaying * np.exp(-distance[:, None] / self.decay_length))
 
+    def deviates(self, persistent: Array, decaying: Array, fresh: Array) -> Array:
+        """Standard normal deviates (n, 3) of a window from those of its push, of its place, and its own (n, 3 each)."""
+        parts = self.persistent, self.decaying, 1.0 - self.persistent - self.decaying
+        shares = [np.sqrt(np.maximum(part, 0.0)) for part in parts]
+        return np.asarray(shares[0] * persistent + shares[1] * decaying + shares[2] * fresh)
+
+    def decayed(self, decaying: Array, distance: Array, change: Array) -> Array:
+        """The decaying deviates (n, 3) at a distance (n,) m along the tip's path; change (n, 3): new deviates."""
+        keeps = np.exp(-distance[:, None] / self.decay_length)
+        return np.asarray(keeps * decaying + np.sqrt(1.0 - keeps**2) * change)
+
 
 INDEPENDENT = Persistence(np.zeros(3), np.zeros(3), np.ones(3))
 
@@ -84,12 +95,28 @@ def whitened_residuals(model: PushModel) -> Array:
 def root_of(covariance: Array) -> Array:
     """Roots R (n, 3, 3) of covariances (n, 3, 3) with R R' = covariance, independent of the outputs' units.
 
-    R is the standard deviations times the symmetric root of the correlation.
+    R is the standard deviations times the symmetric root U of the correlation C. With the invariants i of U,
+    (i1 i2 - i3) U = (i1^2 - i2) C - C^2 + i1 i3 I. Source: Hoger and Carlson, Quart. Appl. Math. 42, 1984.
     """
-    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(covariance / (sd[:, :, None] * sd[:, None, :]))
-    roots = np.sqrt(np.maximum(values, 0.0))  # rounding may give negative values
-    return np.asarray(sd[:, :, None] * ((vectors * roots[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
+    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    above = np.maximum(sd, np.sqrt(np.finfo(float).tiny))
+    correlation = covariance / (above[:, :, None] * above[:, None, :])
+    one, two, three = np.sqrt(_eigenvalues(*correlation[:, [0, 0, 1], [1, 2, 2]].T))
+    first, second = one + two + three, one * two + one * three + two * three
+    of_correlation, of_identity = (first**2 - second)[:, None, None], (first * one * two * three)[:, None, None]
+    scaled = of_correlation * correlation - correlation @ correlation + of_identity * np.eye(3)
+    return np.asarray((sd / ((one + two) * (one + three) * (two + three))[:, None])[:, :, None] * scaled)
+
+
+def _eigenvalues(r12: Array, r13: Array, r23: Array) -> Array:
+    """Eigenvalues (3, n) of correlation matrices. Source: Smith, Communications of the ACM 4, 1961.
+
+    None is below the rounding error, so that a singular matrix has a root too, accurate to 1e-5.
+    """
+    size = np.sqrt((r12**2 + r13**2 + r23**2) / 3.0)
+    cosine = r12 * r13 * r23 / np.maximum(size**3, np.finfo(float).tiny)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0 + np.array([[0.0], [2.0], [4.0]]) * np.pi / 3.0
+    return np.asarray(np.maximum(1.0 + 2.0 * size * np.cos(angle), np.finfo(float).eps))
 
 
 def _distance_between(table: PushTable, first: IntArray, second: IntArray) -> Array:

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,11 @@ import numpy as np
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.types import ByteArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
@@ -67,24 +70,41 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
 
     Raises PushPredictorError if matplotlib is not installed.
     """
+    image = io.BytesIO()
+    with _painted(path.name, size, paint) as canvas:
+        canvas.print_png(image, pil_kwargs={"compress_level": COMPRESSION})
+    write_whole(path, image.getvalue())
+    return path
+
+
+def pixels(name: str, size: tuple[float, float], paint: Callable[[Figure], None]) -> ByteArray:
+    """Paint a figure of that size (inches) and return its pixels (height, width, 3), uint8.
+
+    name: of the picture in the PushPredictorError that is raised if matplotlib is not installed.
+    """
+    with _painted(name, size, paint) as canvas:
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+@contextmanager
+def _painted(name: str, size: tuple[float, float], paint: Callable[[Figure], None]) -> Iterator[FigureCanvasAgg]:
+    """A painted figure with its style."""
     try:
         from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise PushPredictorError(
-            f"{path.name}: pictures need matplotlib ({error}); pip install 'push_predictor[report]'"
+            f"{name}: pictures need matplotlib ({error}); pip install 'push_predictor[report]'"
         ) from None
-    image = io.BytesIO()
     with rc_context(STYLE):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         paint(figure)
         _place_empty_labels(figure)
         _lay_out(figure)
-        canvas.print_png(image, pil_kwargs={"compress_level": COMPRESSION})
-    write_whole(path, image.getvalue())
-    return path
+        yield canvas
 
 
 def _place_empty_labels(figure: Figure) -> None:

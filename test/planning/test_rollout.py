@@ -108,6 +108,24 @@ def test_rollout_of_one_window_equals_the_prediction() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.03)
 
 
+@pytest.mark.parametrize(("correlation", "accuracy"), [
+    (np.eye(3), 1e-15),
+    (CORRELATED, 1e-13),
+    ([[1.0, -0.9, 0.0], [-0.9, 1.0, 0.3], [0.0, 0.3, 1.0]], 1e-13),
+    ([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1e-7),  # singular
+    ([[1.0, 1.0, -1.0], [1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]], 1e-7),
+    (np.diag([1.0, 0.0, 1.0]), 1e-15),  # an output without noise
+    (CERTAIN, 0.0),
+])  # fmt: skip
+def test_covariance_root_is_that_of_an_eigendecomposition(correlation: Array, accuracy: float) -> None:
+    correlation = np.asarray(correlation)
+    values, vectors = np.linalg.eigh(correlation)
+    expected = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    found = root_of(np.array([SD[:, None] * correlation * SD, correlation]))
+    np.testing.assert_allclose(found, [SD[:, None] * expected, expected], rtol=0.0, atol=accuracy)
+    np.testing.assert_allclose(found[0] / SD[:, None], expected, rtol=0.0, atol=accuracy)
+
+
 def test_covariance_root_is_independent_of_units() -> None:
     covariance, units = np.diag(SD) @ CORRELATED @ np.diag(SD), np.diag([1e3, 1e3, 180.0 / np.pi])
     root = root_of(covariance[None])[0]
