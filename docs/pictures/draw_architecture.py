@@ -32,7 +32,7 @@ ROWS = (
         ("msg_adapters", "ROS messages ↔ arrays", ROS, 1.6),
     ),
     (
-        ("online", "windows, scores and alarm of a live run", LIBRARY, 2),
+        ("online", "scores and alarm of a live run", LIBRARY, 2),
         ("residuals", "trace: from residual to effect", LIBRARY, 2),
         ("replay", "player without ROS", LIBRARY, 1.2),
         ("simulation", "rig simulator", LIBRARY, 1.2),
