@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from push_predictor.adaptation.adaptation import Adaptation
     from push_predictor.api import Validation, choose_push, find_windows, trace, train, validate
     from push_predictor.design.batch import suggest_pushes
     from push_predictor.design.limits import Limits
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from push_predictor.recordings.topics import Topics
 
 _PLACES = {
+    "Adaptation": "adaptation.adaptation",
     "DataWarning": "errors",
     "Goal": "planning.goal",
     "Limits": "design.limits",
@@ -51,6 +53,7 @@ _PLACES = {
 }
 
 __all__ = [
+    "Adaptation",
     "DataWarning",
     "Goal",
     "Limits",
