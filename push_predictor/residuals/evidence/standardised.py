@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import whitener_of
 from push_predictor.models.effects.effect import Effect, generic_responses
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import mechanism_named
@@ -130,11 +131,6 @@ def digest_of(table: PushTable) -> str:
     for column in (table.inputs, table.duration, table.outcomes):
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()
-
-
-def whitener_of(covariance: Array) -> Array:
-    """L^-1 (n, 3, 3) of covariances (n, 3, 3) = L L'."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:

@@ -16,6 +16,7 @@ from typing import get_args
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import whitener_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push_model import PushModel
@@ -25,7 +26,7 @@ from push_predictor.residuals.evidence.input_shift import among
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
-from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, whitened_response, whitener_of
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, whitened_response
 from push_predictor.residuals.selection.screening import TINY, Columns, Scores, Screened, screen
 from push_predictor.types import Array, IntArray
 
