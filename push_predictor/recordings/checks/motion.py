@@ -154,9 +154,8 @@ def sums_by_push(values: Array, push: IntArray) -> Array:
     return np.column_stack([np.bincount(number, column) for column in values.T])
 
 
-def contact_fit(recording: Recording, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
+def contact_fit(motion: Motion | None, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
     """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
-    motion = motion_of(recording, rig)
     if motion is None or not motion.contact.any():
         return None
     touch = motion.contact
