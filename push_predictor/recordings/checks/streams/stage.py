@@ -19,7 +19,7 @@ from push_predictor.recordings.checks.frames.orientation import has_heading
 from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.streams.flips import without_flips
 from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
-from push_predictor.recordings.checks.streams.quality import quality_findings
+from push_predictor.recordings.checks.streams.quality import UNSEEN, quality_findings
 from push_predictor.recordings.checks.streams.session import in_order, of_one_body, repeated_samples
 from push_predictor.recordings.checks.streams.stamp_noise import regular_in_bursts, stamp_findings
 from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, stamps_of, unset_stamps
@@ -27,7 +27,6 @@ from push_predictor.recordings.checks.units import stream_rates, stream_units
 from push_predictor.recordings.streams import Recording, taken
 from push_predictor.recordings.windows.repairs.continued import continued
 
-CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
 FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that has facts
 
@@ -69,7 +68,7 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
             f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
         )
         values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
-        found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
+        found.append(Finding(f"continued_poses_{name}", "warning", sentence, UNSEEN, values))
         sound[name] = taken(stream, ~lost)
     return found, replace(recording, **sound) if sound else recording
 
