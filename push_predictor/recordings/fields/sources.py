@@ -29,7 +29,7 @@ from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
 from push_predictor.recordings.fields.elements import names as element_names
 from push_predictor.recordings.fields.elements import places
-from push_predictor.recordings.fields.pose_numbers import pose_rows_of
+from push_predictor.recordings.fields.pose_rows import pose_rows_of
 from push_predictor.types import Array, BoolArray, IntArray
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
