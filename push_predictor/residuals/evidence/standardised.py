@@ -112,17 +112,13 @@ def push_order(table: PushTable) -> IntArray:
 
 def blocks_of(table: PushTable) -> IntArray:
     """Block number (n,): up to BLOCK neighbouring pushes share one; single pushes where there are few."""
-    order = push_order(table)
-    count = int(order.max()) + 1 if len(order) else 0
-    return np.asarray(order // max(1, min(BLOCK, count // FEWEST_BLOCKS)))
+    return np.asarray(push_order(table) // max(1, min(BLOCK, len(table.pushes) // FEWEST_BLOCKS)))
 
 
 def held_out_rows(table: PushTable) -> BoolArray:
     """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session."""
-    order = push_order(table)
-    count = int(order.max()) + 1 if len(order) else 0
-    block = max(1, min(HELD_OUT_BLOCK, count // FEWEST_HELD_OUT))
-    return np.asarray((order // block) % EVERY == EVERY - 1)
+    block = max(1, min(HELD_OUT_BLOCK, len(table.pushes) // FEWEST_HELD_OUT))
+    return np.asarray((push_order(table) // block) % EVERY == EVERY - 1)
 
 
 def digest_of(table: PushTable) -> str:
