@@ -11,19 +11,18 @@ docs/how_to/visualisation.md describes what RViz2 displays.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
+from push_predictor.nodes.launch_files import SWITCH, TOPICS, description, end_launch, is_true, stream_arguments
+from push_predictor.nodes.parameter_tables import PUSH_REPLAY, PUSH_VALIDATOR
+from push_predictor.nodes.parameters import Param
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
-FRAMES = ("wrench_frame", "world_frame", "stamp", "up")
-TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
 CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
     "reliability": ("", "reliable", "best_effort")
 }
@@ -41,14 +40,7 @@ ARGUMENTS = (
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
     ("output", "", "Folder for the validator's results. Empty: nothing is written."),
     ("rig", "", "push_rig YAML file, for a recording without a push_rig record."),
-    ("slider_topic", "", "The slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. Empty: slider/pose."),
-    ("pusher_topic", "", "The pose of the pusher's tip, in the same manner. Empty: pusher/pose."),
-    ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
-    ("wrench_frame", "", "Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: world."),
-    ("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
-    ("world_frame", "", "Frame of all poses; tf turns others into it. Empty: world; others are rejected."),
-    ("stamp", "", "Time of a sample: header, or log for that of its receipt. Empty: header."),
-    ("up", "", "Axis of the poses' world that points up: x, y, z, -x, -y or -z; of one stream slider=y. Empty: z."),
+    *stream_arguments(PUSH_VALIDATOR),
     ("covariate_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
     ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
@@ -58,18 +50,7 @@ ARGUMENTS = (
 
 
 def generate_launch_description() -> LaunchDescription:
-    declared = [
-        DeclareLaunchArgument(name, default_value=value, description=text, choices=CHOICES.get(name))
-        for name, value, text in ARGUMENTS
-    ]
-    discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    return LaunchDescription(
-        [
-            *declared,
-            SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", discovery),
-            OpaqueFunction(function=_nodes),
-        ]
-    )
+    return description(ARGUMENTS, CHOICES, _nodes)
 
 
 def _nodes(context: LaunchContext) -> list[Node]:
@@ -100,14 +81,13 @@ def _validator(given: dict[str, str]) -> dict[str, Any]:
     if given["model"] == SHIPPED:
         paths["model"] = Path(DEFAULT_MODEL[-1]).stem  # its name at predict_server
     scalars = [topic.strip() for topic in given["covariate_topics"].split(",") if topic.strip()]
-    bias = {"wrench_bias": given["wrench_bias"]} if given["wrench_bias"] else {}
-    found: dict[str, Any] = {**paths, **_streams(given), **bias, **_qos(given)}
+    found: dict[str, Any] = {**paths, **_streams(given, PUSH_VALIDATOR), **_qos(given)}
     return {**found, "covariate_topics": scalars} if scalars else found
 
 
-def _streams(given: dict[str, str]) -> dict[str, str]:
-    """Where the streams of pushes are, as far as it was given."""
-    return {name: given[name] for name in (*TOPICS, *FRAMES) if given[name]}
+def _streams(given: dict[str, str], node: Sequence[Param]) -> dict[str, str]:
+    """Where the streams of pushes are, as far as it was given and the node has such parameters."""
+    return {name: given[name] for name, _, _ in stream_arguments(node) if given[name]}
 
 
 def _qos(given: dict[str, str]) -> dict[str, str]:
@@ -126,7 +106,7 @@ def _full_name(namespace: str, topic: str) -> str:
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
-    return {**rig, **rate, **_streams(given), "recording": _path(recording)}
+    return {**rig, **rate, **_streams(given, PUSH_REPLAY), "recording": _path(recording)}
 
 
 def _replay_defaults(given: dict[str, str]) -> dict[str, float]:

@@ -13,13 +13,12 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from push_predictor.nodes.launch_exit import SWITCH, end_launch, is_true
+from push_predictor.nodes.launch_files import STREAMS, SWITCH, description, end_launch, is_true, stream_arguments
+from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 
-TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame", "stamp", "up")
 PATHS = ("bag", "rig")
 SWITCHES = ("force", "use_sim_time")
 # --8<-- [start:documented]
@@ -36,14 +35,7 @@ ARGUMENTS = (
     ("bag", "", "Bag to write: a folder, or FILE.mcap."),
     ("force", "false", "Replace a bag that exists."),
     ("rig", "", "push_rig YAML file to record. Empty: the record on topic rig."),
-    ("slider_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the slider's pose. Empty: slider/pose."),
-    ("pusher_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the tip's pose. Empty: pusher/pose."),
-    ("wrench_topic", "", "TOPIC or TOPIC.FIELD of the wrench. Empty: pusher/wrench, if it is published."),
-    ("wrench_frame", "", "Axes of the wrench, saved for its readers: world, tip or a frame of tf."),
-    ("wrench_bias", "", "What readers do with the sensor's bias and weight: free_motion or none."),
-    ("world_frame", "", "Frame of all poses, saved for their readers, which turn others into it by tf."),
-    ("stamp", "", "Time of a sample, saved for its readers: header, or log for that of its receipt."),
-    ("up", "", "Axis of the poses' world that points up, saved for its readers: x, y, z, -x, -y or -z; slider=y."),
+    *stream_arguments(PUSH_RECORDER),
     ("covariate_topics", "", "Further topics to record, separated by commas."),
     ("duration", "", "Seconds after the first message at which the node ends. Empty: at Ctrl-C."),
 )
@@ -51,18 +43,7 @@ ARGUMENTS = (
 
 
 def generate_launch_description() -> LaunchDescription:
-    declared = [
-        DeclareLaunchArgument(name, default_value=value, description=text, choices=SWITCH if name in SWITCHES else None)
-        for name, value, text in ARGUMENTS
-    ]
-    discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    return LaunchDescription(
-        [
-            *declared,
-            SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", discovery),
-            OpaqueFunction(function=_nodes),
-        ]
-    )
+    return description(ARGUMENTS, dict.fromkeys(SWITCHES, SWITCH), _nodes)
 
 
 def _nodes(context: LaunchContext) -> list[Node]:
@@ -85,7 +66,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 def _parameters(given: dict[str, str]) -> dict[str, Any]:
     """The arguments that were given: others keep the value of params_file."""
-    found: dict[str, Any] = {name: given[name] for name in TEXTS if given[name]}
+    found: dict[str, Any] = {name: given[name] for name in STREAMS if given[name]}
     found |= {name: os.path.abspath(os.path.expanduser(given[name])) for name in PATHS if given[name]}
     found |= {name: True for name in SWITCHES if is_true(given[name])}
     if given["covariate_topics"]:

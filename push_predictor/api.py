@@ -23,7 +23,7 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import DataWarning, RequestError
 from push_predictor.evaluation.metrics import metrics_lines
-from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
+from push_predictor.evaluation.offline import remarks, validate_recording
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import LEARNT, PushModel
 from push_predictor.models.train import TrainingOptions, train_model
@@ -33,7 +33,7 @@ from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
 from push_predictor.planning.repertoire import Repertoire
 from push_predictor.recordings.checks.data_checks import DataChecks
-from push_predictor.recordings.load import different_supports, load_data, load_rig_for
+from push_predictor.recordings.load import different_supports, load_data, load_rig_for, required_rig
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.streams import Recording
@@ -148,7 +148,7 @@ def validate(
     """
     path, given = Path(recording), _rig(rig)
     windows, comparison = validate_recording(model, path, given, _warn, topics, DataChecks(strict, _warn))
-    for text in remarks(model, given or recording_rig(path), windows_to_table(windows)):
+    for text in remarks(model, given or required_rig(path), windows_to_table(windows)):
         _warn(text)
     return Validation(windows, comparison)
 

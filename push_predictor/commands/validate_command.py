@@ -61,11 +61,12 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.alarm.scores import recording_alarm
     from push_predictor.evaluation.judgement import judged
     from push_predictor.evaluation.metrics import metrics_lines
-    from push_predictor.evaluation.offline import recording_rig, remarks, validate_recording
+    from push_predictor.evaluation.offline import remarks, validate_recording
     from push_predictor.evaluation.report.summary import opening_sentences
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
     from push_predictor.online.live_validation import write_window_log
+    from push_predictor.recordings.load import required_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows, force=options.force)
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
     _check_recording(options.recording)
     model = load_model(options.model)
     reading = Reading(options)
-    rig = reading.rig or recording_rig(options.recording)
+    rig = reading.rig or required_rig(options.recording)
     with progress("validate") as watch:
         watch("windows and predictions", 0.0)
         judging = part_of(watch, BEFORE_ALARM, BEFORE_ADAPTING if options.adapt else 1.0)

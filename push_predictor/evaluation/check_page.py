@@ -322,8 +322,8 @@ def contact_sentence(fit: ContactFit) -> str:
 
 def coverage_sentence(coverage: Coverage) -> str:
     """The pushes, with sides, speeds, angles and the share of sliding contacts where they are known."""
-    pushes = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
-    windows = f"{coverage.windows} window{'' if coverage.windows == 1 else 's'}"
+    pushes = html.count(coverage.pushes, "push", "pushes")
+    windows = html.count(coverage.windows, "window", "windows")
     counts = coverage.side_counts
     sides = "" if counts is None else f" on {np.count_nonzero(counts)} of {len(counts)} {coverage.side}s"
     slow, fast = (f"{1e3 * speed:.3g}" for speed in coverage.speeds)

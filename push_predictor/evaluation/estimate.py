@@ -13,6 +13,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import PooledScores, PushScores, samples_of
 from push_predictor.types import Array
 
+NORMAL_95 = 1.96  # standard deviations on either side of the mean that cover 95 % of a Gaussian
 Figure = Callable[[PooledScores], Array]  # returns (d,) for d bootstrap samples
 
 

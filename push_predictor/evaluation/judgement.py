@@ -17,6 +17,7 @@ import numpy as np
 
 from push_predictor.evaluation.metrics import nmse_reference
 from push_predictor.recordings.table import OUTPUTS
+from push_predictor.reporting.html import count
 
 LEVEL = 0.95  # of the intervals that are judged
 CLEARLY = 3.0  # standard errors: a share of outcomes by which intervals count as too narrow or too wide
@@ -39,7 +40,7 @@ def judged(metrics: Mapping[str, Any]) -> Judgement:
     n_training_pushes, if it is there: how many of the pushes were used for training.
     """
     alarm, share, pushes = metrics["alarm"], covered(metrics), int(metrics["n_pushes"])
-    outcomes = f"the outcomes of {count_pushes(pushes)}"
+    outcomes = f"the outcomes of {count(pushes, 'push', 'pushes')}"
     covers = f"95 % intervals cover {100.0 * share:.0f} % of {outcomes}"
     evidence = f"{covers}; {'no alarm' if 'off' not in alarm else 'no alarm was computed'}"
     if alarm["fired"]:
@@ -82,8 +83,3 @@ def _worse_than_textbook(metrics: Mapping[str, Any]) -> str:
 def covered(metrics: Mapping[str, Any]) -> float:
     """Share of the outcomes inside their intervals of LEVEL, the mean over the outputs."""
     return float(np.mean([metrics["coverage"][str(LEVEL)][name] for name in OUTPUTS]))
-
-
-def count_pushes(count: int) -> str:
-    """A number of pushes in words."""
-    return "1 push" if count == 1 else f"{count} pushes"

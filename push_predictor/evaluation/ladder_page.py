@@ -100,8 +100,8 @@ def ladder_answer(ladder: ScoredLadder) -> tuple[str, str, str]:
         suffice = "The textbook values suffice: no fitted parameter clearly improves the prediction of held-out pushes."
         return suffice, f"Their NMSE is {first.nmse.text('.3f')}, from {count(ladder)}.", f"Use this model. {score}"
     share = 100.0 * (1.0 - last.nmse.value / first.nmse.value)
-    fitted = "1 fitted parameter reduces" if number == 1 else f"{number} fitted parameters reduce"
-    pushes = "1 push is" if ladder.pushes == 1 else f"{ladder.pushes} pushes are"
+    fitted = html.count(number, "fitted parameter reduces", "fitted parameters reduce")
+    pushes = html.count(ladder.pushes, "push is", "pushes are")
     few = f"Only {pushes} behind the choice. Record at least {FEWEST} and fit again."
     return (
         f"{fitted} the squared error of held-out pushes by {share:.0f} %.",
@@ -155,7 +155,7 @@ def unit(fitted: FittedParameter) -> str:
 
 def count(ladder: ScoredLadder) -> str:
     """The windows of the search in words."""
-    return f"{ladder.windows} windows of {ladder.pushes} {'push' if ladder.pushes == 1 else 'pushes'}"
+    return f"{ladder.windows} windows of {html.count(ladder.pushes, 'push', 'pushes')}"
 
 
 def ladder_json(ladder: ScoredLadder) -> dict[str, Any]:

@@ -54,6 +54,11 @@ def standardised(mean: Array, covariance: Array, outcomes: Array) -> Array:
     return np.asarray(np.linalg.solve(lower, (outcomes - mean)[..., None])[..., 0])
 
 
+def whitener_of(covariance: Array) -> Array:
+    """L^-1 (n, 3, 3) of covariances (n, 3, 3) = L L'."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
 def coverage(mean: Array, variance: Array, outcomes: Array, half_width: Array) -> Array:
     """Share (k,) of outcomes inside central intervals of half_width (k,), in predicted standard deviations."""
     return np.asarray(np.mean(np.abs(outcomes - mean) <= half_width * np.sqrt(variance), axis=0))

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.errors import RecordingError, RigError
+from push_predictor.errors import RecordingError
 from push_predictor.evaluation.alarm.scores import recording_alarm
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_pushes
 from push_predictor.models.store.table_cache import as_served
 from push_predictor.models.train_mechanics import on_supports
-from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
-from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
+from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -66,13 +65,6 @@ def window_options(model: PushModel) -> WindowOptions:
     if not model.predictor.learnt:
         return WindowOptions()
     return WindowOptions(duration=float(model.training.duration[0]))
-
-
-def recording_rig(path: Path) -> Rig:
-    """The rig of a recording. Raises RigError that states how to give it, RecordingError for an unreadable file."""
-    if (rig := recorded_rig(open_bag(path))) is None:
-        raise RigError(f"{path}: the recording has no {RECORD_NAME} record; {HOW_TO_GIVE}")
-    return rig
 
 
 def rig_difference(model: PushModel, rig: Rig) -> str:

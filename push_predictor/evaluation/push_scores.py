@@ -83,6 +83,12 @@ def samples_of(pushes: TextArray, seed: int = 0) -> Array:
     return push_bootstrap(pushes, seed) if len(pushes) > 1 else np.empty((0, len(pushes)))
 
 
+def push_means(push_id: TextArray, values: Array) -> tuple[list[str], Array]:
+    """The pushes, sorted by name, and the mean (k,) of their windows' values (n,)."""
+    names, push = np.unique(push_id, return_inverse=True)
+    return names.tolist(), np.bincount(push, values) / np.bincount(push)
+
+
 def resampled_means(push_id: TextArray, rows: Array) -> Array:
     """Means (draws, k) of rows (n, k) in bootstrap samples of whole pushes; no draws for fewer than two pushes."""
     pushes, push = np.unique(push_id, return_inverse=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate, by_push, total_nlpd, total_nmse
+from push_predictor.evaluation.estimate import NORMAL_95, Estimate, by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -19,8 +19,6 @@ from push_predictor.models.mechanics.parameters import BY_NAME, MechanicsParamet
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.types import Array
-
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)

@@ -97,9 +97,15 @@ def _load(path: Path, rig: Rig | None, options: WindowOptions, topics: Topics, i
         table = read_table(path)
         inspect(path, table, rig)
         return table
+    recording = load_recording(path, rig, topics, inspect)
+    return windows_to_table(find_windows(recording, require_rig(recording), options))
+
+
+def load_recording(path: Path, rig: Rig | None, topics: Topics, inspect: Inspect) -> Recording:
+    """A recording that was inspected. Raises RecordingError, and RigError without a rig."""
     recording = read_recording(path, rig=rig, topics=topics)
     inspect(path, recording, require_rig(recording))
-    return windows_to_table(find_windows(recording, require_rig(recording), options))
+    return recording
 
 
 def known_rig(path: Path) -> Rig | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +56,16 @@ class WrenchStream:
 
 
 Stream = TypeVar("Stream", PoseStream, WrenchStream)
+Columns = TypeVar("Columns", bound="DataclassInstance")  # of which each field is an array (n,) or None
 
 
-def taken(stream: Stream, rows: Array | IntArray | BoolArray | slice) -> Stream:
-    """The samples of a stream at an index, a mask or a slice."""
+def taken(stream: Columns, rows: Array | IntArray | BoolArray | slice) -> Columns:
+    """The samples of a stream, or of another table of columns, at an index, a mask or a slice."""
     return replace(stream, **{name: of[rows] for name, of in vars(stream).items() if of is not None})
 
 
-def joined(streams: Sequence[Stream]) -> Stream:
-    """One stream of consecutive ones, at least one; what one of them lacks is lacking."""
+def joined(streams: Sequence[Columns]) -> Columns:
+    """One stream or table of consecutive ones, at least one; what one of them lacks is lacking."""
     columns = {name: [getattr(stream, name) for stream in streams] for name in vars(streams[0])}
     whole: dict[str, Any] = {
         name: None if any(part is None for part in parts) else np.concatenate(parts) for name, parts in columns.items()

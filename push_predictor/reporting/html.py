@@ -108,7 +108,7 @@ def folded_table(
     files: addresses of the same table in other formats, by the name of the format.
     """
     first, rest = _first_sentence(caption)
-    summary = f"{first.removesuffix('.')} ({_rows(len(rows))})"
+    summary = f"{first.removesuffix('.')} ({count(len(rows), 'row', 'rows')})"
     return _part("folded_table", summary, table(rest, head, rows), files or {})
 
 
@@ -146,14 +146,15 @@ def number(value: float | None, digits: int = 4, zeros: bool = False) -> str:
     return text.replace("-", "−")
 
 
+def count(n: int, one: str, many: str) -> str:
+    """A number of things."""
+    return f"{n} {one if n == 1 else many}"
+
+
 def _first_sentence(text: str) -> tuple[str, str]:
     """The first sentence of a text, and the rest."""
     first, *rest = SENTENCE_END.split(text, maxsplit=1)
     return first, "".join(rest)
-
-
-def _rows(count: int) -> str:
-    return "1 row" if count == 1 else f"{count} rows"
 
 
 def _cells(head: Sequence[str], row: Sequence[str]) -> list[tuple[str, str, str]]:

@@ -14,7 +14,7 @@ import pytest
 from fake_launch import FakeAction, actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from repository import REPOSITORY
 
-from push_predictor.nodes.launch_exit import end_launch
+from push_predictor.nodes.launch_files import end_launch
 from push_predictor.nodes.parameter_tables import PUSH_VALIDATOR
 
 MAIN = REPOSITORY / "launch" / "push_predictor.launch.py"

@@ -13,7 +13,7 @@ import pytest
 from mistakes import outline_scaled, stream_part
 from repository import REPOSITORY
 
-from push_predictor.recordings.checks.motion import ContactFit, contact_fit
+from push_predictor.recordings.checks.motion import ContactFit, contact_fit, motion_of
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
@@ -29,7 +29,7 @@ def hexagon() -> Recording:
 
 
 def fit_of(recording: Recording, rig: Rig) -> ContactFit:
-    fit = contact_fit(recording, rig)
+    fit = contact_fit(motion_of(recording, rig), rig)
     assert fit is not None
     return fit
 
@@ -72,14 +72,15 @@ def test_the_time_in_contact_is_that_of_the_samples_without_dropouts() -> None:
 def test_windows_use_the_time_in_contact_but_for_the_ends_of_pushes() -> None:
     rig = require_rig(hexagon())
     table = windows_to_table(find_windows(hexagon(), rig))
-    fit = contact_fit(hexagon(), rig, table)
+    fit = contact_fit(motion_of(hexagon(), rig), rig, table)
     assert fit is not None and fit.window_time == pytest.approx(0.2 * len(table)) and fit.lost is not None
     assert 0.0 < fit.lost < 0.2 * len(table.pushes) / fit.contact_time
-    half = contact_fit(hexagon(), rig, table.take(np.arange(len(table)) < len(table) // 2))
+    half = contact_fit(motion_of(hexagon(), rig), rig, table.take(np.arange(len(table)) < len(table) // 2))
     assert half is not None and half.lost == pytest.approx(0.5 + 0.5 * fit.lost, abs=0.02)
 
 
 def test_a_recording_without_contact_has_no_fit() -> None:
     slider = hexagon().slider
     still = replace(slider, x=0.0 * slider.x, y=0.0 * slider.y, heading=0.0 * slider.x)
-    assert contact_fit(replace(hexagon(), slider=still), require_rig(hexagon())) is None
+    rig = require_rig(hexagon())
+    assert contact_fit(motion_of(replace(hexagon(), slider=still), rig), rig) is None

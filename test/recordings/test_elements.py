@@ -18,8 +18,7 @@ from lab_bags import LATENCY, Lab, assign, pose_rows, pose_values, short_recordi
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import parse_definitions, steps_of, type_at
-from push_predictor.recordings.fields.pose_numbers import pose_rows_of
-from push_predictor.recordings.fields.pose_rows import normalised, turned
+from push_predictor.recordings.fields.pose_rows import normalised, pose_rows_of, turned
 from push_predictor.recordings.fields.sources import (
     POSE_TARGET,
     SCALAR_TARGET,

@@ -17,7 +17,6 @@ from synthetic import windows_of
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.contact import SLOWEST
-from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.force_timing import FEWEST, UNSEEN, ForceTiming, force_delay
 
@@ -189,7 +188,7 @@ def touch_of(length: float, late: float, portion: int) -> float:
     samples = samples_at(time, gap, force, speed, way=0.05 * np.clip(after, 0.0, length))
     timing = ForceTiming()
     for begin in range(0, len(time), portion):
-        part = taken_samples(samples, slice(begin, begin + portion))
+        part = taken(samples, slice(begin, begin + portion))
         every = np.ones(len(part), dtype=np.bool_)
         timing.take(part, (part.gap < 0.0005) & (part.time > 1.995), every, lambda _: np.zeros((5, 2)), lambda _: 0.3)
     ((_, delay),) = timing.touches

@@ -17,9 +17,13 @@ from push_predictor.geometry.shapes import ellipse, square
 from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.streams.flips import without_flips
 from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
-from push_predictor.recordings.checks.streams.session import in_order, repeated_samples
-from push_predictor.recordings.checks.streams.stamp_noise import regular_in_bursts, stamp_findings
-from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, unset_stamps
+from push_predictor.recordings.checks.streams.stage import in_order, repeated_samples
+from push_predictor.recordings.checks.streams.stamps import (
+    clocks_never_meet,
+    regular_in_bursts,
+    stamp_findings,
+    unset_stamps,
+)
 from push_predictor.recordings.streams import PoseStream, Recording, taken
 from push_predictor.types import Array, IntArray
 

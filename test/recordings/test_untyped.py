@@ -18,10 +18,10 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_TARGET, WRENCH_TARGET, Source
-from push_predictor.recordings.fields.untyped import candidates, told_type
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.untyped_topics import candidates, told_type
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 KINDS = [*POSE_TARGET.known, *WRENCH_TARGET.known, "tf2_msgs/msg/TFMessage"]

@@ -15,9 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
-from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.streams import PoseStream, Recording, taken
 from push_predictor.recordings.windows.contact import ContactSamples
-from push_predictor.recordings.windows.contact import taken as taken_samples
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.force_zero import TARE_SAMPLES
@@ -187,7 +186,7 @@ def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float, porti
         0.004 * np.arange(len(force)), np.where(pushes, 0.0005, gap), force, np.where(pushes, 0.02, 0.0)
     )
     for begin in range(0, len(force), portion):
-        segmenter.take(taken_samples(samples, slice(begin, begin + portion)))
+        segmenter.take(taken(samples, slice(begin, begin + portion)))
     assert segmenter.push is not None and segmenter.push.tare is not None
     assert segmenter.push.tare == pytest.approx((1.5, 0.0))
 
@@ -225,7 +224,7 @@ def test_segments_do_not_depend_on_the_portions(seed: int) -> None:
     for portion in (1, 13, 500, 4000):
         segmenter, found = PushSegmenter(WindowOptions(duration=0.05)), []
         for begin in range(0, len(samples), portion):
-            found += segmenter.take(taken_samples(samples, slice(begin, begin + portion)))
+            found += segmenter.take(taken(samples, slice(begin, begin + portion)))
         windows = [(start, end, push.push_id, push.dwell, push.tare) for start, end, push in found]
         timing = [(time, str(delay)) for time, delay in segmenter.timing.touches]
         results.append((windows, segmenter.counts, segmenter.touching, segmenter.samples, timing))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from made_up_traces import JUMP, made_up_trace, planted, slippery, trace_of
 
+from push_predictor.evaluation.push_scores import push_means
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.reporting.chart import Bars, Dots
 from push_predictor.residuals.outcome import Trace
@@ -23,8 +24,8 @@ from push_predictor.residuals.reporting.figures.driver_basis import (
     strength_of,
 )
 from push_predictor.residuals.reporting.figures.gallery import effect_figures
-from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, error_charts, means_along, push_means
-from push_predictor.residuals.reporting.sizes import shift_size
+from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, error_charts, means_along
+from push_predictor.residuals.reporting.phrases import shift_size
 
 
 @pytest.fixture

@@ -25,9 +25,8 @@ from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.measurement import CORRECTIONS
 from push_predictor.residuals.outcome import Sized, Trace, best_of, trace_json
 from push_predictor.residuals.reporting.page import role_of, write_trace_report
-from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval
+from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval, shift_size
 from push_predictor.residuals.reporting.sentences import answer, evidence, separating_words, summary_lines, worth
-from push_predictor.residuals.reporting.sizes import shift_size
 
 ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"

@@ -26,7 +26,7 @@ from push_predictor.evaluation.alarm.evidence import (
     alarm_json,
     checked_rate,
 )
-from push_predictor.evaluation.metrics import standardised
+from push_predictor.evaluation.metrics import standardised, whitener_of
 from push_predictor.evaluation.splits import push_folds
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -203,7 +203,7 @@ def _parts(calibration: Calibration, table: PushTable, mean: Array, covariance: 
     size = np.cbrt(np.mean(z**2, axis=1)) - MEAN_SIZE  # nearly normal, so that the number of windows matters little
     side = np.sign(table.inputs[:, 2])
     generic = np.concatenate([np.eye(3)[None] * np.ones((len(z), 1, 1)), np.eye(3)[None] * side[:, None, None]], axis=2)
-    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    whitener = whitener_of(covariance)
     unknown = {name: np.full(len(z), np.nan) for m in calibration.mechanisms for name in m.needs}
     push = Push(table.inputs, table.duration, {**unknown, **table.covariates})
     responses = [mechanism.response(calibration.mechanics, push) for mechanism in calibration.mechanisms]

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.evaluation.judgement import count_pushes, judged
+from push_predictor.evaluation.judgement import judged
 from push_predictor.evaluation.report.figures.calibration import coverage_chart
 from push_predictor.evaluation.report.figures.gallery import (
     Validation,
@@ -105,7 +105,8 @@ def _opening(shown: Validation, metrics: list[dict[str, Any]], alarm: Mapping[st
     main, *others = shown.comparisons
     first, rig = {**metrics[0], "alarm": alarm}, shown.models[0].rig
     sentence, used = training_sentence(shown.models, shown.table)
-    data = f"{first['n_test']} windows of {count_pushes(first['n_pushes'])} (shape {rig.shape} on {rig.surface}). "
+    pushes = html.count(first["n_pushes"], "push", "pushes")
+    data = f"{first['n_test']} windows of {pushes} (shape {rig.shape} on {rig.surface}). "
     about = html.paragraph(f"Model {main.model}. {data}{sentence}", "warning" if used else "")
     if not len(shown.table):
         return [html.opening(NOTHING_FOUND, "no push found"), about]

@@ -20,7 +20,7 @@ from push_predictor.evaluation.report.tables import interval_of, paired_differen
 from push_predictor.evaluation.validation import Comparison, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
-from push_predictor.reporting.html import number
+from push_predictor.reporting.html import count, number
 from push_predictor.types import Array
 
 LEVEL = 0.95
@@ -73,10 +73,10 @@ def comparison_sentence(main: Comparison, other: Comparison) -> str:
 def training_sentence(models: Sequence[PushModel], table: PushTable) -> tuple[str, bool]:
     """How many of the pushes were used for training, and whether any was."""
     used = {model.name: len(trained_on(model, table)) for model in models}
-    pushes = f"{len(table.pushes)} {'push' if len(table.pushes) == 1 else 'pushes'}"
+    pushes = count(len(table.pushes), "push", "pushes")
     if not any(used.values()):
         return "No push was used for training: whole pushes are held out.", False
-    names = ", ".join(f"{count} for {name}" for name, count in used.items() if count)
+    names = ", ".join(f"{n} for {name}" for name, n in used.items() if n)
     return f"Some of these {pushes} were used for training ({names}): the scores of these models are optimistic.", True
 
 

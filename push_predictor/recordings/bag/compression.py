@@ -21,28 +21,18 @@ _AT_ONCE = 1 << 20  # bytes; a message that claims more is decompressed in piece
 _PIECE, _COMPRESSED_PIECE = 1 << 15, 1 << 10  # bytes; small, because data before damage in the same piece are lost
 
 
-def is_compressed(file: Path) -> bool:
-    """Whether a file begins as a zstd frame, whatever its name."""
-    return _start(file, len(FRAME)) == FRAME
-
-
-def start_of(file: Path) -> bytes:
-    """The first bytes of a file, of a compressed one those of its content; none if they cannot be read."""
-    if not is_compressed(file):
-        return _start(file, _START)
+def start_of(file: Path) -> tuple[bytes, bool]:
+    """The first bytes of a file, none if they cannot be read, and whether they are those of a compressed content."""
+    found, compressed = b"", False
     try:
         with file.open("rb") as stream:
-            return zstandard.ZstdDecompressor().stream_reader(stream).read(_START)
+            found = stream.read(_START)
+            if compressed := found.startswith(FRAME):
+                stream.seek(0)
+                found = zstandard.ZstdDecompressor().stream_reader(stream).read(_START)
     except (OSError, zstandard.ZstdError):
-        return b""
-
-
-def _start(file: Path, size: int) -> bytes:
-    try:
-        with file.open("rb") as stream:
-            return stream.read(size)
-    except OSError:
-        return b""
+        return b"", compressed
+    return found, compressed
 
 
 def unpack_file(file: Path, folder: Path, notes: Notes) -> Path:

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.compression import ENDING, is_compressed, start_of, unpack_file
+from push_predictor.recordings.bag.compression import ENDING, start_of, unpack_file
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
 from push_predictor.recordings.bag.mcap_file import McapFile
 from push_predictor.recordings.bag.mcap_records import MAGIC as MCAP
@@ -138,10 +138,10 @@ def open_bag(path: Path) -> Bag:
             return Bag(path, [CsvStreams(path)], described)
         files_needed = "no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
         raise RecordingError(f"{path}: contains {files_needed}{_sheets(path)}")
-    packed = any(map(_packed, files))
+    packed = {file for file in files if file.suffix == ENDING or start_of(file)[1]}
     scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if packed else None
     folder = None if scratch is None else Path(scratch.name)
-    return Bag(path, _opened(files, described, folder), described, scratch)
+    return Bag(path, _opened(files, described, packed, folder), described, scratch)
 
 
 def is_bag_file(path: Path) -> bool:
@@ -155,13 +155,20 @@ def _sheets(folder: Path) -> str:
     return f"; save the sheets of {found[0]} as these CSV files" if found else ""
 
 
-def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[BagFile]:
-    """The readable files. Raises the error of the first file if none is readable."""
+def _opened(files: list[Path], described: BagMetadata, packed: set[Path], scratch: Path | None) -> list[BagFile]:
+    """The readable files; those that are packed are decompressed into the scratch folder.
+
+    Raises the error of the first file if none is readable.
+    """
     opened: list[BagFile] = []
     refused: list[RecordingError] = []
     for file in files:
         try:
-            opened.append(_open(file, described, scratch))
+            if scratch is not None and file in packed:
+                unpacked = unpack_file(file, scratch, described.notes)
+                opened.append(_file(unpacked, name=f"{file}, decompressed,"))
+            else:
+                opened.append(_file(file))
         except RecordingError as error:
             refused.append(error)
     if not opened:
@@ -171,15 +178,9 @@ def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> 
     return opened
 
 
-def _open(file: Path, described: BagMetadata, scratch: Path | None) -> BagFile:
-    if scratch is None or not _packed(file):
-        return _file(file)
-    return _file(unpack_file(file, scratch, described.notes), name=f"{file}, decompressed,")
-
-
 def _file(path: Path, *, name: str = "") -> BagFile:
     """A file of the kind that its first bytes show."""
-    start = start_of(path)
+    start, _ = start_of(path)
     if start.startswith(SQLITE):
         return SqliteFile(path, name=name)
     return Ros1File(path) if start.startswith(ROS1) else McapFile(path, name=name)
@@ -234,12 +235,8 @@ def _ending(file: Path) -> str:
     return Path(file.name.removesuffix(ENDING)).suffix
 
 
-def _packed(file: Path) -> bool:
-    return file.suffix == ENDING or is_compressed(file)
-
-
 def _begins_as_bag(file: Path) -> bool:
-    return start_of(file).startswith((MCAP, SQLITE, ROS1))
+    return start_of(file)[0].startswith((MCAP, SQLITE, ROS1))
 
 
 def _numbered(file: Path) -> list[tuple[str, int]]:

@@ -60,21 +60,20 @@ def checked_recording(recording: Recording) -> CheckedData:
     """Check a recording, and the coverage of its windows if nothing is refused. Raises RigError without a rig."""
     rig = require_rig(recording)
     evidence = evidence_of(recording, rig)
-    found = evidence.findings
-    if any(finding.severity == "refused" for finding in found):
-        return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(recording, rig))
-    used, windows = recording, evidence.windows
+    found, motion = evidence.findings, evidence.motion_as_recorded
+    if evidence.refused:
+        return CheckedData(recording.name, found, None, recording, rig, contacts=contact_fit(motion, rig))
+    windows = evidence.windows
     if windows is None:
         windows = find_windows(recording, rig)
     if any(finding.name in HIDING for finding in found):
-        some, used = windows, replace(recording, wrench=None)
-        windows = find_windows(used, rig)
+        some, windows = windows, find_windows(replace(recording, wrench=None), rig)
         found = _with_hidden(found, _pushes(some), _pushes(windows))
     table = windows_to_table(windows)
     if all(finding.severity == "note" for finding in found):
         found = (*found, *table_signs(table, rig))  # of a circle, contacts do not show the sign of the heading
     coverage = coverage_of(table, rig)
-    fit = contact_fit(used, rig, table)
+    fit = contact_fit(motion, rig, table)
     return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table, fit)
 
 

@@ -46,6 +46,13 @@ class Evidence:
         """The motion of the accepted samples, None if slider and tip have no common time."""
         return motion_of(self.recording, self.rig)
 
+    @property
+    def motion_as_recorded(self) -> Motion | None:
+        """The motion of all samples, the same where all are accepted."""
+        if self.recorded is None or self.recorded is self.recording:
+            return self.motion
+        return motion_of(self.recorded, self.rig)
+
     def has(self, *names: str) -> bool:
         """Whether one of these was found."""
         return any(finding.name in names for finding in self.findings)

@@ -117,19 +117,17 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     if min(len(slider), len(pusher)) < FEWEST:
         return None
     origin = slider.stamp[0]
-    time, tip_time = _seconds(slider.stamp, origin), _seconds(pusher.stamp, origin)
-    order, tip_order = np.unique(time, return_index=True)[1], np.unique(tip_time, return_index=True)[1]
-    within = (time[order] >= tip_time.min()) & (time[order] <= tip_time.max())
-    order = order[within]
-    if len(order) < FEWEST:
+    time, body = in_time(slider.stamp, origin, slider.x, slider.y, np.unwrap(slider.heading), slider.z)
+    tip_time, tracked = in_time(pusher.stamp, origin, pusher.x, pusher.y, pusher.z, pusher.heading)
+    within = (time >= tip_time[0]) & (time <= tip_time[-1])
+    time, pose, height = time[within], body[within, :3], body[within, 3]
+    if len(time) < FEWEST:
         return None
-    time = time[order]
-    pose = np.column_stack([slider.x, slider.y, np.unwrap(slider.heading)])[order]
-    tip = values_at(time, tip_time[tip_order], np.column_stack([pusher.x, pusher.y, pusher.z])[tip_order])
-    tool = np.interp(time, tip_time[tip_order], np.unwrap(pusher.heading[tip_order]))
-    tip_velocity, options = _velocity(time, tip[:, :2], SPANS[0]), WindowOptions()
+    tip = values_at(time, tip_time, tracked[:, :3])
+    tool = np.interp(time, tip_time, np.unwrap(tracked[:, 3]))
+    tip_velocity, options = mean_velocity(time, tip[:, :2], SPANS[0]), WindowOptions()
     tip_speed = np.hypot(*tip_velocity.T)
-    lowered = tip[:, 2] - slider.z[order] < options.lift
+    lowered = tip[:, 2] - height < options.lift
     pushing = tip_speed[lowered & (tip_speed > options.least_speed)]
     slider_speed = _SliderSpeed(time, pose, rig, MOVING_SHARE * float(np.median(pushing)) if len(pushing) else MOVING)
     moving = slider_speed.moving
@@ -137,10 +135,10 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     steady = contact & slider_speed.steady & _is_steady(*_halves(time, tip[:, :2], SPANS[0]), STEADY_TIP)
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
-    height, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
+    raised, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
     kinds = {"moving": moving, "contact": contact, "steady": steady, "push": number}
     measured = {"noise": noise, "span": slider_speed.span, "tool": tool}
-    return Motion(time, pose, tip[:, :2], height, tip_velocity, tip_speed, force, **kinds, **measured)
+    return Motion(time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force, **kinds, **measured)
 
 
 def body_velocity(motion: Motion) -> Array:
@@ -154,9 +152,8 @@ def sums_by_push(values: Array, push: IntArray) -> Array:
     return np.column_stack([np.bincount(number, column) for column in values.T])
 
 
-def contact_fit(recording: Recording, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
+def contact_fit(motion: Motion | None, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
     """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
-    motion = motion_of(recording, rig)
     if motion is None or not motion.contact.any():
         return None
     touch = motion.contact
@@ -182,8 +179,10 @@ def _number(time: Array, contact: BoolArray) -> IntArray:
     return number
 
 
-def _seconds(stamp: IntArray, origin: int) -> Array:
-    return np.asarray(1e-9 * (stamp - origin))
+def in_time(stamp: IntArray, origin: int, *columns: Array) -> tuple[Array, Array]:
+    """Increasing times (m,) s after an origin (ns), and the values (m, k) there of columns (n,) with stamps (n,) ns."""
+    stamp, rows = np.unique(stamp, return_index=True)
+    return np.asarray(1e-9 * (stamp - origin)), np.column_stack(columns)[rows]
 
 
 def values_at(time: Array, known: Array, values: Array) -> Array:
@@ -191,7 +190,7 @@ def values_at(time: Array, known: Array, values: Array) -> Array:
     return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 
-def _velocity(time: Array, values: Array, span: float) -> Array:
+def mean_velocity(time: Array, values: Array, span: float) -> Array:
     """Mean velocities (n, k) from a span (s) before to one after each sample."""
     before, after = np.maximum(time - span, time[0]), np.minimum(time + span, time[-1])
     return np.asarray((values_at(after, time, values) - values_at(before, time, values)) / (after - before)[:, None])
@@ -221,7 +220,7 @@ class _SliderSpeed:
         self.span = next((span for span in SPANS if NOISE * _speed_noise(place, span) < wanted), SPANS[-1])
         noise = _speed_noise(place, self.span)
         least = max(NOISE * noise, WindowOptions().least_speed)
-        self.moving = np.linalg.norm(_velocity(time, place, self.span), axis=1) > least
+        self.moving = np.linalg.norm(mean_velocity(time, place, self.span), axis=1) > least
         before, after = _halves(time, place, self.span)
         both = np.minimum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)) > least
         self.steady = self.moving & both & _is_steady(before, after, STEADY, NOISE * noise)
@@ -248,9 +247,8 @@ def _force(recording: Recording, origin: int, time: Array) -> Array:
     wrench = recording.wrench
     if wrench is None or len(wrench) < FEWEST:
         return np.full((len(time), 2), np.nan)
-    stamp, rows = np.unique(wrench.stamp, return_index=True)
-    known = _seconds(stamp, origin)
-    force = values_at(time, known, np.column_stack([wrench.fx, wrench.fy])[rows])
+    known, force = in_time(wrench.stamp, origin, wrench.fx, wrench.fy)
+    force = values_at(time, known, force)
     around = np.concatenate([[-np.inf], known, [np.inf]])
     after = np.searchsorted(around, time)
     missing = around[after] - around[after - 1] > LONGEST_BREAK

@@ -56,7 +56,8 @@ def slider_stream(stamp: IntArray, values: Array) -> PoseStream:
 
 def pusher_stream(stamp: IntArray, values: Array) -> PoseStream:
     """The stream of tip poses (n, 7); the tip is a point, so a missing orientation becomes heading 0."""
-    return slider_stream(stamp, np.where(has_orientation(values)[:, None], values, upright(values)))
+    oriented = has_orientation(values)
+    return slider_stream(stamp, values if oriented.all() else np.where(oriented[:, None], values, upright(values)))
 
 
 def upright(values: Array) -> Array:

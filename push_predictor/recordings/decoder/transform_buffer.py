@@ -91,13 +91,12 @@ class TransformBuffer:
 
     def put(self, messages: Messages, static: bool, arrived: IntArray | None = None) -> None:
         """Add messages, of /tf_static if static. arrived (n,) ns: of live ones; beyond LIMIT the oldest are dropped."""
-        live = arrived is not None
         if self._from_log and arrived is not None:
             messages = replace(messages, times=arrived)
         with self._lock:
             self._waiting.append((messages, static))
             self._unread += len(messages)
-            while live and self._unread > LIMIT:
+            while arrived is not None and self._unread > LIMIT:
                 old = len(self._waiting.pop(0)[0])
                 self.dropped, self._unread = self.dropped + old, self._unread - old
 

@@ -74,11 +74,10 @@ class WrenchInput:
         """The wrenches that are known with these new poses: stamps (n,) ns and poses (n, 7)."""
         planar = self._posed is None and self._up == Z_UP
         columns = self.messages.usable(WRENCH if planar else SPATIAL_WRENCH)
-        found = Wrenches(columns.stamp, columns.values)
-        if self._posed is None and not planar:
-            found = found._replace(values=wrenches_z_up(found.values, self._up))
         if self._posed is not None:
-            found = self._posed.put(found.stamp, found.values, *tip, last)
+            found = self._posed.put(columns.stamp, columns.values, *tip, last)
+        else:
+            found = Wrenches(columns.stamp, columns.values if planar else wrenches_z_up(columns.values, self._up))
         if self.bias is not None:
             found = self.bias.put(found, slider_stream(*slider), pusher_stream(*tip), last)
         if found.sensor is None or found.tip is None:

@@ -29,7 +29,7 @@ from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
 from push_predictor.recordings.fields.elements import names as element_names
 from push_predictor.recordings.fields.elements import places
-from push_predictor.recordings.fields.pose_numbers import pose_rows_of
+from push_predictor.recordings.fields.pose_rows import pose_rows_of
 from push_predictor.types import Array, BoolArray, IntArray
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -230,9 +230,9 @@ class FieldReader:
         found = pose_rows_of(parts) if self._target is POSE_TARGET else np.hstack(parts)
         if found is None or found.shape[1] != self._target.count:
             return None
-        unfit = np.isnan(found).all(axis=1)
+        unfit = np.isnan(found[:, 0])
         if unfit.any():
-            unfit &= np.isfinite(np.hstack(parts)).all(axis=1)
+            unfit &= np.isnan(found).all(axis=1) & np.isfinite(np.hstack(parts)).all(axis=1)
         return found, np.asarray(unfit)
 
     def _found(self, steps: Sequence[Step], first: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,18 +58,6 @@ class ContactSamples:
     def force_known(self) -> BoolArray:
         """Whether the force at the samples (n,) is known."""
         return ~np.isnan(self.force[:, 0])
-
-
-def taken(samples: ContactSamples, rows: slice | IntArray) -> ContactSamples:
-    """Some of the samples, by index."""
-    return ContactSamples(*(getattr(samples, field.name)[rows] for field in fields(samples)))
-
-
-def joined(first: ContactSamples, second: ContactSamples) -> ContactSamples:
-    """One portion of two consecutive ones."""
-    return ContactSamples(
-        *(np.concatenate([getattr(first, field.name), getattr(second, field.name)]) for field in fields(first))
-    )
 
 
 def contact_samples(

@@ -16,7 +16,7 @@ from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
-from push_predictor.recordings.windows.parts import part_means, part_rows
+from push_predictor.recordings.windows.parts import part_lines, part_means, part_rows
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
@@ -156,15 +156,8 @@ def pusher_motion(pusher: Track, begin: Array, end: Array) -> tuple[Array, Array
 def _lines(pusher: Track, begin: Array, first: IntArray, last: IntArray) -> tuple[Array, Array]:
     """Positions and velocities (n, 2) at times (n,) of lines through the samples from each first to each last."""
     count, rows = last - first, part_rows(first, last)
-    time = pusher.time[rows] - np.repeat(begin, count)
-    mean_time, mean = part_means(time[:, None], count), part_means(pusher.values[rows, :2], count)
-    late, off = (
-        time[:, None] - np.repeat(mean_time, count, axis=0),
-        pusher.values[rows, :2] - np.repeat(mean, count, axis=0),
-    )
-    spread = part_means(late**2, count)
-    velocity = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
-    return mean - velocity * mean_time, velocity
+    position, velocity, _ = part_lines(pusher.time[rows] - np.repeat(begin, count), pusher.values[rows, :2], count)
+    return position, velocity
 
 
 def _motions(outline: Outline, slider: Track, pusher: Track, times: Array) -> _Motions:

@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from push_predictor.recordings.windows.contact import NEAR, ContactSamples, joined, taken
+from push_predictor.recordings.streams import joined, taken
+from push_predictor.recordings.windows.contact import NEAR, ContactSamples
 from push_predictor.types import Array, BoolArray, IntArray
 
 SEARCHED = 0.5  # s before and after a touch in which its force is looked for
@@ -106,7 +107,7 @@ class ForceTiming:
         """
         apart = np.full(len(samples), self.apart)
         touches = self._candidates(samples.time, contact, usable)
-        known = samples if self._samples is None else joined(self._samples, samples)
+        known = samples if self._samples is None else joined([self._samples, samples])
         first = len(known) - len(samples)
         unusable = first + np.flatnonzero(~usable)
         waiting = [] if self._touch is None else [self._touch]

@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSamples, taken
+from push_predictor.recordings.streams import taken
+from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSamples
 from push_predictor.recordings.windows.cut import PushContext
 from push_predictor.recordings.windows.force_timing import ForceTiming
 from push_predictor.recordings.windows.force_zero import ForceZero

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import get_args
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from push_predictor.models.mechanics.ladder import all_supports_known
 from push_predictor.models.mechanics.parameters import QUASI_STATIC
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED, screening_bases
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
 from push_predictor.types import Array
@@ -130,7 +129,7 @@ def confounded(evidence: Evidence, names: Sequence[str] | None, inputs: InputsBa
 
     The search would blame them for errors of the base in its own inputs.
     """
-    found, residualizer = [], Residualizer(inputs.columns)
+    found, residualizer = [], inputs.residualizers["driven"]
     for name in dict.fromkeys(name for name, _ in screening_bases(evidence.table, names)):
         if name in (SIDES, SPEED):
             continue  # functions of the inputs, judged as such
@@ -180,7 +179,7 @@ def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis
         return HEADED
     if not inputs.folds:
         return CONSTANT
-    outside = np.sum(Residualizer(inputs.columns)(response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
+    outside = np.sum(inputs.residualizers["driven"](response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
     return SIDES if outside > OUTSIDE else CONSTANT
 
 
@@ -215,11 +214,7 @@ class Nuisance:
         if constants:
             parts += [self.response(name) for name in self.mechanisms if name != kept]
         columns = np.concatenate(parts, axis=2) if parts else np.empty((len(self.evidence.table), 3, 0))
-        return _orthonormal(columns, self._residualizers[kind])
-
-    @cached_property
-    def _residualizers(self) -> dict[Kind, Residualizer]:
-        return {kind: Residualizer(controls_for(kind, self.inputs)) for kind in get_args(Kind)}
+        return _orthonormal(columns, self.inputs.residualizers[kind])
 
     @cached_property
     def _late_touch(self) -> Array:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import NORMAL_95
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect, ChannelFinding
 from push_predictor.residuals.evidence.drivers import CONSTANT, SENSOR_ZERO, SESSION
@@ -26,7 +27,6 @@ from push_predictor.types import Array
 BETWEEN_SESSIONS = 0.02  # N, standard deviation of the zero of a sound sensor, per axis
 PROGRESS = "push_index"  # along which a step within the session is placed
 PLACES = 10  # at which a step is tried
-NORMAL_95 = 1.96
 WRENCH_BIAS = "wrench_bias"
 BIAS = (("force read too much along x", "N"), ("force read too much along y", "N"))  # its parameters
 

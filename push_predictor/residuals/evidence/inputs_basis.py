@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.models.features import EDGE_SPACING, push_features
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.types import Array
 
 Kind = Literal["driven", "speed", "constant"]  # an effect depends on another covariate, on the speed, or on neither
@@ -39,6 +41,11 @@ class InputsBasis:
     folds: bool = False
     knows_speed: bool = False
     absorbs: bool = True
+
+    @cached_property
+    def residualizers(self) -> dict[Kind, Residualizer]:
+        """What regresses the controls of each kind of effect out."""
+        return {kind: Residualizer(controls_for(kind, self)) for kind in get_args(Kind)}
 
 
 def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:

@@ -15,8 +15,8 @@ from push_predictor.errors import RecordingError
 from push_predictor.models.effects.covariates import CUMULATIVE
 from push_predictor.models.effects.traced_session import COUNT, DISTANCE, TIME, Mark, TracedSession, beginnings
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection
-from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.load import Inspect, distinct_pushes, load_recording, load_rig_for, no_inspection
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import INPUTS, PushTable, concatenate, empty_table
@@ -59,7 +59,7 @@ def load_evidence(
     every = [Path(path) for path in paths]
     alone = len(every) == 1 and is_recording(every[0])  # its rig is read with it: to open a long bag takes seconds
     rig = rig or (None if alone else load_rig_for(every))
-    bags = sorted((_recording(p, rig, topics, inspect) for p in every if is_recording(p)), key=_first_stamp)
+    bags = sorted((load_recording(p, rig, topics, inspect) for p in every if is_recording(p)), key=_first_stamp)
     rig = rig or require_rig(bags[0])
     tables = [(path.name, _read(path, rig, inspect)) for path in every if not is_recording(path)]
     found = _loaded(bags, tables, rig, options)
@@ -125,12 +125,6 @@ def _continued(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWind
 def _later(window: PushWindow, added: Array) -> PushWindow:
     later = {name: window.covariates[name] + float(more) for name, more in zip(CUMULATIVE, added, strict=True)}
     return replace(window, covariates={**window.covariates, **later})
-
-
-def _recording(path: Path, rig: Rig | None, topics: Topics, inspect: Inspect) -> Recording:
-    recording = read_recording(path, rig=rig, topics=topics)
-    inspect(path, recording, require_rig(recording))
-    return recording
 
 
 def _read(path: Path, rig: Rig, inspect: Inspect) -> PushTable:

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import whitener_of
 from push_predictor.models.effects.effect import Effect, generic_responses
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import mechanism_named
@@ -111,17 +112,13 @@ def push_order(table: PushTable) -> IntArray:
 
 def blocks_of(table: PushTable) -> IntArray:
     """Block number (n,): up to BLOCK neighbouring pushes share one; single pushes where there are few."""
-    order = push_order(table)
-    count = int(order.max()) + 1 if len(order) else 0
-    return np.asarray(order // max(1, min(BLOCK, count // FEWEST_BLOCKS)))
+    return np.asarray(push_order(table) // max(1, min(BLOCK, len(table.pushes) // FEWEST_BLOCKS)))
 
 
 def held_out_rows(table: PushTable) -> BoolArray:
     """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session."""
-    order = push_order(table)
-    count = int(order.max()) + 1 if len(order) else 0
-    block = max(1, min(HELD_OUT_BLOCK, count // FEWEST_HELD_OUT))
-    return np.asarray((order // block) % EVERY == EVERY - 1)
+    block = max(1, min(HELD_OUT_BLOCK, len(table.pushes) // FEWEST_HELD_OUT))
+    return np.asarray((push_order(table) // block) % EVERY == EVERY - 1)
 
 
 def digest_of(table: PushTable) -> str:
@@ -130,11 +127,6 @@ def digest_of(table: PushTable) -> str:
     for column in (table.inputs, table.duration, table.outcomes):
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()
-
-
-def whitener_of(covariance: Array) -> Array:
-    """L^-1 (n, 3, 3) of covariances (n, 3, 3) = L L'."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:

@@ -19,14 +19,13 @@ from push_predictor.residuals.outcome import Tested, Trace
 from push_predictor.residuals.reporting.figures.gallery import effect_figures, error_figure, key_figure
 from push_predictor.residuals.reporting.phrases import (
     bare,
-    count,
     covariate_phrase,
+    detectable_size,
     effect_phrase,
     mechanism_phrase,
     p_text,
 )
 from push_predictor.residuals.reporting.sentences import advice, answer, evidence, rivals, shift_sentence, worth
-from push_predictor.residuals.reporting.sizes import detectable_size
 
 VERDICTS = {
     "none": "no change found",
@@ -72,9 +71,9 @@ def _parts(trace: Trace) -> list[str]:
 
 def _facts(trace: Trace) -> dict[str, str]:
     model, held = trace.model, trace.held_out
-    trained = count(model.provenance.pushes, "training push", "training pushes")
-    analysis = count(len(trace.analysis.pushes), "push", "pushes")
-    held_out = count(len(held.table.pushes), "push", "pushes")
+    trained = html.count(model.provenance.pushes, "training push", "training pushes")
+    analysis = html.count(len(trace.analysis.pushes), "push", "pushes")
+    held_out = html.count(len(held.table.pushes), "push", "pushes")
     kind = KINDS.get(model.kind, model.kind)
     return {
         "model": f"{model.name}: {kind}, slider {model.rig.shape} on {model.rig.surface}, {trained}",
@@ -159,8 +158,9 @@ def tested_table(trace: Trace) -> str:
     """All candidates, smallest p first."""
     best = sorted(trace.tested, key=lambda t: t.p_value)
     caption = (
-        f"{count(len(best), 'pair', 'pairs')} of mechanism and covariate, each in its best basis, before any effect is "
-        "subtracted. Neighbours of a true effect are often significant too, because covariates and responses correlate."
+        f"{html.count(len(best), 'pair', 'pairs')} of mechanism and covariate, each in its best basis, before any "
+        "effect is subtracted. Neighbours of a true effect are often significant too, because covariates and responses "
+        "correlate."
     )
     head = ("mechanism", "depends on", "family-wise p", "")
     return html.folded_table(caption, head, [_tested_row(trace, tested) for tested in best])

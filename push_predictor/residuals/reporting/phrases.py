@@ -1,23 +1,27 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Words for mechanisms, covariates and numbers: identifiers belong in tables and JSON, not in prose."""
+"""Words for mechanisms, covariates, numbers and sizes: identifiers belong in tables and JSON, not in prose."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.effects.covariates import COVARIATES, UNITS
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
-from push_predictor.reporting.html import NOTHING, number
+from push_predictor.models.pushes import Push
+from push_predictor.reporting.html import NOTHING, count, number
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION, UNDRIVEN
-from push_predictor.residuals.outcome import Sized
+from push_predictor.residuals.evidence.standardised import mechanics_under
+from push_predictor.residuals.outcome import FoundEffect, Sized, Trace
 
 MECHANISMS = {mechanism.name: mechanism for mechanism in (*LIBRARY, *REFINEMENTS)}
-
 
 # Of findings that are no mechanism of the motion.
 OTHERS = {
@@ -29,6 +33,8 @@ OTHERS = {
     "tool_offset": "an offset of the tool point",
 }
 
+USUAL = "contact_friction"  # the mechanism whose detectable size is shown if nothing was found
+NO_ENDS = ("periodic", "periodic, twice around", "category", "map")  # bases whose size is their largest difference
 NAMED = {SESSION: "the session (since training)", CONSTANT: "nothing (constant)"}  # what is no covariate
 SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "deg"), "s": (1e3, "ms"), "1": (1.0, "")}
 
@@ -117,11 +123,6 @@ def p_text(p_value: float) -> str:
     return number(p_value, 2)
 
 
-def count(n: int, one: str, many: str) -> str:
-    """A number of things."""
-    return f"{n} {one if n == 1 else many}"
-
-
 def _shown(value: float, ends: Estimate) -> str:
     """A number with as many decimals as its interval determines."""
     if not np.isfinite(value):
@@ -133,3 +134,49 @@ def _shown(value: float, ends: Estimate) -> str:
     decimals = -power + (width / 10.0**power <= 3.0)  # one digit of the width, two if it begins with 1 to 3
     shown = round(value, max(0, decimals)) + 0.0  # no minus zero
     return f"{shown:.{max(0, decimals)}f}".replace("-", "−")
+
+
+# --- the size of an effect: the shift of a window first, then the parameter -------------------------------------------
+
+
+def shift_size(trace: Trace, effect: Effect) -> tuple[float, float]:
+    """Root mean square shift of the position (m) and of the heading (rad) over the windows of the analysis."""
+    square = np.mean(joint_shift(mechanics_under(trace.model), [effect], Push.of(trace.analysis)) ** 2, axis=0)
+    return float(np.hypot(*np.sqrt(square[:2]))), float(np.sqrt(square[2]))
+
+
+def effect_size(trace: Trace, index: int, p_value: float | None = None) -> str:
+    """How far an effect shifts a window, root mean square, then its parameter; to follow "it"."""
+    effect = trace.effects[index]
+    metres, radians = shift_size(trace, trace.terms[index])
+    shift = f"shifts a window by {1e3 * metres:.2g} mm and {np.degrees(radians):.2g} deg"
+    return shift if effect.parameter is None else f"{shift}: {parameter(effect, p_value)}"
+
+
+def parameter(effect: FoundEffect, p_value: float | None = None) -> str:
+    """The parameter of an effect with its interval; of a change, whether the quantity is lower or higher."""
+    assert effect.parameter is not None  # the caller has checked it
+    value, unit = in_shown_unit(effect.parameter)
+    name = effect.parameter.name.partition(", ")[0]
+    changed = name.removeprefix("change of the ")
+    if changed == name:
+        return f"{name} is {interval(value, unit, p_value)}"
+    if effect.basis in NO_ENDS:
+        return f"{changed} differs by up to {interval(value, unit, p_value)}"
+    return f"{changed} {interval(value.size(), unit, p_value, 'lower' if value.value < 0.0 else 'higher')}"
+
+
+def detectable(trace: Trace) -> str:
+    """The smallest effect that would have been found."""
+    name = USUAL if USUAL in trace.minimum_detectable else next(iter(trace.minimum_detectable), USUAL)
+    size = detectable_size(trace.minimum_detectable.get(name, {}), 2)
+    if not size:
+        tried = count(len(trace.tested), "candidate", "candidates")
+        return f"not one of {tried} explains the errors of these pushes"
+    return f"a change of {mechanism_phrase(name)} by {size} would have been found with 80 % probability"
+
+
+def detectable_size(entry: Mapping[str, Any], digits: int) -> str:
+    """The value of an entry of minimum_detectable with its unit; empty if it is unknown."""
+    value, (factor, unit) = entry.get("value"), shown_unit(str(entry.get("unit", "")))
+    return "" if value is None or not np.isfinite(value) else f"{number(factor * float(value), digits)} {unit}".strip()

@@ -14,13 +14,12 @@ from push_predictor.evaluation.estimate import Estimate, difference_by_push, tot
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.effects.covariates import CUMULATIVE, HEADINGS
-from push_predictor.reporting.html import NOTHING, number
+from push_predictor.reporting.html import NOTHING, count, number
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting import phrases as say
-from push_predictor.residuals.reporting.phrases import effect_phrase
-from push_predictor.residuals.reporting.sizes import detectable, effect_size, parameter
+from push_predictor.residuals.reporting.phrases import detectable, effect_phrase, effect_size, parameter
 
 MOST_NAMES = 3  # rivals that one sentence lists
 MOST_TIMES = 100.0  # as many pushes; an estimate of more is none
@@ -119,7 +118,7 @@ def _change(trace: Trace) -> str:
     if trace.verdict == "input_shift":
         return say.capitalised(_shift_clause(trace.input_shift[0]))
     more = min(len(trace.terms), len(trace.effects)) - 1
-    further = f", and {say.count(more, 'further change was', 'further changes were')} found" if more > 0 else ""
+    further = f", and {count(more, 'further change was', 'further changes were')} found" if more > 0 else ""
     return say.capitalised(f"{'weak evidence: ' if trace.weak else ''}{_claim(trace, 0)}{further}")
 
 
@@ -177,7 +176,7 @@ def _size(trace: Trace) -> str:
         return detectable(trace)
     if trace.verdict == "input_shift":
         more = len(trace.input_shift) - 1
-        also = f"; {say.count(more, 'further input has', 'further inputs have')} shifted as well" if more else ""
+        also = f"; {count(more, 'further input has', 'further inputs have')} shifted as well" if more else ""
         return f"{_share_clause(trace.input_shift[0])}{also}"
     if not trace.terms:
         return f"the {say.listed([parameter(e) for e in trace.effects[:2] if e.parameter] or ['size is unknown'])}"
@@ -253,8 +252,8 @@ def _evidence_of(trace: Trace, index: int) -> str:
 
 
 def _closest(trace: Trace) -> str:
-    pushes = say.count(len(trace.analysis.pushes), "push", "pushes")
-    tried = say.count(len(trace.tested), "candidate", "candidates")
+    pushes = count(len(trace.analysis.pushes), "push", "pushes")
+    tried = count(len(trace.tested), "candidate", "candidates")
     text = f"Not one of {tried} explains the residual of {pushes} (family-wise level {number(trace.alpha)})."
     harmless = {each.mechanism for each in trace.harmless}
     others = (tested for tested in trace.tested if tested.mechanism not in harmless)
@@ -281,7 +280,7 @@ def _needed_pushes(trace: Trace) -> str:
 
 
 def _held_out_pushes(trace: Trace) -> str:
-    return say.count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
+    return count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
 
 
 def _difference(first: Comparison, second: Comparison) -> Estimate:

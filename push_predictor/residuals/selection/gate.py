@@ -12,20 +12,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import get_args
 
 import numpy as np
 
+from push_predictor.evaluation.metrics import whitener_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate, Nuisance, usable
 from push_predictor.residuals.evidence.drivers import OF_SESSION
 from push_predictor.residuals.evidence.input_shift import among
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, inputs_basis
 from push_predictor.residuals.evidence.loading import with_inputs
-from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
-from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, whitened_response, whitener_of
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, whitened_response
 from push_predictor.residuals.selection.screening import TINY, Columns, Scores, Screened, screen
 from push_predictor.types import Array, IntArray
 
@@ -103,19 +103,15 @@ class Seen:
 
     def columns(self, c: Candidate) -> Columns:
         """Those of a candidate on these windows, without its controls."""
-        return Columns(self._residualizers[c.kind](c.columns))
+        return Columns(self.inputs.residualizers[c.kind](c.columns))
 
     def scores(self, c: Candidate, columns: Columns) -> Scores:
         """Block scores of a candidate."""
         key = c.kind, id(c.nuisance)  # many share one array of nuisance columns: each is projected off only once
         if key not in self._blocks:
-            of_kind = self._residualizers[c.kind].blocks(self.z, self.block, self.noise)
+            of_kind = self.inputs.residualizers[c.kind].blocks(self.z, self.block, self.noise)
             self._blocks[key] = of_kind.orthogonal_to(c.nuisance)
         return columns.scores(self._blocks[key])
-
-    @cached_property
-    def _residualizers(self) -> dict[Kind, Residualizer]:
-        return {kind: Residualizer(controls_for(kind, self.inputs)) for kind in get_args(Kind)}
 
     @cached_property
     def _blocks(self) -> dict[tuple[Kind, int], ResidualBlocks]:

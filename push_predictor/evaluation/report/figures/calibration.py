@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import NORMAL_95
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, pit
 from push_predictor.reporting.canvas import COLOURS, SYMBOLS
@@ -27,7 +28,6 @@ LEVELS = np.linspace(0.02, 0.98, 49)
 WINDOWS_PER_BAR = 10
 FEWEST_BARS, MOST_BARS = 4, 10
 DRAWS = 400
-NORMAL_95 = 1.96
 
 
 def coverage_chart(comparison: Comparison) -> Chart:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.push_scores import push_means
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.predictors.tails import half_widths
@@ -88,7 +89,7 @@ def _paint_over_time(ax: Axes, axis: TimeAxis, residual: Array, push_id: np.ndar
     grid(ax)
     ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     ax.plot(axis.place, np.clip(residual, -reach, reach), "o", color="0.55", markersize=2.0, mew=0.0, alpha=0.7)
-    place, mean = _per_push(axis.place, residual, push_id)
+    place, mean = (push_means(push_id, values)[1] for values in (axis.place, residual))
     ax.plot(place, mean, "o", color=COLOURS[k], markersize=4.0, mew=0.0)
     found = trend(axis.place, residual, push_id)
     ax.set_title(_title(found), fontsize=8.0)
@@ -99,12 +100,6 @@ def _title(found: Estimate | None) -> str:
     if found is None:
         return "too few pushes for a trend"
     return f"trend {found.value:+.2f} sd (95 % CI {found.low:+.2f} to {found.high:+.2f})".replace("-", "−")
-
-
-def _per_push(place: Array, residual: Array, push_id: np.ndarray) -> tuple[Array, Array]:
-    _, index = np.unique(push_id, return_inverse=True)
-    count = np.bincount(index)
-    return np.bincount(index, place) / count, np.bincount(index, residual) / count
 
 
 def _change(weights: Array, place: Array, residual: Array) -> Array:

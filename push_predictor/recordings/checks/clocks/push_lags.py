@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from push_predictor.geometry.frames import to_body
-from push_predictor.recordings.checks.motion import SPANS, moving_slider, noise_of, values_at
+from push_predictor.recordings.checks.motion import SPANS, in_time, moving_slider, noise_of, values_at
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.streams import Recording
 from push_predictor.types import Array, BoolArray, IntArray
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
@@ -55,8 +55,8 @@ def push_lags(recording: Recording, rig: Rig) -> PushLags | None:
     if min(len(slider), len(pusher)) < SAMPLES:
         return None
     origin = int(slider.stamp[0])
-    time, pose = _ordered(slider, origin, np.column_stack([slider.x, slider.y, np.unwrap(slider.heading)]))
-    tip_time, tip = _ordered(pusher, origin, np.column_stack([pusher.x, pusher.y]))
+    time, pose = in_time(slider.stamp, origin, slider.x, slider.y, np.unwrap(slider.heading))
+    tip_time, tip = in_time(pusher.stamp, origin, pusher.x, pusher.y)
     rows = _rows(time, moving_slider(time, pose, rig))
     if not len(rows):
         return None
@@ -101,11 +101,6 @@ def _direction(place: Array) -> ComplexArray:
     """Directions (n,) in which places (n, 2) change, as complex numbers of at most length 1; 0 at rest."""
     step = np.gradient(place[:, 0] + 1j * place[:, 1])
     return np.asarray(step / (np.abs(step) + LEAST_STEP))
-
-
-def _ordered(stream: PoseStream, origin: int, values: Array) -> tuple[Array, Array]:
-    stamp, order = np.unique(stream.stamp, return_index=True)
-    return np.asarray(1e-9 * (stamp - origin)), values[order]
 
 
 def _rows(time: Array, moving: BoolArray) -> IntArray:

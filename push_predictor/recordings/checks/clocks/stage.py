@@ -17,7 +17,7 @@ import numpy as np
 from push_predictor.recordings.checks.clocks.push_lags import FINE, PushLags, push_lags
 from push_predictor.recordings.checks.evidence import Evidence
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.geometry.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart
+from push_predictor.recordings.checks.geometry.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart, time_apart
 from push_predictor.recordings.checks.geometry.outline_fit import MEDIAN_SD, TIE, fit_outline
 from push_predictor.recordings.checks.geometry.stage import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
@@ -151,7 +151,7 @@ def _drift(drift: Value) -> Finding:
 
 def _steps(steps: tuple[Step, ...]) -> Finding:
     stated = ", and ".join(
-        f"{_clock(step)} by {_size(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
+        f"{_clock(step)} by {time_apart(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
         for step in steps
     )
     sentence = f"A clock was set during the recording: {stated}."
@@ -169,10 +169,6 @@ def _clock(step: Step) -> str:
     if not step.seen:
         return f"the slider's stamps become {'later' if step.size > 0.0 else 'earlier'} against the pusher's"
     return f"the {step.stream}'s {'forward' if (step.size > 0.0) == (step.stream == 'slider') else 'back'}"
-
-
-def _size(step: float) -> str:
-    return f"{1e3 * abs(step):.0f} ms" if abs(step) < 10.0 else f"{abs(step):.1f} s"
 
 
 def _explains(before: Recording, after: Recording, rig: Rig) -> bool:

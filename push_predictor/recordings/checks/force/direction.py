@@ -17,7 +17,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.motion import Motion, sums_by_push
+from push_predictor.recordings.checks.motion import Motion, mean_velocity, sums_by_push
 from push_predictor.types import Array, BoolArray, IntArray
 
 SPAN = 0.05  # s before and after a sample that determine its velocity
@@ -50,13 +50,13 @@ class Reading:
     length: float
 
 
-def direction_findings(motion: Motion, used: BoolArray, radius: float, tip_heading: Array | None) -> list[Finding]:
+def direction_findings(motion: Motion, used: BoolArray, radius: float) -> list[Finding]:
     """Findings about sign and axes of the force, none if they are sound.
 
     used (n,): samples in contact with a force, of which the zero is subtracted. radius: gyration radius of the slider,
-    m. tip_heading (n,) rad: of the tip at the samples, None if it is not known.
+    m.
     """
-    velocity = _velocity(motion)
+    velocity = mean_velocity(motion.time, motion.slider, SPAN)  # of the centre, m/s, and of the heading, rad/s
     speed = np.hypot(*velocity[:, :2].T)
     used = used & (speed > TRANSLATING * np.hypot(speed, radius * velocity[:, 2]))
     if np.sum(used) < FEWEST:
@@ -64,8 +64,8 @@ def direction_findings(motion: Motion, used: BoolArray, radius: float, tip_headi
     push, slider = motion.push[used], motion.slider[used, 2]
     force, moved = (np.arctan2(of[used, 1], of[used, 0]) for of in (-motion.force, velocity))
     angles = {WORLD: force - moved, MIRROR: -force - moved, SLIDER: force + slider - moved}
-    if tip_heading is not None:
-        angles[TIP] = force + tip_heading[used] - moved
+    if motion.tool is not None and np.isfinite(motion.tool).all() and motion.tool.any():  # a heading is recorded
+        angles[TIP] = force + motion.tool[used] - moved
     world, *others = (_reading(axes, each, push) for axes, each in angles.items())
     if len(np.unique(push)) < FEWEST_PUSHES:
         return _of_few(world)
@@ -75,14 +75,6 @@ def direction_findings(motion: Motion, used: BoolArray, radius: float, tip_headi
     if best.length < RELATED:
         return [_unrelated(best)]
     return _turned_axes(best, others) if best is world else [_other_axes(best, world)]
-
-
-def _velocity(motion: Motion) -> Array:
-    """Mean velocities (n, 3) of the slider's centre (m/s) and heading (rad/s), from SPAN before to SPAN after."""
-    time = motion.time
-    before, after = np.maximum(time - SPAN, time[0]), np.minimum(time + SPAN, time[-1])
-    ends = [np.column_stack([np.interp(when, time, column) for column in motion.slider.T]) for when in (before, after)]
-    return np.asarray((ends[1] - ends[0]) / (after - before)[:, None])
 
 
 def _reading(axes: str, angles: Array, push: IntArray) -> Reading:

@@ -24,7 +24,6 @@ from push_predictor.recordings.checks.geometry.stage import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array, BoolArray
 
@@ -65,21 +64,15 @@ def force_stage(evidence: Evidence) -> Evidence:
         motion = motion_of(kept, rig)
     found += [each for each in (rate_finding(recording.wrench), late) if each is not None]
     directed = not evidence.has(*MIRRORS, "frames_apart")
-    found += wrench_findings(motion, rig, outlined, kept, directed)
+    found += wrench_findings(motion, rig, outlined, directed)
     return replace(evidence.found(found or [unseen_finding(delays)], kept), windows=windows)
 
 
-def wrench_findings(
-    motion: Motion | None,
-    rig: Rig,
-    outlined: bool = True,
-    recording: Recording | None = None,
-    directed: bool = True,
-) -> list[Finding]:
+def wrench_findings(motion: Motion | None, rig: Rig, outlined: bool = True, directed: bool = True) -> list[Finding]:
     """Findings about the zero, unit and axes of the wrench; empty without one.
 
-    outlined: whether the outline shows where the tip is in contact. recording: that of the motion, None if
-    the tip's heading is unknown. directed: whether slider and tip have one world frame, so that directions show axes.
+    outlined: whether the outline shows where the tip is in contact. directed: whether slider and tip have one world
+    frame, so that directions show axes.
     """
     if motion is None:
         return []
@@ -102,7 +95,7 @@ def wrench_findings(
     if not directed:
         return biased
     used, radius = touching & (size > least), float(np.sqrt(rig.outline.polar_moment))
-    return [*biased, *direction_findings(motion, used, radius, _heading(motion, recording))]
+    return [*biased, *direction_findings(motion, used, radius)]
 
 
 def _free(motion: Motion, rig: Rig) -> BoolArray:
@@ -193,12 +186,3 @@ def _scale(size: Array, rig: Rig) -> Finding | None:
     advice = "Give forces in N" + (f": multiply them {factors}" if fitting else "")
     values = {"force": Value(force, "N"), "weight": Value(weight, "N")}
     return Finding("wrench_units", "warning", sentence, f"{advice}. Give object_mass in kg.", values)
-
-
-def _heading(motion: Motion, recording: Recording | None) -> Array | None:
-    """The heading (n,) rad of the tip at the samples, None where it is not recorded."""
-    if recording is None or not np.isfinite(recording.pusher.heading).all() or not np.any(recording.pusher.heading):
-        return None
-    stamp, rows = np.unique(recording.pusher.stamp, return_index=True)
-    time = (stamp - recording.slider.stamp[0]) * NANOSECOND
-    return np.asarray(np.interp(motion.time, time, np.unwrap(recording.pusher.heading[rows])))

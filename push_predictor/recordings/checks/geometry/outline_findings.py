@@ -240,14 +240,18 @@ def _clock_findings(fit: OutlineFit, corrected: float) -> list[Finding]:
 def clocks_apart(lag: Value, the: str = "The") -> Finding:
     """The finding that the slider's stamps are late (s), or early."""
     side, sd = "late" if lag.value > 0.0 else "early", 1e3 * (lag.sd or 0.0)
-    size = f"{1e3 * abs(lag.value):.0f} ms" if abs(lag.value) < 10.0 else f"{abs(lag.value):.1f} s"
-    sentence = f"{the} slider's stamps are {size} {side} (sd {sd:.2g} ms) against the pusher's."
+    sentence = f"{the} slider's stamps are {time_apart(lag.value)} {side} (sd {sd:.2g} ms) against the pusher's."
     advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
     if 0.0 < lag.value < SLOWEST_FILTER:
         advice += (
             " A filter of the tracker has the same effect, and so has a commanded pose of the tip: record neither."
         )
     return Finding("clocks_apart", "warning", sentence, advice, {"lag": lag})
+
+
+def time_apart(seconds: float) -> str:
+    """By how much clocks differ, in words, without the sign."""
+    return f"{1e3 * abs(seconds):.0f} ms" if abs(seconds) < 10.0 else f"{abs(seconds):.1f} s"
 
 
 @dataclass(frozen=True, eq=False)

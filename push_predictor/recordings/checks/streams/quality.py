@@ -23,6 +23,7 @@ ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
 SPEED_NOISE, TOO_NOISY = 0.006, 0.01  # m/s of the tip: a third and half of those of a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
 FEWEST_HOLDS = 2
+UNSEEN = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
 DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
 
 
@@ -70,9 +71,8 @@ def _holds(name: str, facts: StreamFacts) -> Finding | None:
         f"The {name}'s pose is repeated with new stamps {len(facts.holds)} times while the body moves on, for "
         f"{1e3 * float(np.median(facts.holds)):.0f} ms (median): {share:.1f} % of the samples are stale."
     )
-    advice = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
     values = {"holds": Value(float(len(facts.holds)), "1"), "share": Value(0.01 * share, "1")}
-    return Finding(f"held_poses_{name}", "warning", sentence, advice, values)
+    return Finding(f"held_poses_{name}", "warning", sentence, UNSEEN, values)
 
 
 def _rate(name: str, facts: StreamFacts) -> Finding | None:

@@ -19,17 +19,24 @@ from push_predictor.recordings.checks.frames.orientation import has_heading
 from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
 from push_predictor.recordings.checks.streams.flips import without_flips
 from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
-from push_predictor.recordings.checks.streams.quality import quality_findings
-from push_predictor.recordings.checks.streams.session import in_order, of_one_body, repeated_samples
-from push_predictor.recordings.checks.streams.stamp_noise import regular_in_bursts, stamp_findings
-from push_predictor.recordings.checks.streams.stamps import clocks_never_meet, stamps_of, unset_stamps
+from push_predictor.recordings.checks.streams.quality import UNSEEN, quality_findings
+from push_predictor.recordings.checks.streams.stamps import (
+    clocks_never_meet,
+    regular_in_bursts,
+    stamp_findings,
+    stamps_of,
+    unset_stamps,
+)
 from push_predictor.recordings.checks.units import stream_rates, stream_units
-from push_predictor.recordings.streams import Recording, taken
+from push_predictor.recordings.dropouts import CLOCK_SET
+from push_predictor.recordings.streams import PoseStream, Recording, Stream, repeated, taken
 from push_predictor.recordings.windows.repairs.continued import continued
+from push_predictor.recordings.windows.stamp_order import StampOrder
+from push_predictor.recordings.windows.track import Track
 
-CONTINUED = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
 FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that has facts
+LEAST_SHARE = 0.05  # of the samples are repeats; single ones are usual
 
 
 def stream_stage(evidence: Evidence) -> Evidence:
@@ -69,7 +76,7 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
             f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
         )
         values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
-        found.append(Finding(f"continued_poses_{name}", "warning", sentence, CONTINUED, values))
+        found.append(Finding(f"continued_poses_{name}", "warning", sentence, UNSEEN, values))
         sound[name] = taken(stream, ~lost)
     return found, replace(recording, **sound) if sound else recording
 
@@ -98,3 +105,42 @@ def _jumps(recording: Recording) -> tuple[list[Finding], Recording]:
     slider, pusher = (of_one_body(in_order(stream)) for stream in (recording.slider, recording.pusher))
     wrench = None if recording.wrench is None else in_order(recording.wrench)
     return found, replace(recording, slider=slider, pusher=pusher, wrench=wrench)
+
+
+# --- the samples that are judged: of one setting of the clock, in order, each once ------------------------------------
+
+
+def in_order(stream: Stream) -> Stream:
+    """The longest part of a stream between settings of its clock, without samples older than one before."""
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(stream.stamp) < -CLOCK_SET) + 1, [len(stream)]])
+    longest = int(np.argmax(np.diff(begins)))
+    part = taken(stream, slice(int(begins[longest]), int(begins[longest + 1])))
+    newest = np.maximum.accumulate(part.stamp)
+    newer = np.append(True, part.stamp[1:] > newest[:-1])[: len(part)]
+    return part if newer.all() else taken(part, newer)
+
+
+def of_one_body(stream: PoseStream) -> PoseStream:
+    """The samples of a stream without those that jump away and back, as the window finder takes them."""
+    order = StampOrder(3, Track(3, position=True).is_jump)
+    rows = np.column_stack([stream.x, stream.y, np.arange(len(stream), dtype=np.float64)])
+    return taken(stream, order.take(stream.stamp, rows, final=True).values[:, 2].astype(np.int64))
+
+
+def repeated_samples(recording: Recording) -> Finding | None:
+    """A warning if samples are in the recording twice: from two publishers, or from a loop that was recorded."""
+    every = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
+    streams = {name: stream for name, stream in every.items() if stream is not None and len(stream)}
+    twice = {name: repeated(stream) for name, stream in streams.items()}
+    often = {name: again for name, again in twice.items() if np.mean(again) > LEAST_SHARE}
+    if not often:
+        return None
+    listed = ", ".join(f"{name} {100.0 * np.mean(again):.0f} %" for name, again in often.items())
+    values = {f"{name}_share": Value(float(np.mean(again)), "1") for name, again in often.items()}
+    sentence = f"Samples are recorded twice, with the same stamp and value: {listed}."
+    loop = any(bool(np.any(np.diff(streams[name].stamp) < -CLOCK_SET)) for name in often)
+    if loop:
+        advice = "A loop was recorded. Its windows count once. Record a replay only once."
+        return Finding("loop_recorded", "warning", sentence, advice, values)
+    advice = "They count once. Stop the second publisher (`ros2 topic info --verbose` lists both)."
+    return Finding("sent_twice", "warning", sentence, advice, values)

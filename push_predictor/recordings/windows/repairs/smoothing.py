@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.windows.parts import part_means, part_rows
+from push_predictor.recordings.windows.parts import part_lines, part_rows
 from push_predictor.recordings.windows.repairs.resolution import EVIDENCE, LEVER
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
 from push_predictor.types import Array, IntArray
@@ -118,12 +118,8 @@ def _lines_at(stamp: IntArray, values: Array, rows: IntArray, first: IntArray, l
     for at in range(0, len(rows), AT_ONCE):
         part = slice(at, at + AT_ONCE)
         count, inside = (last - first)[part], part_rows(first[part], last[part])
-        time = np.asarray((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)[:, None]
-        mean_time, mean = part_means(time, count), part_means(values[inside], count)
-        late = time - np.repeat(mean_time, count, axis=0)
-        off = values[inside] - np.repeat(mean, count, axis=0)
-        spread = part_means(late**2, count)
-        slope = part_means(late * off, count) / np.where(spread > 0.0, spread, 1.0)
-        found.append(mean - slope * mean_time)
-        misfit.append(part_means((off - np.repeat(slope, count, axis=0) * late) ** 2, count))
+        time = np.asarray((stamp[inside] - np.repeat(stamp[rows[part]], count)) * NANOSECOND)
+        value, _, left = part_lines(time, values[inside], count)
+        found.append(value)
+        misfit.append(left)
     return np.concatenate(found), np.concatenate(misfit)

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import by_push
+from push_predictor.evaluation.estimate import NORMAL_95
+from push_predictor.evaluation.push_scores import by_push, push_means
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.effects.exact import JointEffects, joint_shift
@@ -24,7 +25,6 @@ from push_predictor.residuals.reporting.figures.pushes import (
     Axis,
     axis_of,
     means_along,
-    push_means,
     titles,
 )
 from push_predictor.residuals.reporting.phrases import capitalised, shown_unit
@@ -34,7 +34,6 @@ GRID = 400
 MAP_CELLS = 16
 ROOM = 0.35  # of the range of curve and bins, above and below them
 PERIODIC = ("periodic", "periodic, twice around")
-CENTRAL = 1.96  # standard deviations that cover 95 % of a Gaussian
 
 
 def basis_charts(trace: Trace, strength: Strength, rows: Evidence) -> list[Chart]:
@@ -131,7 +130,7 @@ class Strength:
         """Fitted parameters (n, q) and half of their 95 % band (n, q)."""
         values = self.effect.basis.values(covariates, n)
         variance = np.einsum("nm,qmk,nk->nq", values, self.covariance, values)
-        return values @ self.coefficients.T, CENTRAL * np.sqrt(np.maximum(variance, 0.0))
+        return values @ self.coefficients.T, NORMAL_95 * np.sqrt(np.maximum(variance, 0.0))
 
 
 def analysis_rows(trace: Trace) -> Evidence:

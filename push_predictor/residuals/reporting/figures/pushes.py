@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.evaluation.estimate import Estimate
-from push_predictor.evaluation.push_scores import resampled_means
+from push_predictor.evaluation.push_scores import push_means, resampled_means
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import INPUTS, OUTPUTS, PushTable
 from push_predictor.reporting.canvas import UNITS
@@ -231,12 +231,6 @@ def recorded_axis(table: PushTable, covariate: str) -> Axis | None:
     factor, unit = shown_unit_of(covariate)
     name = capitalised(bare(covariate_phrase(covariate)))
     return Axis(factor * values, f"{name} ({unit})" if unit else name, names, factor)
-
-
-def push_means(push_id: TextArray, values: Array) -> tuple[list[str], Array]:
-    """The pushes, sorted by name, and the mean (k,) of their windows' values (n,)."""
-    names, push = np.unique(push_id, return_inverse=True)
-    return names.tolist(), np.bincount(push, values) / np.bincount(push)
 
 
 def titles(names: Sequence[str], values: Array, unit: str = "") -> list[str]:
