@@ -29,15 +29,15 @@ from push_predictor.planning.goal import Goal
 from push_predictor.planning.obstacles.scene import Scene
 from push_predictor.planning.tip_paths import SliderPaths, slider_paths
 from push_predictor.planning.unscented import Predict, PusherGeometry
-from push_predictor.simulation.live_rig import LiveRig
+from push_predictor.simulation.interactive_rig import LiveRig
 from push_predictor.types import Array
 
 OUT = Path(__file__).resolve().parents[1] / "out" / "mpc"
-HORIZON, SAMPLES, KNOTS, LIMIT = 12, 128, 3, 150  # windows ahead; samples, drawn twice; windows of a run
+STEPS, SAMPLES, KNOTS, LIMIT = (1, 1, 2, 2, 3, 3), 128, 3, 150  # windows of each step ahead; windows of a run
 SPEED, STEEPEST = (0.01, 0.05), 1.2  # m/s, rad from the inward normal: in the model's domain
 SPREAD, TEMPERATURE = np.array([0.01, 0.02, 0.3]), 0.03  # of samples about a plan: m/s, contact, rad; s
 PLACING, MISS, TOUCH, PACE = 2.0, 8.0, 20.0, 0.01  # s to place the tip, lost by a miss, by a touch; m/s of approach
-BASIS = np.maximum(0.0, 1.0 - np.abs(np.linspace(0.0, KNOTS - 1.0, HORIZON)[:, None] - np.arange(KNOTS)))
+BASIS = np.maximum(0.0, 1.0 - np.abs(np.linspace(0.0, KNOTS - 1.0, len(STEPS))[:, None] - np.arange(KNOTS)))
 START, GOAL = np.array([-0.06, -0.03, 0.4]), Goal([0.06, 0.02, 0.0], distance=0.002, turn=0.05)
 
 
@@ -55,7 +55,7 @@ class SamplingMpc:
 
     def __init__(self, predict: Predict, pusher: PusherGeometry, goal: Goal, scene: Scene) -> None:
         self._predict, self._pusher, self._goal, self._scene = predict, pusher, goal, scene
-        self._random, self._last = np.random.default_rng(0), np.zeros((HORIZON, 3))
+        self._random, self._last = np.random.default_rng(0), np.zeros((len(STEPS), 3))
 
     def plan(self, slider: Array, tip: Array | None) -> Plan:
         """Plan for a slider (3,) and a tip (2,), None if it is lifted. Raises RequestError.
@@ -84,7 +84,7 @@ class SamplingMpc:
         square = self._goal.errors(paths.poses) ** 2 + np.diagonal(paths.covariance, axis1=2, axis2=3)
         cost = np.sqrt(square @ [1.0, 1.0, self._pusher.outline.polar_moment]) / PACE
         cost += MISS * (1.0 - self._goal.likely(paths.poses, paths.covariance))
-        cost += self._pusher.window * np.arange(1, HORIZON + 1)
+        cost += self._pusher.window * np.cumsum(STEPS)
         touch = self._scene.touch_probability(paths.poses, paths.covariance)
         cost += TOUCH * np.maximum.accumulate(touch, axis=1)
         return np.asarray(np.where(paths.known, cost, np.inf).min(axis=1))
@@ -94,7 +94,7 @@ class SamplingMpc:
         outline, contact = self._pusher.outline, samples[:, 0, 1] % 1.0
         tips = to_world(outline.point(contact) - self._pusher.radius * outline.inward_normal(contact), slider)
         tips[:keep] = 0.0 if tip is None else tip
-        paths = slider_paths(self._predict, self._pusher, slider, tips, samples[..., 0], samples[..., 2])
+        paths = slider_paths(self._predict, self._pusher, slider, tips, samples[..., 0], samples[..., 2], STEPS)
         return self.cost(paths) + PLACING * (np.arange(len(samples)) >= keep), paths
 
     def _anywhere(self, slider: Array, count: int) -> Array:
@@ -102,7 +102,7 @@ class SamplingMpc:
         speed, contact = self._random.uniform(*SPEED, count), self._random.random(count)
         x, y = self._pusher.outline.inward_normal(contact).T
         heading = slider[2] + np.arctan2(y, x) + self._random.uniform(-STEEPEST, STEEPEST, count)
-        return np.repeat(np.column_stack([speed, contact, heading])[:, None], HORIZON, axis=1)
+        return np.repeat(np.column_stack([speed, contact, heading])[:, None], len(STEPS), axis=1)
 
     def _about(self, sample: Array, count: int) -> Array:
         """Samples (count, h, 3) about one (h, 3), which is the first; changes are linear between the knots."""
@@ -138,7 +138,7 @@ def run(mpc: SamplingMpc, rig: LiveRig, client: PlannerClient, duration: float) 
         plan = mpc.plan(slider, rig.tips[0] if rig.placed[0] else None)
         spent = time.monotonic() - begun
         if plan.place:
-            rig.place(only, plan.window[1:2] % 1.0)
+            rig.place(only, plan.window[1:2])
         windows.append(Window(slider, rig.tips[0].copy(), plan.place, plan.poses, plan.covariance, spent))
         rig.push(only, plan.window[:1], plan.window[2:], duration)
         client.publish_poses({"slider/pose": rig.sliders[0], "pusher/pose": np.append(rig.tips[0], 0.0)})

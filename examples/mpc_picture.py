@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIZE = (6.4, 4.6)  # inches
-STRIDE = 3  # windows between two ellipses
+BETWEEN = 12  # windows between two plans that are drawn
 ELLIPSE = 2.4477  # standard deviations: 95 % in two dimensions
 
 
@@ -56,10 +56,11 @@ def _paint(figure: Figure, windows: Sequence[Window], after: Array, goal: Goal, 
     placed = [k for k, window in enumerate(windows) if window.placed]
     for number, (first, end) in enumerate(pairwise([*placed, len(windows)]), 1):
         paint_outline(axes, scene.outline, windows[first].slider, color=NEARBY, linewidth=0.9, label="before a contact")
-        _paint_ellipses(axes, windows[first])
+        for window in windows[first:end:BETWEEN]:
+            _paint_ellipses(axes, window)
         tips = 1e3 * np.array([window.tip for window in windows[first:end]])
         axes.plot(*tips.T, ".-", color="black", markersize=3.0, linewidth=0.8, label="tip, every 0.1 s")
-        axes.annotate(f"{number}", tips[0], (-10.0, -3.0), textcoords="offset points")
+        axes.annotate(f"{number}", tips[0], (0.0, -14.0), ha="center", textcoords="offset points")
     centres = 1e3 * np.array([*(window.slider for window in windows), after])
     axes.plot(*centres[:, :2].T, ".-", color=OBSERVED, markersize=3.0, linewidth=1.0, label="centre, every 0.1 s")
     paint_outline(axes, scene.outline, after, color=OBSERVED, label="after")
@@ -69,9 +70,9 @@ def _paint(figure: Figure, windows: Sequence[Window], after: Array, goal: Goal, 
 
 
 def _paint_ellipses(axes: Axes, window: Window) -> None:
-    """Draw the 95 % ellipses of the centre in some of the windows ahead."""
+    """Draw the 95 % ellipses of the centre in the windows ahead."""
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     circle = ELLIPSE * np.column_stack([np.cos(turn), np.sin(turn)])
-    for mean, covariance in zip(window.poses[::STRIDE], window.covariance[::STRIDE], strict=True):
+    for mean, covariance in zip(window.poses, window.covariance, strict=True):
         ring = 1e3 * (mean[:2] + circle @ np.linalg.cholesky(covariance[:2, :2]).T)
         axes.plot(*ring.T, color=PREDICTED, linewidth=0.8, label="centre as planned, 95 %")

@@ -27,8 +27,9 @@ OBSTACLE = np.array([[-0.04, 0.03], [-0.02, 0.03], [-0.02, 0.1], [-0.04, 0.1]])
 SCENE = Scene(slider_named("rect1").outline, TABLE, [OBSTACLE])
 
 
-def square_model(path: Path) -> PushModel:
+def square_model(path: Path | str) -> PushModel:
     """The model of a file; if there is none, it is trained in a few seconds and saved."""
+    path = Path(path)
     if not path.exists():
         rig = load_rig_for([TRAINING])
         table = load_data([TRAINING], rig, WindowOptions(duration=WINDOW))

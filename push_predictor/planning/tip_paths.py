@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ STEEPEST = 1.5  # rad from the inward normal; a steeper tip does not push
 
 @dataclass(frozen=True, eq=False)
 class SliderPaths:
-    """The slider after each of h windows, on n paths of the tip.
+    """The slider after each of h steps, on n paths of the tip.
 
     poses (n, h, 3): means, x, y m, heading rad; covariance (n, h, 3, 3): sum over the windows so far; known (n, h):
     whether the tip kept contact and the model's domain so far.
@@ -31,21 +32,29 @@ class SliderPaths:
 
 
 def slider_paths(
-    predict: Predict, pusher: PusherGeometry, slider: Array, tips: Array, speeds: Array, headings: Array
+    predict: Predict,
+    pusher: PusherGeometry,
+    slider: Array,
+    tips: Array,
+    speeds: Array,
+    headings: Array,
+    windows: Sequence[int],
 ) -> SliderPaths:
-    """Follow a slider at (3,) while tips from (n, 2) move with speeds (n, h) m/s in directions (n, h) rad.
+    """Follow a slider at (3,) while tips from (n, 2) move in h steps at speeds (n, h) m/s in directions (n, h) rad.
 
-    Everything is in the world. predict is called h times, with n windows that last pusher.window s.
+    Everything is in the world. predict is called once for each step, with n windows of pusher.window s. A step lasts
+    windows (h,) of these, which are taken to be alike.
     """
     poses, covariance = np.tile(slider, (len(tips), 1)), np.zeros((len(tips), 3, 3))
-    known, windows = np.ones(len(tips), dtype=np.bool_), []
+    known, after = np.ones(len(tips), dtype=np.bool_), []
     velocities = speeds[..., None] * paired(np.cos(headings), np.sin(headings))
-    for velocity in np.swapaxes(velocities, 0, 1):
+    for count, velocity in zip(windows, np.swapaxes(velocities, 0, 1), strict=True):
         touch = touches(pusher.outline, poses, tips, velocity)
         known = known & (np.abs(touch.inputs[:, 2]) < STEEPEST) & (touch.distance - pusher.radius < LOST)
         answer = predict(np.clip(touch.inputs, -STEEPEST, STEEPEST))
         known = known & answer.in_domain
-        poses, tips = displaced(poses, touch.heading, answer.mean), tips + pusher.window * velocity
-        covariance = covariance + covariance_in_world(answer.covariance, touch.heading)
-        windows.append((poses, covariance, known))
-    return SliderPaths(*(np.stack(each, axis=1) for each in zip(*windows, strict=True)))
+        poses = displaced(poses, touch.heading, count * answer.mean)
+        tips = tips + count * pusher.window * velocity
+        covariance = covariance + count * covariance_in_world(answer.covariance, touch.heading)
+        after.append((poses, covariance, known))
+    return SliderPaths(*(np.stack(each, axis=1) for each in zip(*after, strict=True)))

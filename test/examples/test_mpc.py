@@ -28,7 +28,7 @@ from push_predictor.planning.tip_paths import SliderPaths
 from push_predictor.planning.unscented import PusherGeometry
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.windows.push_window import WindowOptions
-from push_predictor.simulation.live_rig import LiveRig
+from push_predictor.simulation.interactive_rig import LiveRig
 
 SQUARE, ONLY = shape_outline("rect1"), np.array([0])
 PUSHER, FREE = PusherGeometry(SQUARE, 0.00475, 0.1), Scene(SQUARE, TABLE)
@@ -67,16 +67,23 @@ def test_a_tip_keeps_its_contact_where_it_pushes_to_the_goal_and_is_placed_where
 
 
 def test_the_cost_is_the_expected_distance_a_miss_and_the_time_of_the_best_window():
-    planner = mpc.SamplingMpc(carried, PUSHER, Goal([1.0, 0.0, 0.0], 0.002, 0.05), FREE)
-    sure = SliderPaths(np.zeros((1, mpc.HORIZON, 3)), np.zeros((1, mpc.HORIZON, 3, 3)), np.ones((1, mpc.HORIZON), bool))
-    unsure = SliderPaths(
-        sure.poses, np.tile(np.diag([0.3, 0.2, 0.1 / SQUARE.polar_moment]), (1, mpc.HORIZON, 1, 1)), sure.known
-    )
-    assert planner.cost(sure) == pytest.approx(1.0 / mpc.PACE + mpc.MISS + PUSHER.window)
-    far = Goal([1.0, 0.0, 0.0], 1e-9, 1e-9)  # no touch: the table ends where the slider would fall with this covariance
-    wide = Scene(SQUARE, 1e6 * TABLE)
-    cost = mpc.SamplingMpc(carried, PUSHER, far, wide).cost(unsure)
-    assert cost == pytest.approx(np.sqrt(1.6) / mpc.PACE + mpc.MISS + PUSHER.window)
+    far, steps = Goal([1.0, 0.0, 0.0], 0.002, 0.05), len(mpc.STEPS)
+    planner = mpc.SamplingMpc(carried, PUSHER, far, Scene(SQUARE, 1e6 * TABLE))
+    variances = np.diag([0.3, 0.2, 0.1 / SQUARE.polar_moment])
+    for covariance, square in ((np.zeros((3, 3)), 1.0), (variances, 1.6)):
+        paths = SliderPaths(np.zeros((1, steps, 3)), np.tile(covariance, (1, steps, 1, 1)), np.ones((1, steps), bool))
+        assert planner.cost(paths) == pytest.approx(np.sqrt(square) / mpc.PACE + mpc.MISS + PUSHER.window, rel=1e-4)
+
+
+def test_placing_the_tip_costs_time_and_the_samples_that_place_it_do_not_change_a_plan_that_keeps_it():
+    tip = np.array([-0.045 - PUSHER.radius, 0.0])
+    planner = Recorded(carried, PUSHER, Goal([0.05, 0.0, 0.0], 0.002), FREE)
+    alike = np.tile([0.02, 0.125, 0.0], (2, len(mpc.STEPS), 1))
+    assert np.diff(planner._rolled(np.zeros(3), tip, alike, 1)[0]) == pytest.approx(mpc.PLACING)
+    kept = np.arange(mpc.SAMPLES) < mpc.SAMPLES // 2
+    planner.cost = lambda paths: np.where(kept, mpc.PLACING, 1e-3)
+    plan = planner.plan(np.zeros(3), tip)
+    np.testing.assert_allclose(plan.window, planner.last[0][kept, 0].mean(axis=0))
 
 
 @pytest.mark.parametrize("obstacle", [False, True])

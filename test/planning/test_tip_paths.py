@@ -27,20 +27,23 @@ def carried(inputs) -> Prediction:
     return Prediction(mean, noise, noise, inputs[:, 1] < 0.5)
 
 
-def test_a_slider_follows_the_tip_and_its_uncertainty_grows_along_the_push():
-    tips, heading = np.array([[-0.045 - PUSHER.radius, 0.01]]), 0.5
-    paths = slider_paths(carried, PUSHER, np.zeros(3), tips, np.array([[0.05, 0.03]]), np.array([[heading] * 2]))
-    along = np.array([np.cos(heading), np.sin(heading)])
-    np.testing.assert_allclose(paths.poses[0], [[*(0.005 * along), 0.0], [*(0.008 * along), 0.0]], atol=1e-12)
-    assert along @ paths.covariance[0, 1, :2, :2] @ along == pytest.approx(2.0 * 3e-4**2)
-    assert paths.covariance[0, :, 2, 2] == pytest.approx([5e-3**2, 2.0 * 5e-3**2])
+def test_a_slider_follows_the_tip_and_its_uncertainty_grows_with_the_windows():
+    tips, heading = np.array([[-0.045 - PUSHER.radius, 0.01]]), np.array([[0.5, 0.5]])
+    paths = slider_paths(carried, PUSHER, np.zeros(3), tips, np.array([[0.05, 0.03]]), heading, (1, 2))
+    along = np.array([np.cos(0.5), np.sin(0.5)])
+    np.testing.assert_allclose(paths.poses[0], [[*(0.005 * along), 0.0], [*(0.011 * along), 0.0]], atol=1e-12)
+    assert along @ paths.covariance[0, 1, :2, :2] @ along == pytest.approx(3.0 * 3e-4**2)
+    assert paths.covariance[0, :, 2, 2] == pytest.approx([5e-3**2, 3.0 * 5e-3**2])
+    assert paths.known.all()
 
 
 def test_a_tip_that_leaves_the_slider_or_the_domain_leads_to_no_known_pose():
     tips = np.array([[-0.045 - PUSHER.radius, 0.0]] * 2 + [[0.045 + PUSHER.radius, 0.0]])
     headings = np.array([[0.0, 0.0, 0.0], [0.0, np.pi, 0.0], [np.pi, np.pi, np.pi]])
-    paths = slider_paths(carried, PUSHER, np.zeros(3), tips, np.full((3, 3), 0.05), headings)
+    paths = slider_paths(carried, PUSHER, np.zeros(3), tips, np.full((3, 3), 0.05), headings, (1, 1, 1))
     assert paths.known.tolist() == [[True] * 3, [True, False, False], [False] * 3]
+    ahead = np.array([0.003, 0.0, 0.0])  # of the tip
+    assert not slider_paths(carried, PUSHER, ahead, tips[:1], np.full((1, 1), 0.05), headings[:1, :1], (1,)).known.any()
 
 
 def test_how_likely_a_goal_is_reached_is_the_mean_over_the_gaussian():

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from examples.square import square_spec
-from push_predictor.simulation.live_rig import LiveRig
+from push_predictor.simulation.interactive_rig import LiveRig
 
 ONLY = np.array([0])
 
