@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import sys
 import threading
+from collections.abc import Mapping
 from time import monotonic
 from typing import Any
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovariance, Quaternion
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -41,7 +42,7 @@ class PlannerClient:
 
     def __init__(self, window: float, *, timeout: float = TIMEOUT, patience: float = PATIENCE) -> None:
         self._window, self._timeout, self._patience = window, timeout, patience
-        self._context = Context()
+        self._context, self._publishers = Context(), dict[str, Any]()
 
     def __enter__(self) -> PlannerClient:
         rclpy.init(context=self._context)
@@ -76,6 +77,14 @@ class PlannerClient:
         if not response.success:
             raise RefusedError(response.message)
         return np.reshape(response.samples, (-1, 3))
+
+    def publish_poses(self, poses: Mapping[str, Array]) -> None:
+        """Publish poses (3: x, y m, heading rad) in the world, by topic, with one stamp."""
+        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id="world")
+        for topic, pose in poses.items():
+            if topic not in self._publishers:
+                self._publishers[topic] = self._node.create_publisher(PoseStamped, topic, DEEP)
+            self._publishers[topic].publish(PoseStamped(header=header, pose=_pose(pose)))
 
     def _call(self, client: Any, request: Any) -> Any:
         """The response. Raises SystemExit that names the service and the time waited."""

@@ -65,3 +65,20 @@ class Goal:
         """Whether displacements to the goal (..., 3) are within the tolerances, (...)."""
         near = ahead[..., 0] ** 2 + ahead[..., 1] ** 2 <= self.distance**2
         return near if self.turn is None else near & (np.abs(self.shortest(ahead[..., 2])) <= self.turn)
+
+    def errors(self, poses: Array) -> Array:
+        """Errors (..., 3) of poses (..., 3) in the world: x, y in m and the shortest rotation in rad, 0 for any."""
+        turned = self.shortest(poses[..., 2:] - self.pose[2])
+        return np.concatenate([poses[..., :2] - self.pose[:2], turned], axis=-1)
+
+    def likely(self, poses: Array, covariance: Array) -> Array:
+        """How likely (...) poses with means (..., 3) and covariance (..., 3, 3) are within the tolerances, smoothly.
+
+        1 at the goal without uncertainty; the tolerances are Gaussian, exp(-1) at their limits. A planner that samples
+        needs a slope outside of them. Source: saturating cost, Deisenroth and Rasmussen, PILCO, 2011.
+        """
+        size = 2 if self.turn is None else 3
+        tolerance = np.diag([self.distance, self.distance, self.turn or 0.0][:size]) ** 2 / 2.0
+        total, error = covariance[..., :size, :size] + tolerance, self.errors(poses)[..., :size]
+        exponent = 0.5 * np.sum(error * np.linalg.solve(total, error[..., None])[..., 0], axis=-1)
+        return np.asarray(np.exp(-exponent) * np.sqrt(np.linalg.det(tolerance) / np.linalg.det(total)))

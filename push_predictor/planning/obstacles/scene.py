@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.spatial import ConvexHull
+from scipy.special import ndtr
 
 from push_predictor.errors import RequestError
 from push_predictor.geometry.convex import ConvexPolygon
@@ -55,6 +56,14 @@ class Scene:
             near = np.flatnonzero(safe & (-obstacle.depth(flat[:, :2]) - self._radius <= margin))
             safe[near] = obstacle.gap(self.body, flat[near]) > margin
         return np.asarray(safe.reshape(poses.shape[:-1]))
+
+    def touch_probability(self, poses: Array, covariance: Array) -> Array:
+        """Probability (...) that sliders with mean poses (..., 3) and covariance (..., 3, 3) are not safe.
+
+        The clearance is taken for Gaussian, with the standard deviation of the farthest point of the outline.
+        """
+        variance = np.diagonal(covariance, axis1=-2, axis2=-1) @ [1.0, 1.0, self.outline.reach**2]
+        return np.asarray(ndtr(-self.clearance(poses) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))))
 
     @cached_property
     def body(self) -> ConvexPolygon:
