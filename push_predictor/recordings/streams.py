@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,13 @@ class WrenchStream:
 
 
 Stream = TypeVar("Stream", PoseStream, WrenchStream)
-Columns = TypeVar("Columns", bound="DataclassInstance")  # of which each field is an array (n,) or None
+
+
+class _Dataclass(Protocol):
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+
+Columns = TypeVar("Columns", bound=_Dataclass)  # of which each field is an array (n,) or None
 
 
 def taken(stream: Columns, rows: Array | IntArray | BoolArray | slice) -> Columns:

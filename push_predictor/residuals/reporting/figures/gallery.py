@@ -11,6 +11,7 @@ import numpy as np
 
 from push_predictor.reporting import html
 from push_predictor.reporting.chart import WIDE, Chart, Dots
+from push_predictor.reporting.html import count
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.driver_basis import (
@@ -28,7 +29,6 @@ from push_predictor.residuals.reporting.figures.pushes import (
 )
 from push_predictor.residuals.reporting.phrases import (
     capitalised,
-    count,
     covariate_phrase,
     listed,
     mechanism_phrase,
