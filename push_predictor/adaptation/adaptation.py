@@ -1,0 +1,265 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Follow a rig push by push: a model whose mechanics and noise change as the outcomes say.
+
+What has changed is not known. So there is one hypothesis for "nothing", one for each mechanism alone, and one for all
+of them together; each is a walk of its parameters, weighted by how well it predicted the pushes so far. Their mixture,
+as one mean and covariance of all parameters, extends the deployed model by constant effects. What the model has learnt
+beside its mechanics stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from push_predictor.adaptation.walk import SPEEDS, Observed, Walk
+from push_predictor.errors import RequestError
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import JointEffects
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.prior import NOISE_WINDOWS, ProcessNoise, normal_draws, window_weights
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
+from push_predictor.models.predictors import (
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    Predictor,
+    PriorPredictor,
+)
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Push
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, IntArray
+
+USUAL = ("contact_friction", "contact_asymmetry", "pressure_spread", "centre_of_friction", "body_anisotropy")
+UNCHANGED = 0.9  # probability that nothing has changed before the first push
+TOGETHER = 0.2  # that more than one mechanism has, if any
+FORGOTTEN = 6.0  # nats: no hypothesis falls further behind the best, so that a later change is found
+SPREAD = 1.5  # standard deviation of a change in units of PARAMETERS' spread
+TRAINED_NOISE = 40.0  # independent windows that the deployed model's noise is worth
+ACCURACY = 3e-3  # of displacements, relative
+CERTAIN = 1.96
+CONSTANT = DriverBasis("constant")
+
+
+class AdaptedParameter(NamedTuple):
+    """A parameter as it is now, with a 95 % interval, and as it was when the model was trained; in `unit`."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    deployed: float
+
+    def __str__(self) -> str:
+        now = f"{self.name} {self.value:.3g} ({self.low:.3g} to {self.high:.3g})"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{now}{unit}, {self.deployed:.3g} when trained"
+
+
+class Adaptation:
+    """A deployed model and what its pushes since have shown.
+
+    mechanisms: names of those that may change (models/mechanisms.py). Those in the world need pushes with
+    `slider_heading`. speed: of the random walk, in standard deviations of a change per push; None: learnt. A prior
+    model follows in its own parameters. Raises RequestError for a model without mechanics, an unknown mechanism, or a
+    speed that is not a finite number >= 0.
+    """
+
+    def __init__(self, model: PushModel, mechanisms: Sequence[str] = USUAL, speed: float | None = None) -> None:
+        _check(model, mechanisms, speed)
+        self.deployed, self.pushes = model, 0
+        base = model.predictor.base
+        self._mechanisms = () if isinstance(base, PriorPredictor) else tuple(mechanisms)
+        if isinstance(base, PriorPredictor):
+            names, self._groups = tuple(base.fitted.values), [np.arange(len(base.fitted.values))]
+            covariance, windows = base.fitted.covariance, NOISE_WINDOWS
+        else:
+            names = tuple(name for each in mechanisms for name in mechanism_named(each).quantities)
+            self._groups = _hypotheses(mechanisms)
+            covariance, windows = np.diag([(SPREAD * BY_NAME[name].spread) ** 2 for name in names]), TRAINED_NOISE
+        fitted = base.mechanics
+        self._names, self._values = names, np.array([fitted.value(name) for name in names])
+        self._mechanics = replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY))
+        low, high = (
+            np.array([getattr(BY_NAME[name], end) for name in names]) - self._values for end in ("low", "high")
+        )
+        speeds = SPEEDS if speed is None else {speed: 1.0}
+        self._walks = [
+            Walk.start(covariance[np.ix_(own, own)], low[own], high[own], windows, speeds) for own in self._groups
+        ]
+        self._log_weight = np.log(_prior_weights(len(self._groups)))
+
+    def update(self, windows: PushTable) -> None:
+        """Take in the n windows of one push.
+
+        Raises RequestError if there are none or they belong to several pushes, and KeyError where a covariate that the
+        model needs is missing.
+        """
+        if len(windows.pushes) != 1:
+            raise RequestError("windows", f"of {len(windows.pushes)} pushes", "those of one push")
+        push = Push.of(windows)
+        mean, covariance = self._deployed_moments(push)
+        observed = Observed(windows.outcomes - mean, covariance, window_weights(np.zeros(len(windows), dtype=np.intp)))
+        view = _View(self._mechanics, self._old, self._names, push)
+        log_density = np.empty(len(self._groups))
+        for k, own in enumerate(self._groups):
+            self._walks[k], log_density[k] = self._walks[k].after(
+                observed, lambda change, own=own: view.shift(own, change)
+            )
+        weight = self._log_weight + log_density
+        weight = np.maximum(weight - weight.max(), -FORGOTTEN)
+        self._log_weight = weight - np.log(np.exp(weight).sum())
+        self.pushes += 1
+
+    @property
+    def parameters(self) -> list[AdaptedParameter]:
+        """The parameters that follow, in the order of the mechanisms."""
+        change, covariance = self._change
+        half = CERTAIN * np.sqrt(np.diagonal(covariance))
+        columns = zip(self._names, self._values + change, half, self._values, strict=True)
+        return [AdaptedParameter(k, BY_NAME[k].unit, v, v - h, v + h, was) for k, v, h, was in columns]
+
+    @property
+    def noise(self) -> Array:
+        """Factor (3,) on the deployed standard deviations of dx, dy and dtheta."""
+        return np.asarray(np.sqrt(self._weights @ [walk.noise for walk in self._walks]))
+
+    @property
+    def out_of_range(self) -> bool:
+        """Whether the last push needs parameters that no rig has: not followed, a reason to look at the rig."""
+        return self._walks[int(np.argmax(self._log_weight))].refused
+
+    @property
+    def adapted(self) -> PushModel:
+        """The deployed model as the rig is now, with `_adapted` after its name; it predicts, and saves, like others."""
+        return replace(self.deployed, name=f"{self.deployed.name}_adapted", predictor=self._predictor())
+
+    def _predictor(self) -> Predictor:
+        change, covariance = self._change
+        base, predictor = self.deployed.predictor.base, self.deployed.predictor
+        if isinstance(base, PriorPredictor):
+            values = dict(zip(self._names, (self._values + change).tolist(), strict=True))
+            fitted = FittedMechanics(base.fitted.mechanics, values, covariance)
+            noise = ProcessNoise(base.noise.factor * self.noise**2)
+            return PriorPredictor(fitted, normal_draws(fitted, self.deployed.provenance.seed), noise)
+        effects, cross = _constant_effects(self._mechanisms, change, covariance)
+        had = len(predictor.effects)
+        cross = {(had + i, had + j): shared for (i, j), shared in cross.items()}
+        if isinstance(predictor, ExtendedPredictor):
+            joined = (*predictor.effects, *effects)
+            return replace(
+                predictor, effects=joined, cross={**predictor.cross, **cross}, scale=predictor.scale * self.noise
+            )
+        return ExtendedPredictor(predictor, effects, self.noise, cross)
+
+    @cached_property
+    def _old(self) -> JointEffects:
+        """Effects of the mechanics that the deployed model has already."""
+        return JointEffects.of(self.deployed.predictor.effects)
+
+    def _deployed_moments(self, push: Push) -> tuple[Array, Array]:
+        """Mean (n, 3) and covariance (n, 3, 3) under the deployed parameters."""
+        predictor = self.deployed.predictor
+        if isinstance(predictor, PriorPredictor):
+            mean = predictor.fitted.displacement(push.inputs, push.duration, push.covariates)
+            return mean, predictor.process_covariance(push)
+        moments = predictor.with_independent_outputs().moments(push)
+        return moments.mean, moments.covariance
+
+    @property
+    def _weights(self) -> Array:
+        return np.exp(self._log_weight)
+
+    @property
+    def _change(self) -> tuple[Array, Array]:
+        """Mean (p,) and covariance (p, p) of the change of all parameters, of the mixture of hypotheses."""
+        p, weights = len(self._names), self._weights
+        means, covariance = np.zeros((len(weights), p)), np.zeros((p, p))
+        for k, (own, walk) in enumerate(zip(self._groups, self._walks, strict=True)):
+            means[k, own] = walk.mean
+            covariance[np.ix_(own, own)] += weights[k] * walk.covariance
+        mean = weights @ means
+        away = means - mean
+        return mean, covariance + np.einsum("s,sp,sq->pq", weights, away, away)
+
+
+class _View:
+    """What changes of some parameters do to a push of a model."""
+
+    def __init__(self, mechanics: FittedMechanics, old: JointEffects, names: tuple[str, ...], push: Push) -> None:
+        self._mechanics, self._names, self._push = mechanics, names, push
+        n = len(push.inputs)
+        self._old_names = old.names if old.effects else ()
+        self._old = old.changes(old.columns(push)) if old.effects else np.zeros((n, 0))
+        self._unchanged = self._shifted(self._old_names, self._old, derivatives=False)[0] if old.effects else 0.0
+
+    def shift(self, own: IntArray, change: Array) -> tuple[Array, Array]:
+        """Shift (n, 3) of the mean by changes (p,) of the parameters `own`, and derivatives (n, 3, p)."""
+        n, names = len(self._push.inputs), [self._names[k] for k in own]
+        if not names:
+            return np.zeros((n, 3)), np.zeros((n, 3, 0))
+        together = (*names, *(name for name in self._old_names if name not in names))
+        changes = np.zeros((n, len(together)))
+        changes[:, : len(names)] = change
+        changes[:, [together.index(name) for name in self._old_names]] += self._old
+        moved, slopes = self._shifted(together, changes)
+        return moved - self._unchanged, slopes[:, : len(names)].transpose(0, 2, 1)
+
+    def _shifted(self, names: tuple[str, ...], changes: Array, *, derivatives: bool = True) -> tuple[Array, Array]:
+        return self._mechanics.shifted(names, changes, self._push, derivatives=derivatives)
+
+
+def _hypotheses(mechanisms: Sequence[str]) -> list[IntArray]:
+    """The columns of the parameters that change: none, those of each mechanism, all."""
+    counts = [len(mechanism_named(name).quantities) for name in mechanisms]
+    each = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+    return [np.arange(0), *each, *([np.arange(sum(counts))] if len(counts) > 1 else [])]
+
+
+def _prior_weights(count: int) -> Array:
+    """Of the hypotheses: a prior model has one."""
+    if count == 1:
+        return np.ones(1)
+    together = TOGETHER if count > 2 else 0.0
+    alone = count - 1 - (together > 0.0)
+    weights = [UNCHANGED, *[(1.0 - UNCHANGED) * (1.0 - together) / alone] * alone]
+    return np.array(weights + [(1.0 - UNCHANGED) * together] * (together > 0.0))
+
+
+def _constant_effects(
+    mechanisms: Sequence[str], change: Array, covariance: Array
+) -> tuple[tuple[Effect, ...], dict[tuple[int, int], Array]]:
+    """Effects that are the same for every push, and the covariance of each two."""
+    ends = np.cumsum([0, *(len(mechanism_named(name).quantities) for name in mechanisms)])
+    parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+    effects = tuple(
+        Effect(name, "constant", CONSTANT, change[own], covariance[own, own], np.ones(3))
+        for name, own in zip(mechanisms, parts, strict=True)
+    )
+    pairs = [(i, j) for i in range(len(parts)) for j in range(i + 1, len(parts))]
+    return effects, {(i, j): covariance[parts[i], parts[j]] for i, j in pairs}
+
+
+def _check(model: PushModel, mechanisms: Sequence[str], speed: float | None) -> None:
+    base = model.predictor.base
+    if isinstance(base, GaussianProcessPredictor) and base.mean is None:
+        raise RequestError("model", model.name, "a model about mechanics: it has learnt the outcomes without them")
+    if unknown := [name for name in mechanisms if name not in _NAMES]:
+        raise RequestError("mechanism", unknown[0], f"some of {', '.join(_NAMES)}, each once")
+    if not mechanisms or len(set(mechanisms)) < len(mechanisms):
+        raise RequestError("mechanisms", list(mechanisms), f"some of {', '.join(_NAMES)}, each once")
+    if speed is not None and not (np.isfinite(speed) and speed >= 0.0):
+        raise RequestError("speed", speed, "a finite number >= 0")
+
+
+_NAMES = tuple(mechanism.name for mechanism in (*LIBRARY, *REFINEMENTS))
