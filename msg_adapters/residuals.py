@@ -1,15 +1,18 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a validator publishes: a window and its prediction -> PushResidual, an alarm that has fired -> PushAlarm."""
+"""What a validator publishes: a window and its prediction <-> PushResidual, an alarm that has fired -> PushAlarm."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from msg_adapters import ns_to_stamp
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushAlarm, PushResidual
@@ -34,7 +37,34 @@ def residual_to_message(
     message.predicted, message.observed = _flat(mean), _flat(window.displacement)
     message.covariance = _flat(covariance)
     message.standardised = _flat(np.linalg.solve(factor, window.displacement - mean))
+    message.covariate_names = list(window.covariates)
+    message.covariate_values = [float(value) for value in window.covariates.values()]
     return message
+
+
+def residuals_to_table(messages: Sequence[PushResidual]) -> PushTable:
+    """The windows as rows of a table, without predictions; a covariate is kept if every window has it.
+
+    Raises RequestError for lists of covariates of different lengths, and for a number that is not finite.
+    """
+    given = []
+    for message in messages:
+        if len(message.covariate_names) != len(message.covariate_values):
+            accepted = f"{len(message.covariate_names)} values, as many as names"
+            raise RequestError("covariate_values length", len(message.covariate_values), accepted)
+        given.append(dict(zip(message.covariate_names, message.covariate_values, strict=True)))
+    common = [name for name in given[0] if all(name in each for each in given)]
+    table = PushTable(
+        np.array([[m.velocity, m.contact, m.angle] for m in messages]),
+        np.array([m.duration for m in messages]),
+        np.array([m.observed for m in messages]),
+        np.array([m.push_id for m in messages], dtype=np.str_),
+        {name: np.array([each[name] for each in given]) for name in common},
+    )
+    for name, values in (("observed", table.outcomes), ("velocity, contact, angle", table.inputs)):
+        if not np.all(np.isfinite(values)):
+            raise RequestError(name, values[~np.all(np.isfinite(values), axis=1)][0].tolist(), "finite numbers")
+    return table
 
 
 def _flat(values: Array) -> Array:

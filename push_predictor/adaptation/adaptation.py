@@ -11,31 +11,34 @@ beside its mechanics stays as it is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from push_predictor.adaptation.walk import SPEEDS, Observed, Walk
+from push_predictor.adaptation.walk import LARGEST_SQUARE, SPEEDS, Noise, Observed, Walk
 from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanics.prior import NOISE_WINDOWS, ProcessNoise, normal_draws, window_weights
+from push_predictor.models.mechanics.prior import NOISE_WINDOWS, ProcessNoise, normal_draws
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
     Predictor,
     PriorPredictor,
 )
+from push_predictor.models.predictors.tails import Tails, half_widths
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
+from push_predictor.models.request import check_pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
@@ -47,7 +50,10 @@ SPREAD = 1.5  # standard deviation of a change in units of PARAMETERS' spread
 TRAINED_NOISE = 40.0  # independent windows that the deployed model's noise is worth
 ACCURACY = 3e-3  # of displacements, relative
 CERTAIN = 1.96
+LEVELS = 200  # quantiles of which a mean is taken
 CONSTANT = DriverBasis("constant")
+# From inputs (n, 3), durations (n,) and covariates to predictions.
+Predict: TypeAlias = Callable[[Array, Array, Mapping[str, Array]], Prediction]
 
 
 class AdaptedParameter(NamedTuple):
@@ -60,10 +66,15 @@ class AdaptedParameter(NamedTuple):
     high: float
     deployed: float
 
+    @property
+    def changed(self) -> bool:
+        """Whether the interval leaves out the deployed value."""
+        return not self.low <= self.deployed <= self.high
+
     def __str__(self) -> str:
-        now = f"{self.name} {self.value:.3g} ({self.low:.3g} to {self.high:.3g})"
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{now}{unit}, {self.deployed:.3g} when trained"
+        now = f"{self.name.replace('_', ' ')} {self.value:.2g}{unit} ({self.low:.2g} to {self.high:.2g})"
+        return f"{now}, {self.deployed:.2g} when trained"
 
 
 class Adaptation:
@@ -71,13 +82,21 @@ class Adaptation:
 
     mechanisms: names of those that may change (models/mechanisms.py). Those in the world need pushes with
     `slider_heading`. speed: of the random walk, in standard deviations of a change per push; None: learnt. A prior
-    model follows in its own parameters. Raises RequestError for a model without mechanics, an unknown mechanism, or a
-    speed that is not a finite number >= 0.
+    model follows in its own parameters. predict: predictions of the model from its table, if there is one. Raises
+    RequestError for a model without mechanics, an unknown mechanism, or a speed that is not a finite number >= 0.
     """
 
-    def __init__(self, model: PushModel, mechanisms: Sequence[str] = USUAL, speed: float | None = None) -> None:
+    def __init__(
+        self,
+        model: PushModel,
+        mechanisms: Sequence[str] = USUAL,
+        speed: float | None = None,
+        predict: Predict | None = None,
+    ) -> None:
         _check(model, mechanisms, speed)
         self.deployed, self.pushes = model, 0
+        self._predict = predict or model.predict_rows
+        self._adapted: PushModel | None = None
         base = model.predictor.base
         self._mechanisms = () if isinstance(base, PriorPredictor) else tuple(mechanisms)
         if isinstance(base, PriorPredictor):
@@ -93,23 +112,27 @@ class Adaptation:
         low, high = (
             np.array([getattr(BY_NAME[name], end) for name in names]) - self._values for end in ("low", "high")
         )
+        noise = Noise(windows, _usual_square(model.predictor.tails))
         speeds = SPEEDS if speed is None else {speed: 1.0}
         self._walks = [
-            Walk.start(covariance[np.ix_(own, own)], low[own], high[own], windows, speeds) for own in self._groups
+            Walk.start(covariance[np.ix_(own, own)], low[own], high[own], noise, speeds) for own in self._groups
         ]
         self._log_weight = np.log(_prior_weights(len(self._groups)))
 
     def update(self, windows: PushTable) -> None:
         """Take in the n windows of one push.
 
-        Raises RequestError if there are none or they belong to several pushes, and KeyError where a covariate that the
-        model needs is missing.
+        Raises RequestError if there are none, if they belong to several pushes, or lack a covariate that is needed.
         """
         if len(windows.pushes) != 1:
             raise RequestError("windows", f"of {len(windows.pushes)} pushes", "those of one push")
-        push = Push.of(windows)
+        for name in self._needs:
+            if name not in windows.covariates:
+                raise RequestError("windows", f"without {name}", "those with what the mechanisms need")
+        check_pushes(self.deployed, windows)
+        push = self.deployed.predictor.completed(Push.of(windows))
         mean, covariance = self._deployed_moments(push)
-        observed = Observed(windows.outcomes - mean, covariance, window_weights(np.zeros(len(windows), dtype=np.intp)))
+        observed = Observed(windows.outcomes - mean, covariance)
         view = _View(self._mechanics, self._old, self._names, push)
         log_density = np.empty(len(self._groups))
         for k, own in enumerate(self._groups):
@@ -119,7 +142,13 @@ class Adaptation:
         weight = self._log_weight + log_density
         weight = np.maximum(weight - weight.max(), -FORGOTTEN)
         self._log_weight = weight - np.log(np.exp(weight).sum())
-        self.pushes += 1
+        self.pushes, self._adapted = self.pushes + 1, None
+
+    def __str__(self) -> str:
+        changed = [str(parameter) for parameter in self.parameters if parameter.changed]
+        found = "; ".join(changed) or "no parameter has certainly changed"
+        alarm = "; the last push needs parameters that no rig has" if self.out_of_range else ""
+        return f"{found}, after {self.pushes} push{'es' * (self.pushes != 1)}{alarm}"
 
     @property
     def parameters(self) -> list[AdaptedParameter]:
@@ -132,7 +161,7 @@ class Adaptation:
     @property
     def noise(self) -> Array:
         """Factor (3,) on the deployed standard deviations of dx, dy and dtheta."""
-        return np.asarray(np.sqrt(self._weights @ [walk.noise for walk in self._walks]))
+        return np.asarray(np.sqrt(self._weights @ [walk.noise.factor for walk in self._walks]))
 
     @property
     def out_of_range(self) -> bool:
@@ -142,7 +171,9 @@ class Adaptation:
     @property
     def adapted(self) -> PushModel:
         """The deployed model as the rig is now, with `_adapted` after its name; it predicts, and saves, like others."""
-        return replace(self.deployed, name=f"{self.deployed.name}_adapted", predictor=self._predictor())
+        if self._adapted is None:
+            self._adapted = replace(self.deployed, name=adapted_name(self.deployed.name), predictor=self._predictor())
+        return self._adapted
 
     def _predictor(self) -> Predictor:
         change, covariance = self._change
@@ -163,6 +194,11 @@ class Adaptation:
         return ExtendedPredictor(predictor, effects, self.noise, cross)
 
     @cached_property
+    def _needs(self) -> set[str]:
+        """Covariates that the mechanisms need."""
+        return {name for each in self._mechanisms for name in mechanism_named(each).needs}
+
+    @cached_property
     def _old(self) -> JointEffects:
         """Effects of the mechanics that the deployed model has already."""
         return JointEffects.of(self.deployed.predictor.effects)
@@ -173,8 +209,9 @@ class Adaptation:
         if isinstance(predictor, PriorPredictor):
             mean = predictor.fitted.displacement(push.inputs, push.duration, push.covariates)
             return mean, predictor.process_covariance(push)
-        moments = predictor.with_independent_outputs().moments(push)
-        return moments.mean, moments.covariance
+        found = self._predict(push.inputs, push.duration, push.covariates)
+        # A learnt model's outputs are taken one by one, see residuals/evidence/standardised.py.
+        return found.mean, found.covariance * np.eye(3) if predictor.learnt else found.covariance
 
     @property
     def _weights(self) -> Array:
@@ -191,6 +228,11 @@ class Adaptation:
         mean = weights @ means
         away = means - mean
         return mean, covariance + np.einsum("s,sp,sq->pq", weights, away, away)
+
+
+def adapted_name(name: str) -> str:
+    """The name of the adapted model."""
+    return f"{name}_adapted"
 
 
 class _View:
@@ -234,6 +276,12 @@ def _prior_weights(count: int) -> Array:
     alone = count - 1 - (together > 0.0)
     weights = [UNCHANGED, *[(1.0 - UNCHANGED) * (1.0 - together) / alone] * alone]
     return np.array(weights + [(1.0 - UNCHANGED) * together] * (together > 0.0))
+
+
+def _usual_square(tails: Tails | None) -> Array:
+    """See Noise."""
+    levels = (np.arange(LEVELS) + 0.5) / LEVELS
+    return np.mean([np.minimum(half_widths(tails, level) ** 2, LARGEST_SQUARE) for level in levels], axis=0)
 
 
 def _constant_effects(

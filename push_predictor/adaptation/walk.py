@@ -13,7 +13,7 @@ push enters with the weight of Student's t, so that one bad push moves little.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -21,10 +21,11 @@ import numpy as np
 from push_predictor.models.mechanics.fit import DEGREES
 from push_predictor.types import Array
 
-SPEEDS = {0.0: 0.6, 0.03: 0.37, 0.3: 0.03}  # standard deviations of a change per push, and how often: none, wear, jumps
+SPEEDS = {0.0: 0.8, 0.02: 0.18, 0.3: 0.02}  # standard deviations of a change per push, and how often: none, wear, jumps
 STEADY = 0.8  # probability that the speed stays, else it is drawn again: a jump takes some five pushes
 LINEARISED = 3  # times per push
-LARGEST_RATIO = 9.0  # of a squared residual to its variance: one bad window says little about the noise of the others
+CORRELATION = 0.8  # of the windows of a push: they share the friction under it and what a model misses there
+LARGEST_SQUARE = 9.0  # of a residual in standard deviations: one bad window says little about the noise of others
 MEMORY = 200.0  # independent windows that the noise is averaged over
 REFUSED = 2.0  # posterior standard deviations beyond the plausible range from which a push is not explained
 
@@ -33,11 +34,39 @@ Shift: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
 
 class Observed(NamedTuple):
-    """The windows of a push: residual (n, 3) of the deployed mean, covariance (n, 3, 3), weight (n,) of each."""
+    """The windows of a push: residual (n, 3) of the deployed mean, covariance (n, 3, 3).
+
+    They share their deviation: each counts for a `share` of an independent one.
+    """
 
     residual: Array
     covariance: Array
-    weight: Array
+
+    @property
+    def share(self) -> float:
+        """1 / (1 + (n - 1) r) with a correlation r."""
+        return 1.0 / (1.0 + (len(self.residual) - 1.0) * CORRELATION)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """factor (3,) on the variances of the deployed model, as sure as from so many independent windows.
+
+    usual_square (3,): mean square of the deployed model's residuals in its standard deviations, cut off at
+    LARGEST_SQUARE.
+    """
+
+    windows: float
+    usual_square: Array
+    factor: Array = field(default_factory=lambda: np.ones(3))
+
+    def after(self, square: Array, share: float) -> Noise:
+        """After a push with squared residuals (n, 3) over the deployed variances; share: see Observed."""
+        count = share * len(square)
+        windows = min(self.windows + count, MEMORY)
+        cut_off = np.minimum(square / self.factor, LARGEST_SQUARE)
+        growth = (np.mean(cut_off, axis=0) / self.usual_square - 1.0) * count / windows
+        return replace(self, windows=windows, factor=self.factor * (1.0 + growth))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +74,8 @@ class Walk:
     """What is known of a change (p,) of parameters after some pushes, for each of s speeds; usual (s,): how often.
 
     spread (p,): prior standard deviations, the unit of `speeds` (s,) as well. low, high (p,): of the change.
-    probability (s,), means (s, p), covariances (s, p, p). noise (3,): factor on the variances of the deployed model;
-    windows: independent ones it is worth. refused: whether the last push would have needed implausible parameters.
+    probability (s,), means (s, p), covariances (s, p, p). refused: whether the last push would have needed implausible
+    parameters.
     """
 
     spread: Array
@@ -57,20 +86,19 @@ class Walk:
     probability: Array
     means: Array
     covariances: Array
-    noise: Array
-    windows: float
+    noise: Noise
     refused: bool = False
 
     @classmethod
     def start(
-        cls, covariance: Array, low: Array, high: Array, windows: float, speeds: Mapping[float, float] = SPEEDS
+        cls, covariance: Array, low: Array, high: Array, noise: Noise, speeds: Mapping[float, float] = SPEEDS
     ) -> Walk:
-        """Before the first push: no change, with this covariance (p, p); windows: what the noise's prior is worth."""
+        """Before the first push: no change, with this covariance (p, p)."""
         s, p = len(speeds), len(covariance)
         each, usual = np.array(list(speeds)), np.array(list(speeds.values()))
         spread = np.sqrt(np.diagonal(covariance))
         of_all = np.tile(covariance, (s, 1, 1))
-        return cls(spread, low, high, each, usual, usual, np.zeros((s, p)), of_all, np.ones(3), windows)
+        return cls(spread, low, high, each, usual, usual, np.zeros((s, p)), of_all, noise)
 
     @property
     def mean(self) -> Array:
@@ -88,7 +116,7 @@ class Walk:
         A push that only implausible parameters would explain leaves them as they were.
         """
         before = self._before_push()
-        root = np.sqrt(self.noise)
+        root = np.sqrt(self.noise.factor)
         seen = observed._replace(covariance=observed.covariance * root[:, None] * root)
         likelihood, means, covariances = before._updated(seen, shift)
         probability = before.probability * np.exp(likelihood - likelihood.max())
@@ -112,7 +140,7 @@ class Walk:
 
     def _updated(self, seen: Observed, shift: Shift) -> tuple[Array, Array, Array]:
         """Log density (s,) of a push under each filter, means (s, p), covariances (s, p, p) after it."""
-        noise = _blocks(seen.covariance / seen.weight[:, None, None])
+        noise = _blocks(seen.covariance / seen.share)
         about, means, covariances, likelihood = self.mean, self.means, self.covariances, np.zeros(len(self.speeds))
         for _ in range(LINEARISED if len(self.spread) else 1):
             moved, slopes = shift(np.clip(about, self.low, self.high))
@@ -134,12 +162,9 @@ class Walk:
         """With the factor of the noise after a push, whose residuals count with the uncertainty of the parameters."""
         moved, slopes = shift(self.mean)
         unsure = np.einsum("nkp,pq,nkq->nk", slopes, self.covariance, slopes)
-        ratio = ((observed.residual - moved) ** 2 + unsure) / np.diagonal(observed.covariance, axis1=1, axis2=2)
-        ratio = np.minimum(ratio, LARGEST_RATIO * self.noise)
-        count = float(observed.weight.sum())
-        windows = min(self.windows + count, MEMORY)
-        noise = self.noise + (observed.weight @ ratio - count * self.noise) / windows
-        return replace(self, noise=noise, windows=windows)
+        variance = np.diagonal(observed.covariance, axis1=1, axis2=2)
+        square = (observed.residual - moved) ** 2 + unsure
+        return replace(self, noise=self.noise.after(square / variance, observed.share))
 
 
 def _kalman(
@@ -152,7 +177,7 @@ def _kalman(
     gain = covariance @ jacobian.T
     lower = np.linalg.cholesky(noise + jacobian @ gain)
     whitened = np.linalg.solve(lower, innovation)
-    square, count = float(whitened @ whitened), 3.0 * float(seen.weight.sum())
+    square, count = float(whitened @ whitened), seen.share * len(innovation)
     log_density = -np.log(np.diagonal(lower)).sum() - 0.5 * (DEGREES + count) * np.log1p(square / DEGREES)
     weight = min((DEGREES + count) / (DEGREES + square), 1.0)
     lower = np.linalg.cholesky(noise / weight + jacobian @ gain)

@@ -14,7 +14,7 @@ from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 from push_predictor.watch import part_of
 
-BEFORE_ALARM = 0.2  # share of the time for windows and predictions
+BEFORE_ALARM, BEFORE_ADAPTING = 0.1, 0.6  # shares of the time
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,12 +38,25 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
     )
+    parser.add_argument(
+        "--adapt",
+        type=Path,
+        nargs="?",
+        const=Path("adaptation.png"),
+        metavar="PICTURE.png",
+        help="let the model follow the pushes too: print and draw errors and parameters push by push (default "
+        "%(const)s)",
+    )
+    parser.add_argument(
+        "--extended", type=Path, metavar="MODEL", help="with --adapt: a model to compare, such as that of a trace"
+    )
     add_reading(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Compare, print the scores, and warn about training pushes and other sliders."""
+    from push_predictor.adaptation.followed import follow
     from push_predictor.evaluation.alarm.evidence import alarm_sentence
     from push_predictor.evaluation.alarm.scores import recording_alarm
     from push_predictor.evaluation.judgement import judged
@@ -56,6 +69,9 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows, force=options.force)
+    check_output("--adapt", options.adapt, force=options.force)
+    if options.extended and not options.adapt:
+        raise RequestError("--extended", str(options.extended), "only together with --adapt")
     _check_recording(options.recording)
     model = load_model(options.model)
     reading = Reading(options)
@@ -65,17 +81,26 @@ def run(options: argparse.Namespace) -> None:
         windows, comparison = validate_recording(model, options.recording, rig, warn, reading.topics, reading.checks)
         reading.save_topics([options.recording])
         table = windows_to_table(windows)
-        alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, 1.0))
+        alarm = recording_alarm(
+            model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, BEFORE_ADAPTING)
+        )
         metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}
         metrics["judgement"] = judged(metrics).sentence
+        extended = load_model(options.extended) if options.extended else None
+        followed = follow(model, table, extended, part_of(watch, BEFORE_ADAPTING, 1.0)) if options.adapt else None
     for text in remarks(model, rig, table):
         warn(text)
     if options.windows:
         write_window_log(options.windows, windows, comparison)
+    if followed is not None:
+        metrics["adaptation"] = followed.json
+        followed.draw(options.adapt)
     if not write_json(options, metrics):
         print("\n".join(opening_sentences(metrics)))
         print("\n".join(metrics_lines(metrics)))
         print(alarm_sentence(alarm))
+        if followed is not None:
+            print("\n".join([*followed.lines, f"drawn: {options.adapt}"]))
 
 
 def _check_recording(path: Path) -> None:

@@ -53,6 +53,7 @@ PREDICT_SERVER = (
         read_only=False,
     ),
     Param("world_frame", "world", "Frame in which sliders lie flat, with z up."),
+    Param("adapt", False, "Let the default model follow the rig from its activation, as NAME_adapted."),
     Param("autostart", True, "Configure and activate at start, without a lifecycle manager."),
     Param(
         "introspection",

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The node predict_server: six services, the actions suggest_pushes and trace_residual (docs/reference)."""
+"""The node predict_server: seven services, the actions suggest_pushes and trace_residual (docs/reference)."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ from rclpy.service import Service
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
-from push_predictor.errors import InactiveError, RequestError
+from push_predictor.errors import InactiveError, PushPredictorError, RequestError
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.parameter_tables import PREDICT_SERVER
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import refusal, run
 from push_predictor.nodes.server.actions import GuardedAction, TraceAction
+from push_predictor.nodes.server.adaptation import AdaptedModels
 from push_predictor.nodes.server.services import (
     RequestFrames,
     handle_list_models,
@@ -55,6 +56,7 @@ from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor.resources import SHIPPED
 from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.srv import (
+    AdaptModel,
     ListModels,
     LoadModel,
     PredictPush,
@@ -93,6 +95,7 @@ class PredictServer(LifecycleNode):
         self._state = "unconfigured"
         self._first_default = self.value("default_model")
         self._frames = RequestFrames(self, self.value("world_frame"))
+        self._adapted = AdaptedModels(self, lambda: self._registry)
         self._create_services()
         self._introspect(self.value("introspection"))
         check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))
@@ -183,9 +186,19 @@ class PredictServer(LifecycleNode):
             self.get_logger().error(f"the node stays inactive: {NO_MODEL}")
             return TransitionCallbackReturn.FAILURE
         self._state = "active"
+        if self.value("adapt"):
+            self._adapt()
         models = ", ".join(self._registry.names)
         self.get_logger().info(f"active with the models {models}; default {self._registry.default!r}")
         return super().on_activate(state)
+
+    def _adapt(self) -> None:
+        """Let the default model follow; a model that cannot is reported, and predicts as it is."""
+        try:
+            self._adapted.start("")
+        except PushPredictorError as error:
+            self._problems.append(f"adapt: {error}")
+            self.get_logger().error(self._problems[-1])
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Refuse predictions from now on."""
@@ -224,6 +237,7 @@ class PredictServer(LifecycleNode):
                 (PredictPushBatch, "predict_push_batch", self._prediction(batch)),
                 (RolloutPushes, "rollout_pushes", self._prediction(rollout)),
                 (LoadModel, "load_model", self._on_load),
+                (AdaptModel, "adapt_model", self._guarded(self._adapted.handle)),
             )
         ]
         self._short_services = [
@@ -365,7 +379,8 @@ class PredictServer(LifecycleNode):
     def _publish_diagnostics(self) -> None:
         name = self.get_fully_qualified_name()
         status = server_status(name, self._state, self._registry, self._problems, self._statistics)
-        self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
+        adapted = [status for status in (self._adapted.status(),) if status is not None]
+        self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, status, *adapted))
 
 
 def main(args: Sequence[str] | None = None) -> int:

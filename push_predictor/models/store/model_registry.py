@@ -77,10 +77,14 @@ class ModelRegistry:
         name = name or tabulated.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is already used by {self._files[name]}, give another name")
+        self.put(name, tabulated, path)
+        return name
+
+    def put(self, name: str, tabulated: TabulatedModel, path: Path) -> None:
+        """Register a model under a name, in place of an older one. path: the file that it comes from."""
         with self._lock:
             self._files[name] = path
             self._models = {**self._models, name: tabulated}  # other threads may be iterating over the old one
-        return name
 
     def complete(self, cancelled: Callable[[], bool] = lambda: False) -> None:
         """Compute missing tables, which takes some seconds each.
