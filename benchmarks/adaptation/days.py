@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.adaptation.rigs import CHANGES, MONDAY, Session, write_session_of
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import rig_path, write_table
@@ -53,10 +53,11 @@ def cut_all(bags: Path, folder: Path) -> None:
 
 
 def train(folder: Path) -> None:
-    """Train what `push_predictor train --kind vhgp` gives on Monday's windows, unless it is there."""
+    """Train what `push_predictor train --kind vhgp --mean mechanics` gives on Monday's windows, unless it is there."""
     if not (folder / MODEL).exists():
         monday, begin = folder / f"{MONDAY}{ENDING}", time.process_time()
-        save_model(train_model(load_data([monday]), load_rig_for([monday]), "vhgp", name=folder.name), folder / MODEL)
+        table, rig, options = load_data([monday]), load_rig_for([monday]), TrainingOptions(mean="mechanics")
+        save_model(train_model(table, rig, "vhgp", name=folder.name, options=options), folder / MODEL)
         cpu = time.process_time() - begin
         print(f"{load_model(folder / MODEL)!r}\n  {cpu:.0f} s of CPU", file=sys.stderr, flush=True)
 

@@ -88,14 +88,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.command == "table":
         print_tables(options.file)
         return
-    for case in _cases(options.data, options.rigs):
+    for case in cases_of(options.data, options.rigs):
         for model in options.models:
             for way in options.ways:
                 for draw in range(options.draws if way == "random" else 1):
                     _grow(case, model, way, draw, options.sizes or SIZES[case.kind], options.out)
 
 
-def _cases(data: Path | None, rigs: Sequence[str]) -> Iterator[Case]:
+def cases_of(data: Path | None, rigs: Sequence[str]) -> Iterator[Case]:
     if data is not None:
         with tempfile.TemporaryDirectory() as work:
             square = imported_square(data, Path(work))
