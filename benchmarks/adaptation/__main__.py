@@ -5,12 +5,13 @@
 
     python -m benchmarks.adaptation make --out DATA --rigs own:1 points:1 foreign:1
     python -m benchmarks.adaptation cut --bags RIG --out DATA/rig4_1
+    python -m benchmarks.adaptation measured --data FOLDER --out DATA
     python -m benchmarks.adaptation run --data DATA --out RESULTS [--methods adapted headed]
     python -m benchmarks.adaptation table --results RESULTS --markdown FILE --json FILE
 
-make: simulate the recordings of rigs, SIMULATOR:SEED, keep their windows and train Monday's model. cut: the same from
-before.mcap and after_NAME.mcap of another rig. run: score the methods on every Tuesday; scores of other methods are
-kept, and recordings that have those of all these methods are skipped unless --again. table: what they gain.
+make: simulate the recordings of rigs, keep their windows and train Monday's model. cut: the same from before.mcap and
+after_NAME.mcap of another rig. measured: from mlab and mcube_preliminary in FOLDER, in their order. run: score the
+methods on every Tuesday; what is kept is not scored again without --again. table: what the methods gain.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.adaptation.days import MODEL, cut_all, make, train, tuesdays
+from benchmarks.adaptation.days import MODEL, cut_all, cut_measured, make, train, tuesdays
 from benchmarks.adaptation.methods import METHODS, Tuesday
 from benchmarks.adaptation.results import Record, load_record, save_record
 from benchmarks.adaptation.tables import markdown, rows, seconds, verdict
@@ -47,6 +48,12 @@ def _make(options: argparse.Namespace) -> None:
 def _cut(options: argparse.Namespace) -> None:
     cut_all(options.bags, options.out)
     train(options.out)
+
+
+def _measured(options: argparse.Namespace) -> None:
+    cut_measured(options.data, options.out)
+    for folder in sorted(options.out.glob("m*_*")):
+        train(folder)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -91,6 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     command = commands.add_parser("cut")
     command.set_defaults(work=_cut)
     command.add_argument("--bags", type=Path, required=True)
+    command.add_argument("--out", type=Path, required=True)
+    command = commands.add_parser("measured")
+    command.set_defaults(work=_measured)
+    command.add_argument("--data", type=Path, required=True)
     command.add_argument("--out", type=Path, required=True)
     command = commands.add_parser("run")
     command.set_defaults(work=_run)

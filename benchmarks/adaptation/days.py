@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import sys
 import tempfile
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from benchmarks.adaptation.rigs import CHANGES, MONDAY, Session, write_session_of
-from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import rig_path, write_table
@@ -33,14 +34,14 @@ def make(out: Path, rig: str, seed: int) -> None:
             with tempfile.TemporaryDirectory() as work:
                 bag = Path(work) / name
                 write_session_of(bag, Session(rig, seed, name.removeprefix(AFTER)))
-                cut(bag, table)
+                cut([bag], table)
 
 
-def cut(bag: Path, table: Path) -> None:
-    """Write the windows of a recording and its rig."""
+def cut(data: Sequence[Path], table: Path) -> None:
+    """Write the windows of recordings or tables and the rig of the first."""
     table.parent.mkdir(parents=True, exist_ok=True)
-    save_rig(load_rig_for([bag]), rig_path(table))
-    write_table(table, load_data([bag]))
+    save_rig(load_rig_for(data[:1]), rig_path(table))
+    write_table(table, load_data(data))
     print(table, file=sys.stderr, flush=True)
 
 
@@ -49,17 +50,38 @@ def cut_all(bags: Path, folder: Path) -> None:
     for bag in sorted((*bags.glob(f"{MONDAY}*"), *bags.glob(f"{AFTER}*"))):
         table = folder / f"{bag.name.removesuffix('.mcap')}{ENDING}"
         if not table.exists():
-            cut(bag, table)
+            cut([bag], table)
+
+
+def cut_measured(data: Path, out: Path) -> None:
+    """Measured pushes in their order: for each log of mlab the one before it is Monday's; mcube's runs by block."""
+    with tempfile.TemporaryDirectory() as work:
+        import_source("mlab", [data / "mlab" / "sensor_log"], Path(work))
+        logs = sorted(Path(work).glob("*.csv"), key=lambda log: log.stem.partition("_exp_")[2])  # by day and time
+        for number, (before, after) in enumerate(pairwise(logs), start=1):
+            print(f"mlab_{number}: {before.stem} to {after.stem}", file=sys.stderr)
+            _pair([before], [after], out / f"mlab_{number}")
+    with tempfile.TemporaryDirectory() as work:
+        import_source("mcube", [data / "mcube_preliminary"], Path(work))
+        aluminium, steel = (sorted(Path(work).glob(f"{block}_block*")) for block in ("Al", "St"))
+        _pair(aluminium, steel, out / "mcube_1")
+        _pair(aluminium[:2], aluminium[2:], out / "mcube_2")
+        _pair(steel[:2], steel[2:], out / "mcube_3")
+
+
+def _pair(before: Sequence[Path], after: Sequence[Path], folder: Path) -> None:
+    cut(before, folder / f"{MONDAY}{ENDING}")
+    cut(after, folder / f"{AFTER}measured{ENDING}")
 
 
 def train(folder: Path) -> None:
     """Train what `push_predictor train --kind vhgp --mean mechanics` gives on Monday's windows, unless it is there."""
     if not (folder / MODEL).exists():
-        monday, begin = folder / f"{MONDAY}{ENDING}", time.process_time()
+        monday = folder / f"{MONDAY}{ENDING}"
         table, rig, options = load_data([monday]), load_rig_for([monday]), TrainingOptions(mean="mechanics")
-        save_model(train_model(table, rig, "vhgp", name=folder.name, options=options), folder / MODEL)
-        cpu = time.process_time() - begin
-        print(f"{load_model(folder / MODEL)!r}\n  {cpu:.0f} s of CPU", file=sys.stderr, flush=True)
+        model = train_model(table, rig, "vhgp", name=folder.name, options=options)
+        save_model(model, folder / MODEL)
+        print(model, file=sys.stderr, flush=True)
 
 
 def tuesdays(folder: Path) -> Iterator[tuple[str, LoadedData]]:

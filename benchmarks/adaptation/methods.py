@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from benchmarks.adaptation.rigs import KINDS, NOTHING, WEAR
+from benchmarks.adaptation.rigs import KINDS, WEAR
 from push_predictor.adaptation import Adaptation
 from push_predictor.adaptation.adaptation import USUAL
+from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.validation import comparison_of_moments
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -28,14 +30,13 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
-from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.extension.extended_model import refit_base
 from push_predictor.residuals.trace import trace
 
 SEEN = (0, 10, 30, 100)  # pushes since the change
-NEXT = 20  # pushes after the k seen: the test after a change that grows; else all from SEEN[-1] on are, for every k
+NEXT = 20  # pushes after those seen: the test after a change that grows
 HEADED = (*USUAL, "anisotropic_friction", "tilted_surface")
 SLID = "slid_distance"
 
@@ -53,21 +54,26 @@ class Tuesday:
         """In order of time."""
         return self.loaded.table.pushes
 
+    @cached_property
+    def seen(self) -> tuple[int, ...]:
+        """Numbers of pushes after which models are judged: SEEN, as far as there are pushes, or every one of a few."""
+        count = len(self.pushes)
+        return tuple(seen for seen in SEEN if seen < count) if count > SEEN[1] else tuple(range(count))
+
     def between(self, first: int, last: int) -> PushTable:
         """The windows of the pushes with these numbers."""
         return self.loaded.table.take(np.isin(self.loaded.table.push_id, self.pushes[first:last]))
 
     def tested(self, seen: int) -> PushTable:
-        """The pushes on which a model that has seen so many is judged."""
+        """The pushes on which a model that has seen so many is judged: the same for all, but after one that grows."""
         if self.change == WEAR:
             return self.between(seen, seen + NEXT)
-        return self.between(SEEN[-1], len(self.pushes))
+        return self.between(self.seen[-1], len(self.pushes))
 
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """What a method scored: after so many pushes, and on each of the first SEEN[-1] before it was seen; CPU s per update.
-    """
+    """Scores of a method after so many pushes, and on each of the first before it was seen; CPU s per update."""
 
     after: dict[int, PushScores]
     running: PushScores
@@ -90,17 +96,16 @@ def deployed(tuesday: Tuesday) -> Scored:
 def oracle(tuesday: Tuesday) -> Scored:
     """The deployed model with the effect that acts, if any."""
     evidence = evidence_of(tuesday.model, tuesday.loaded.table)
-    terms = true_terms(tuesday.change, evidence)
-    if not terms:
+    if (term := true_term(tuesday.change, evidence)) is None:
         return deployed(tuesday)
-    found = [_with_effect(tuesday.model, evidence, term) for term in terms]
-    gained = [scores(model, tuesday.loaded.table, tuesday.model).exact_nlpd.sum() for model in found]
-    return _steady(tuesday, found[int(np.argmin(gained))])
+    effects, cross = estimated(fitted(FitRows(evidence), [term]), of_size=True)
+    predictor = ExtendedPredictor(tuesday.model.predictor.base, effects, np.ones(3), cross)
+    return _steady(tuesday, replace(tuesday.model, predictor=predictor))
 
 
 def retrained(tuesday: Tuesday) -> Scored:
     """Refitted to the pushes so far; until there are ten it is the deployed one."""
-    return _known_at(tuesday, lambda seen: refit_base(tuesday.model, tuesday.between(0, seen)), SEEN[1:])
+    return _known_at(tuesday, lambda seen: refit_base(tuesday.model, tuesday.between(0, seen)), tuesday.seen[1:])
 
 
 def extended(tuesday: Tuesday) -> Scored:
@@ -110,18 +115,18 @@ def extended(tuesday: Tuesday) -> Scored:
         loaded = replace(tuesday.loaded, table=tuesday.between(0, seen), recordings=None)
         return trace(tuesday.model, loaded).extended or tuesday.model
 
-    return _known_at(tuesday, traced, SEEN[-1:])
+    return _known_at(tuesday, traced, tuesday.seen[-1:])
 
 
 def adapted(tuesday: Tuesday, mechanisms: Sequence[str] = USUAL) -> Scored:
     """Updated with the windows of every push."""
     adaptation = Adaptation(tuesday.model, mechanisms)
     after, running, seconds = {}, [], []
-    for number in range(SEEN[-1] + 1):
+    for number in range(tuesday.seen[-1] + 1):
         now, windows = adaptation.adapted, tuesday.between(number, number + 1)
-        if number in SEEN:
+        if number in tuesday.seen:
             after[number] = scores(now, tuesday.tested(number), tuesday.model)
-        if number < SEEN[-1]:
+        if number < tuesday.seen[-1]:
             running.append(scores(now, windows, tuesday.model))
             begin = time.process_time()
             adaptation.update(windows)
@@ -139,14 +144,14 @@ METHODS: dict[str, Callable[[Tuesday], Scored]] = {
 }
 
 
-def true_terms(change: str, evidence: Evidence) -> list[Candidate]:
-    """The true mechanism with its driver; of wear along one of two measures that grow together, both."""
-    if change == NOTHING:
-        return []
+def true_term(change: str, evidence: Evidence) -> Candidate | None:
+    """The true mechanism with its driver, None where nothing changed or it is not known what."""
+    if not KINDS.get(change):
+        return None
     if change != WEAR:
-        return [candidate(evidence, KINDS[change], "constant", DriverBasis("constant"))]
-    slid = evidence.table.covariates[SLID]
-    return [candidate(evidence, KINDS[change], SLID, replace(standard_basis("linear", SLID, slid), centre=(0.0,)))]
+        return candidate(evidence, KINDS[change], "constant", DriverBasis("constant"))
+    scale = (float(evidence.table.covariates[SLID].std()),)
+    return candidate(evidence, KINDS[change], SLID, DriverBasis("linear", (SLID,), (0.0,), scale))
 
 
 def joined(parts: Sequence[PushScores]) -> PushScores:
@@ -155,22 +160,19 @@ def joined(parts: Sequence[PushScores]) -> PushScores:
     return PushScores(*(np.concatenate([getattr(part, field) for part in parts]) for field in fields))
 
 
-def _with_effect(model: PushModel, evidence: Evidence, term: Candidate) -> PushModel:
-    effects, cross = estimated(fitted(FitRows(evidence), [term]), of_size=True)
-    return replace(model, predictor=ExtendedPredictor(model.predictor.base, effects, np.ones(3), cross))
-
-
 def _steady(tuesday: Tuesday, model: PushModel) -> Scored:
     """Scores of a model that does not learn."""
-    after = {seen: scores(model, tuesday.tested(seen), tuesday.model) for seen in SEEN}
-    return Scored(after, scores(model, tuesday.between(0, SEEN[-1]), tuesday.model))
+    after = {seen: scores(model, tuesday.tested(seen), tuesday.model) for seen in tuesday.seen}
+    return Scored(after, scores(model, tuesday.between(0, tuesday.seen[-1]), tuesday.model))
 
 
 def _known_at(tuesday: Tuesday, learn: Callable[[int], PushModel], sizes: Sequence[int]) -> Scored:
     """Scores of models that learn at these numbers of pushes; before the first, the deployed one predicts."""
-    after, running, before = {}, [], (0, tuesday.model)
+    after, running, begin, before = {}, [], 0, tuesday.model
     for seen in sizes:
-        running.append(scores(before[1], tuesday.between(before[0], seen), tuesday.model))
-        before = seen, learn(seen)
-        after[seen] = scores(before[1], tuesday.tested(seen), tuesday.model)
+        running.append(scores(before, tuesday.between(begin, seen), tuesday.model))
+        with suppress(PushPredictorError):  # too few pushes
+            before = learn(seen)
+        after[seen] = scores(before, tuesday.tested(seen), tuesday.model)
+        begin = seen
     return Scored(after, joined(running))

@@ -88,7 +88,7 @@ def pooled(records: Sequence[Record], method: str, part: Part) -> PushScores | N
 
 
 def first(record: Record, count: int) -> Record:
-    """The record with the running scores of the first pushes alone, in order of time for every method."""
+    """The record with the running scores of the first pushes alone, in order of time; extensions come too late."""
     wanted = record.pushes[:count]
 
     def cut(scored: Scored) -> Scored:
@@ -96,7 +96,7 @@ def first(record: Record, count: int) -> Record:
         rows = [row[push] for push in wanted]
         return replace(scored, running=PushScores(*(getattr(scored.running, field)[rows] for field in FIELDS)))
 
-    return replace(record, methods={name: cut(scored) for name, scored in record.methods.items()})
+    return replace(record, methods={name: cut(s) for name, s in record.methods.items() if name != "extended"})
 
 
 def gain(deployed: PushScores, other: PushScores) -> Estimate:

@@ -3,8 +3,8 @@
 
 """Recordings of one rig on two days, of three simulators: on the second day one property of the rig has changed.
 
-Monday's recording is of the plain rig. Tuesday's differ in one property each, from their first push on; with `wear`, the
-contact friction rises in proportion to the distance slid. Signs and directions are drawn.
+Monday's recording is of the plain rig. Tuesday's differ in one property each, from their first push on; with `wear`
+the contact friction rises in proportion to the distance slid. Signs and directions are drawn.
 """
 
 from __future__ import annotations

@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.adaptation.methods import SEEN
 from benchmarks.adaptation.results import Part, Record, after, coverage, first, gain, pooled, share
 from benchmarks.adaptation.rigs import CHANGES, NOTHING
 from push_predictor.evaluation.estimate import Estimate, total_exact_nlpd, total_nmse
-from push_predictor.evaluation.push_scores import PushScores
 
 OTHERS = ("adapted", "headed", "retrained", "extended", "oracle")
 HEAD = (
@@ -37,8 +35,9 @@ def rows(records: Sequence[Record]) -> list[dict[str, Any]]:
             same = [record for record in own if record.change == change]
             level = "rig" if name in {r.rig for r in records} else "simulator" if name != "all" else "all"
             known = {"rig": name, "level": level, "change": change, "recordings": len(same)}
-            found += [{**known, "table": "after", "pushes": k, **_numbers(same, after(k))} for k in SEEN]
-            for count in SEEN[1:]:
+            seen = sorted(set.intersection(*(set(record.methods["deployed"].after) for record in same)))
+            found += [{**known, "table": "after", "pushes": k, **_numbers(same, after(k))} for k in seen]
+            for count in seen[1:]:
                 begun = [first(record, count) for record in same]
                 found.append({**known, "table": "next", "pushes": count, **_numbers(begun, lambda s: s.running)})
     return found
@@ -47,14 +46,14 @@ def rows(records: Sequence[Record]) -> list[dict[str, Any]]:
 def _numbers(records: Sequence[Record], part: Part) -> dict[str, Any]:
     scores = {method: pooled(records, method, part) for method in ("deployed", *OTHERS)}
     deployed, oracle = scores["deployed"], scores["oracle"]
-    assert deployed is not None and oracle is not None
+    assert deployed is not None
     others = {name: found for name in OTHERS if (found := scores[name]) is not None}
     return {
         "nlpd": {name: float(total_exact_nlpd(s.totals())[0]) for name, s in scores.items() if s is not None},
         "nmse": {name: float(total_nmse(s.totals())[0]) for name, s in scores.items() if s is not None},
         "coverage": {name: coverage(s).tolist() for name, s in scores.items() if s is not None},
         "gain": {name: gain(deployed, s).json() for name, s in others.items()},
-        "share": {name: share(deployed, s, oracle).json() for name, s in others.items() if name != "oracle"},
+        "share": {name: share(deployed, s, oracle).json() for name, s in others.items() if oracle and name != "oracle"},
     }
 
 
@@ -73,16 +72,20 @@ def markdown(found: Sequence[dict[str, Any]], table: str, level: str) -> str:
 
 
 def verdict(found: Sequence[dict[str, Any]], method: str) -> Iterator[str]:
-    """Which of the targets a method reaches, pooled over all recordings, each simulator, and each rig."""
-    for level in ("all", "simulator", "rig"):
+    """Which of the targets a method reaches, pooled over all recordings and over each simulator."""
+    for level in ("all", "simulator"):
         own = [row for row in found if row["level"] == level and row["table"] == "after" and row["pushes"] > 0]
         for seen, target in SHARES.items():
-            known = [row for row in own if row["pushes"] == seen and row["share"].get(method, {}).get("value") is not None]
+            known = [
+                row for row in own if row["pushes"] == seen and row["share"].get(method, {}).get("value") is not None
+            ]
             short = [_name(row, f"{row['share'][method]['value']:.2f}") for row in known
                      if row["share"][method]["value"] < target]  # fmt: skip
             yield _line(f"{level}: share {target} after {seen} pushes", len(known), short)
         same = [row for row in own if row["change"] == NOTHING]
-        lost = [_name(row, f"{row['gain'][method]['value']:+.3f}") for row in same if row["gain"][method]["value"] < -LOSS]
+        lost = [
+            _name(row, f"{row['gain'][method]['value']:+.3f}") for row in same if row["gain"][method]["value"] < -LOSS
+        ]
         yield _line(f"{level}: loss at most {LOSS} where nothing changed", len(same), lost)
         outside = [_name(row, " ".join(f"{c:.3f}" for c in row["coverage"][method])) for row in own
                    if not COVERED[0] <= float(np.mean(row["coverage"][method])) <= COVERED[1]]  # fmt: skip
@@ -98,15 +101,13 @@ def _name(row: dict[str, Any], value: str) -> str:
 
 
 def _cell(estimate: dict[str, float | None] | None, form: str) -> str:
-    if estimate is None or estimate["value"] is None:
-        return ""
+    if estimate is None or estimate["value"] is None or not any(estimate.values()):
+        return ""  # not known, or the deployed model itself
     return Estimate(*(np.nan if v is None else v for v in estimate.values())).text(form)
 
 
 def seconds(records: Sequence[Record], method: str) -> str:
     """Median and largest processor time of an update."""
     every = np.array([s for record in records if method in record.methods for s in record.methods[method].seconds])
-    return f"{method}: an update takes {1e3 * np.median(every):.0f} ms of processor time, at most {1e3 * every.max():.0f} ms"
-
-
-__all__ = ["PushScores", "markdown", "rows", "seconds", "verdict"]
+    median, most = 1e3 * np.median(every), 1e3 * every.max()
+    return f"{method}: an update takes {median:.0f} ms of processor time, at most {most:.0f} ms"

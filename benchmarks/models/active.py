@@ -96,6 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def cases_of(data: Path | None, rigs: Sequence[str]) -> Iterator[Case]:
+    """The folds of mit_square, if the folder of the measured data is given, and the rigs SHAPE:SURFACE:SEED."""
     if data is not None:
         with tempfile.TemporaryDirectory() as work:
             square = imported_square(data, Path(work))
