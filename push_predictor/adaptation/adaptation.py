@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
@@ -136,9 +136,7 @@ class Adaptation:
         view = _View(self._mechanics, self._old, self._names, push)
         log_density = np.empty(len(self._groups))
         for k, own in enumerate(self._groups):
-            self._walks[k], log_density[k] = self._walks[k].after(
-                observed, lambda change, own=own: view.shift(own, change)
-            )
+            self._walks[k], log_density[k] = self._walks[k].after(observed, partial(view.shift, own))
         weight = self._log_weight + log_density
         weight = np.maximum(weight - weight.max(), -FORGOTTEN)
         self._log_weight = weight - np.log(np.exp(weight).sum())
@@ -281,7 +279,8 @@ def _prior_weights(count: int) -> Array:
 def _usual_square(tails: Tails | None) -> Array:
     """See Noise."""
     levels = (np.arange(LEVELS) + 0.5) / LEVELS
-    return np.mean([np.minimum(half_widths(tails, level) ** 2, LARGEST_SQUARE) for level in levels], axis=0)
+    squares = [np.minimum(half_widths(tails, level) ** 2, LARGEST_SQUARE) for level in levels.tolist()]
+    return np.asarray(np.mean(squares, axis=0))
 
 
 def _constant_effects(
@@ -302,9 +301,7 @@ def _check(model: PushModel, mechanisms: Sequence[str], speed: float | None) -> 
     base = model.predictor.base
     if isinstance(base, GaussianProcessPredictor) and base.mean is None:
         raise RequestError("model", model.name, "a model about mechanics: it has learnt the outcomes without them")
-    if unknown := [name for name in mechanisms if name not in _NAMES]:
-        raise RequestError("mechanism", unknown[0], f"some of {', '.join(_NAMES)}, each once")
-    if not mechanisms or len(set(mechanisms)) < len(mechanisms):
+    if not mechanisms or {*mechanisms} - {*_NAMES} or len({*mechanisms}) < len(mechanisms):
         raise RequestError("mechanisms", list(mechanisms), f"some of {', '.join(_NAMES)}, each once")
     if speed is not None and not (np.isfinite(speed) and speed >= 0.0):
         raise RequestError("speed", speed, "a finite number >= 0")
