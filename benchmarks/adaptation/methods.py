@@ -1,11 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The models of a Tuesday after its first k pushes, each scored on later pushes that none has seen.
+"""The models of a Tuesday after its first pushes, scored on later pushes that none of them has learned from.
 
 deployed: Monday's model. adapted: updated push by push; headed: the same with the mechanisms in the world among those
-that may change. retrained: refitted to the k pushes in its inputs (`refit_base`). extended: by `trace` of the k pushes,
-where it extends. oracle: the deployed model with the true mechanism and driver, its size fitted to all of Tuesday.
+that may change. retrained: refitted to these pushes in its inputs (`refit_base`). extended: by a `trace` of the most
+pushes. oracle: the deployed model with the true mechanism and driver, its size fitted to all of Tuesday.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.loading import LoadedData
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import refit_base
 from push_predictor.residuals.trace import trace
 
@@ -70,6 +70,13 @@ class Tuesday:
             return self.between(seen, seen + NEXT)
         return self.between(self.seen[-1], len(self.pushes))
 
+    def scores(self, model: PushModel, table: PushTable) -> PushScores:
+        """Of a model on a table; the NMSE is relative to the mean of the deployed model's training."""
+        found = model.predict_rows(table.inputs, table.duration, table.covariates)
+        comparison = comparison_of_moments(model, table, found.mean, found.covariance)
+        exact = model.exact_log_density(table)
+        return push_scores(replace(comparison, exact_log_density=exact, training_mean=self.model.training_mean))
+
 
 @dataclass(frozen=True, eq=False)
 class Scored:
@@ -80,32 +87,27 @@ class Scored:
     seconds: tuple[float, ...] = ()
 
 
-def scores(model: PushModel, table: PushTable, reference: PushModel) -> PushScores:
-    """Of a model on a table; the NMSE is relative to the mean of the reference's training."""
-    found = model.predict_rows(table.inputs, table.duration, table.covariates)
-    comparison = comparison_of_moments(model, table, found.mean, found.covariance)
-    exact = model.exact_log_density(table)
-    return push_scores(replace(comparison, exact_log_density=exact, training_mean=reference.training_mean))
-
-
 def deployed(tuesday: Tuesday) -> Scored:
     """The model as it is."""
     return _steady(tuesday, tuesday.model)
 
 
 def oracle(tuesday: Tuesday) -> Scored:
-    """The deployed model with the effect that acts, if any."""
-    evidence = evidence_of(tuesday.model, tuesday.loaded.table)
-    if (term := true_term(tuesday.change, evidence)) is None:
+    """With the effect that acts, if any is known."""
+    if (kind := KINDS.get(tuesday.change)) is None:
         return deployed(tuesday)
-    effects, cross = estimated(fitted(FitRows(evidence), [term]), of_size=True)
+    evidence, driver, basis = evidence_of(tuesday.model, tuesday.loaded.table), "constant", DriverBasis("constant")
+    if tuesday.change == WEAR:
+        scale = float(evidence.table.covariates[SLID].std())
+        driver, basis = SLID, DriverBasis("linear", (SLID,), (0.0,), (scale,))
+    effects, cross = estimated(fitted(FitRows(evidence), [candidate(evidence, kind, driver, basis)]), of_size=True)
     predictor = ExtendedPredictor(tuesday.model.predictor.base, effects, np.ones(3), cross)
     return _steady(tuesday, replace(tuesday.model, predictor=predictor))
 
 
 def retrained(tuesday: Tuesday) -> Scored:
-    """Refitted to the pushes so far; until there are ten it is the deployed one."""
-    return _known_at(tuesday, lambda seen: refit_base(tuesday.model, tuesday.between(0, seen)), tuesday.seen[1:])
+    """Refitted to the pushes so far."""
+    return _learning(tuesday, lambda seen: refit_base(tuesday.model, tuesday.between(0, seen)), tuesday.seen[1:])
 
 
 def extended(tuesday: Tuesday) -> Scored:
@@ -115,7 +117,7 @@ def extended(tuesday: Tuesday) -> Scored:
         loaded = replace(tuesday.loaded, table=tuesday.between(0, seen), recordings=None)
         return trace(tuesday.model, loaded).extended or tuesday.model
 
-    return _known_at(tuesday, traced, tuesday.seen[-1:])
+    return _learning(tuesday, traced, tuesday.seen[-1:])
 
 
 def adapted(tuesday: Tuesday, mechanisms: Sequence[str] = USUAL) -> Scored:
@@ -125,9 +127,9 @@ def adapted(tuesday: Tuesday, mechanisms: Sequence[str] = USUAL) -> Scored:
     for number in range(tuesday.seen[-1] + 1):
         now, windows = adaptation.adapted, tuesday.between(number, number + 1)
         if number in tuesday.seen:
-            after[number] = scores(now, tuesday.tested(number), tuesday.model)
+            after[number] = tuesday.scores(now, tuesday.tested(number))
         if number < tuesday.seen[-1]:
-            running.append(scores(now, windows, tuesday.model))
+            running.append(tuesday.scores(now, windows))
             begin = time.process_time()
             adaptation.update(windows)
             seconds.append(time.process_time() - begin)
@@ -144,35 +146,25 @@ METHODS: dict[str, Callable[[Tuesday], Scored]] = {
 }
 
 
-def true_term(change: str, evidence: Evidence) -> Candidate | None:
-    """The true mechanism with its driver, None where nothing changed or it is not known what."""
-    if not KINDS.get(change):
-        return None
-    if change != WEAR:
-        return candidate(evidence, KINDS[change], "constant", DriverBasis("constant"))
-    scale = (float(evidence.table.covariates[SLID].std()),)
-    return candidate(evidence, KINDS[change], SLID, DriverBasis("linear", (SLID,), (0.0,), scale))
-
-
 def joined(parts: Sequence[PushScores]) -> PushScores:
     """The scores of different pushes as one."""
-    fields = PushScores.__dataclass_fields__
-    return PushScores(*(np.concatenate([getattr(part, field) for part in parts]) for field in fields))
+    return PushScores(
+        *(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts), strict=True))
+    )
 
 
 def _steady(tuesday: Tuesday, model: PushModel) -> Scored:
     """Scores of a model that does not learn."""
-    after = {seen: scores(model, tuesday.tested(seen), tuesday.model) for seen in tuesday.seen}
-    return Scored(after, scores(model, tuesday.between(0, tuesday.seen[-1]), tuesday.model))
+    after = {seen: tuesday.scores(model, tuesday.tested(seen)) for seen in tuesday.seen}
+    return Scored(after, tuesday.scores(model, tuesday.between(0, tuesday.seen[-1])))
 
 
-def _known_at(tuesday: Tuesday, learn: Callable[[int], PushModel], sizes: Sequence[int]) -> Scored:
-    """Scores of models that learn at these numbers of pushes; before the first, the deployed one predicts."""
-    after, running, begin, before = {}, [], 0, tuesday.model
+def _learning(tuesday: Tuesday, learn: Callable[[int], PushModel], sizes: Sequence[int]) -> Scored:
+    """Scores of models that learn at these numbers of pushes, and until then are the deployed one."""
+    after, running, begin, model = {}, [], 0, tuesday.model
     for seen in sizes:
-        running.append(scores(before, tuesday.between(begin, seen), tuesday.model))
+        running.append(tuesday.scores(model, tuesday.between(begin, seen)))
         with suppress(PushPredictorError):  # too few pushes
-            before = learn(seen)
-        after[seen] = scores(before, tuesday.tested(seen), tuesday.model)
-        begin = seen
+            model = learn(seen)
+        after[seen], begin = tuesday.scores(model, tuesday.tested(seen)), seen
     return Scored(after, joined(running))

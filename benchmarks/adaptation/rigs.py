@@ -10,7 +10,7 @@ the contact friction rises in proportion to the distance slid. Signs and directi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,101 +39,86 @@ from push_predictor.types import Array
 
 MONDAY, NOTHING, WEAR = "before", "nothing", "wear"
 MONDAY_PUSHES, TUESDAY_PUSHES = 250, 140
-KINDS = {  # by change, the simulators' name of what acts
+KINDS = {  # by change, the name of what acts, the same in the simulators and in the library of mechanisms
     "contact_friction": "contact_friction",
     "pressure": "pressure_spread",
     "anisotropy": "anisotropic_friction",
     WEAR: "contact_friction",
     "tilt": "tilted_surface",
-    NOTHING: "",
 }
-CHANGES = tuple(KINDS)
-# Sizes in the units of the simulators' catalogues, medium to large there.
+CHANGES = (*KINDS, NOTHING)
+# Sizes in the units of the simulators' catalogues, medium to large there; those that may be negative are below zero.
 SIZES = {
-    "own": {"contact_friction": 0.25, "pressure": 1.5, "anisotropy": 0.3, WEAR: 0.5, "tilt": 0.04},
-    "points": {"contact_friction": 0.2, "pressure": 0.25, "anisotropy": 0.35, WEAR: 0.4, "tilt": 0.06},
-    "foreign": {"contact_friction": 0.25, "pressure": 0.15, "anisotropy": 0.5, WEAR: 0.45, "tilt": 0.06},
+    "own": {"contact_friction": 0.25, "pressure": -1.5, "anisotropy": 0.3, WEAR: 0.5, "tilt": 0.04},
+    "points": {"contact_friction": -0.2, "pressure": -0.25, "anisotropy": 0.35, WEAR: 0.4, "tilt": 0.06},
+    "foreign": {"contact_friction": -0.25, "pressure": -0.15, "anisotropy": 0.5, WEAR: 0.45, "tilt": 0.06},
 }
-SIGNED = {"own": ("pressure",), "points": ("contact_friction", "pressure"), "foreign": ("contact_friction", "pressure")}
 LEAST_FRICTION = 0.05  # of the contact after a change
 
 
-@dataclass(frozen=True)
-class Session:
-    """One recording of a rig: which simulator's, seed, one of CHANGES or MONDAY."""
-
-    rig: str
-    seed: int
-    name: str
-
-    @property
-    def pushes(self) -> int:
-        """Number of pushes."""
-        return MONDAY_PUSHES if self.name == MONDAY else TUESDAY_PUSHES
-
-    @property
-    def day(self) -> int:
-        """Number of the day, 0 on Monday: every recording has its own, so that no stamps coincide."""
-        return 0 if self.name == MONDAY else 1 + CHANGES.index(self.name)
-
-    @property
-    def rng(self) -> np.random.Generator:
-        """The generator of what is pushed, measured and changed."""
-        return np.random.default_rng([self.seed, 1 + self.day])
-
-    def value(self, rng: np.random.Generator, friction: float = np.inf) -> float:
-        """Size of the change; never a contact friction below LEAST_FRICTION."""
-        size = SIZES[self.rig][self.name]
-        negative = self.name in SIGNED[self.rig] and rng.random() < 0.5
-        return -size if negative and (self.name != "contact_friction" or friction - size > LEAST_FRICTION) else size
+def write_day(folder: Path, rig: str, seed: int, name: str) -> None:
+    """Write the bag of a recording of a rig, one of RIGS and a seed; name: one of CHANGES, or MONDAY."""
+    RIGS[rig](folder, seed, name)
 
 
-def write_session_of(folder: Path, session: Session) -> None:
-    """Write the bag of a recording into a new folder."""
-    RIGS[session.rig](folder, session)
+def _own(folder: Path, seed: int, name: str) -> None:
+    spec, rng = rig_of(np.random.default_rng([seed, 0]), "before", MONDAY_PUSHES), _rng(seed, name)
+    if name != MONDAY:
+        spec = later_spec(spec, rng, TUESDAY_PUSHES)
+    if name in KINDS:
+        known = conditions(spec)
+        world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, known, rng)
+        (kind,) = (kind for kind in IN_LIBRARY if kind.name == KINDS[name])
+        furthest = float(known.values["slid_distance"].max())
 
+        def strength(moment: Moment) -> Array:
+            slid = moment.conditions.values["slid_distance"]
+            return slid / furthest if name == WEAR else np.ones(len(slid))
 
-def _own(folder: Path, session: Session) -> None:
-    spec = rig_of(np.random.default_rng([session.seed, 0]), "before", MONDAY_PUSHES)
-    if session.name != MONDAY:
-        rng = session.rng
-        spec = later_spec(spec, rng, session.pushes)
-        if session.name != NOTHING:
-            known = conditions(spec)
-            world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, known, rng)
-            (kind,) = (kind for kind in IN_LIBRARY if kind.name == KINDS[session.name])
-            furthest = float(known.values["slid_distance"].max())
-
-            def strength(moment: Moment) -> Array:
-                slid = moment.conditions.values["slid_distance"]
-                return slid / furthest if session.name == WEAR else np.ones(len(slid))
-
-            spec = replace(spec, changes=kind.acts(session.value(rng), strength, world))
+        spec = replace(spec, changes=kind.acts(_size("own", name, rng), strength, world))
     write_recording(folder, simulate(spec))
 
 
-def _points(folder: Path, session: Session) -> None:
-    rig, rng = draw_points_rig(np.random.default_rng([session.seed, 0])), session.rng
-    planned, effects = plan_session(rng, rig, session.pushes), ()
-    if session.name not in (MONDAY, NOTHING):
-        driver = points_drivers.Driver("linear" if session.name == WEAR else "constant", measure="distance")
-        size, angle = session.value(rng, rig.contact_friction), float(rng.uniform(-np.pi, np.pi))
-        effects = (points_effects.Effect(KINDS[session.name], size, driver, angle),)
-    streams = record(rng, rig, planned, Scenario("library" if effects else "none", effects))
-    write_bag(folder, streams.serialised(EPOCH + 86_400.0 * session.day), rig.record(), "points_rig")
+def _points(folder: Path, seed: int, name: str) -> None:
+    rig, rng, effects = draw_points_rig(np.random.default_rng([seed, 0])), _rng(seed, name), ()
+    planned = plan_session(rng, rig, _pushes(name))
+    if name in KINDS:
+        driver = points_drivers.Driver("linear" if name == WEAR else "constant", measure="distance")
+        size, angle = _size("points", name, rng, rig.contact_friction), float(rng.uniform(-np.pi, np.pi))
+        effects = (points_effects.Effect(KINDS[name], size, driver, angle),)
+    streams = record(rng, rig, planned, Scenario("library", effects))
+    write_bag(folder, streams.serialised(EPOCH + 86_400.0 * _day(name)), rig.record(), "points_rig")
 
 
-def _foreign(folder: Path, session: Session) -> None:
-    rig, rng = draw_foreign_rig(np.random.default_rng([session.seed, 0])), session.rng
-    inputs, effects = draw_inputs(rng, rig, session.pushes, PushDistribution()), ()
-    if session.name not in (MONDAY, NOTHING):
-        driver = foreign_drivers.Driver("constant", "constant")
-        if session.name == WEAR:
-            driver = foreign_drivers.Driver("slid_distance", "linear", high=float(inputs.facts.slid.max()))
-        size, axis = session.value(rng, rig.contact_friction), float(rng.uniform(-np.pi, np.pi))
-        effects = (foreign_effects.Effect(KINDS[session.name], size, driver, axis),)
+def _foreign(folder: Path, seed: int, name: str) -> None:
+    rig, rng, effects = draw_foreign_rig(np.random.default_rng([seed, 0])), _rng(seed, name), ()
+    inputs = draw_inputs(rng, rig, _pushes(name), PushDistribution())
+    if name in KINDS:
+        furthest = float(inputs.facts.slid.max())
+        driver = foreign_drivers.Driver("slid_distance" if name == WEAR else "constant", "linear", high=furthest)
+        size, axis = _size("foreign", name, rng, rig.contact_friction), float(rng.uniform(-np.pi, np.pi))
+        effects = (foreign_effects.Effect(KINDS[name], size, driver, axis),)
     motion = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, effects)
-    write_session(rng, folder, rig, inputs, motion, Change("none"), FIRST_DAY + session.day * DAY)
+    write_session(rng, folder, rig, inputs, motion, Change("none"), FIRST_DAY + _day(name) * DAY)
 
 
-RIGS: dict[str, Callable[[Path, Session], None]] = {"own": _own, "points": _points, "foreign": _foreign}
+def _pushes(name: str) -> int:
+    return MONDAY_PUSHES if name == MONDAY else TUESDAY_PUSHES
+
+
+def _day(name: str) -> int:
+    """Every recording has a day of its own, so that no stamps coincide."""
+    return 0 if name == MONDAY else 1 + CHANGES.index(name)
+
+
+def _rng(seed: int, name: str) -> np.random.Generator:
+    return np.random.default_rng([seed, 1 + _day(name)])
+
+
+def _size(rig: str, name: str, rng: np.random.Generator, friction: float = np.inf) -> float:
+    size = abs(SIZES[rig][name])
+    negative = SIZES[rig][name] < 0.0 and rng.random() < 0.5
+    return -size if negative and (name != "contact_friction" or friction - size > LEAST_FRICTION) else size
+
+
+RIGS: dict[str, Callable[[Path, int, str], None]] = {"own": _own, "points": _points, "foreign": _foreign}
