@@ -35,6 +35,7 @@ ROWS = (
         ("residuals", "trace: from residual to effect", LIBRARY, 2),
         ("replay", "player without ROS", LIBRARY, 1.2),
         ("simulation", "rig simulator", LIBRARY, 1.2),
+        ("adaptation", "a model follows the rig", LIBRARY, 1.4),
     ),
     (
         ("evaluation", "metrics, alarm, reports", LIBRARY, 2),

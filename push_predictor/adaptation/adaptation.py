@@ -44,7 +44,6 @@ from push_predictor.types import Array, IntArray
 
 USUAL = ("contact_friction", "contact_asymmetry", "pressure_spread", "centre_of_friction", "body_anisotropy")
 UNCHANGED = 0.9  # probability that nothing has changed before the first push
-TOGETHER = 0.2  # that more than one mechanism has, if any
 FORGOTTEN = 6.0  # nats: no hypothesis falls further behind the best, so that a later change is found
 SPREAD = 1.5  # standard deviation of a change in units of PARAMETERS' spread
 TRAINED_NOISE = 40.0  # independent windows that the deployed model's noise is worth
@@ -117,7 +116,8 @@ class Adaptation:
         self._walks = [
             Walk.start(covariance[np.ix_(own, own)], low[own], high[own], noise, speeds) for own in self._groups
         ]
-        self._log_weight = np.log(_prior_weights(len(self._groups)))
+        others = max(len(self._groups) - 1, 1)
+        self._log_weight = np.log([UNCHANGED, *[(1.0 - UNCHANGED) / others] * others][: len(self._groups)])
 
     def update(self, windows: PushTable) -> None:
         """Take in the n windows of one push.
@@ -264,16 +264,6 @@ def _hypotheses(mechanisms: Sequence[str]) -> list[IntArray]:
     counts = [len(mechanism_named(name).quantities) for name in mechanisms]
     each = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
     return [np.arange(0), *each, *([np.arange(sum(counts))] if len(counts) > 1 else [])]
-
-
-def _prior_weights(count: int) -> Array:
-    """Of the hypotheses: a prior model has one."""
-    if count == 1:
-        return np.ones(1)
-    together = TOGETHER if count > 2 else 0.0
-    alone = count - 1 - (together > 0.0)
-    weights = [UNCHANGED, *[(1.0 - UNCHANGED) * (1.0 - together) / alone] * alone]
-    return np.array(weights + [(1.0 - UNCHANGED) * together] * (together > 0.0))
 
 
 def _usual_square(tails: Tails | None) -> Array:

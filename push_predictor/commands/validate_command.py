@@ -14,7 +14,7 @@ from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 from push_predictor.watch import part_of
 
-BEFORE_ALARM, BEFORE_ADAPTING = 0.1, 0.6  # shares of the time
+BEFORE_ALARM, BEFORE_ADAPTING = 0.2, 0.6  # shares of the time for windows and predictions, and for the alarm too
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -48,7 +48,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "%(const)s)",
     )
     parser.add_argument(
-        "--extended", type=Path, metavar="MODEL", help="with --adapt: a model to compare, such as that of a trace"
+        "--extended", type=Path, metavar="TRACED", help="with --adapt: a further model to compare, as that of a trace"
     )
     add_reading(parser)
     parser.set_defaults(run=run)
@@ -78,12 +78,11 @@ def run(options: argparse.Namespace) -> None:
     rig = reading.rig or recording_rig(options.recording)
     with progress("validate") as watch:
         watch("windows and predictions", 0.0)
+        judging = part_of(watch, BEFORE_ALARM, BEFORE_ADAPTING if options.adapt else 1.0)
         windows, comparison = validate_recording(model, options.recording, rig, warn, reading.topics, reading.checks)
         reading.save_topics([options.recording])
         table = windows_to_table(windows)
-        alarm = recording_alarm(
-            model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, BEFORE_ADAPTING)
-        )
+        alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, judging)
         metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}
         metrics["judgement"] = judged(metrics).sentence
         extended = load_model(options.extended) if options.extended else None

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from push_predictor.adaptation.adaptation import USUAL
 from push_predictor.evaluation.alarm.evidence import DEFAULT_RATE
 from push_predictor.nodes.parameters import Param
 from push_predictor.resources import SHIPPED
@@ -54,6 +55,7 @@ PREDICT_SERVER = (
     ),
     Param("world_frame", "world", "Frame in which sliders lie flat, with z up."),
     Param("adapt", False, "Let the default model follow the rig from its activation, as NAME_adapted."),
+    Param("adapt_mechanisms", list(USUAL), "Mechanisms whose parameters follow."),
     Param("autostart", True, "Configure and activate at start, without a lifecycle manager."),
     Param(
         "introspection",

@@ -95,7 +95,7 @@ class PredictServer(LifecycleNode):
         self._state = "unconfigured"
         self._first_default = self.value("default_model")
         self._frames = RequestFrames(self, self.value("world_frame"))
-        self._adapted = AdaptedModels(self, lambda: self._registry)
+        self._adapted = AdaptedModels(self, lambda: self._registry, self.value("adapt_mechanisms"))
         self._create_services()
         self._introspect(self.value("introspection"))
         check, alpha = self._check_active, lambda: float(self.value("trace_alpha"))

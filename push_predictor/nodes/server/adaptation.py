@@ -8,7 +8,7 @@ The windows of a push are taken in together, once a residual of another push arr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import RLock
@@ -28,10 +28,9 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.nodes.runtime import one_line
 from push_predictor_interfaces.msg import PushResidual
-from push_predictor_interfaces.srv import AdaptModel
 
 QUIET = 1.0  # s without a residual after which a push is over
-START, STOP, RESET, SAVE = (getattr(AdaptModel.Request, name) for name in ("START", "STOP", "RESET", "SAVE"))
+COMMANDS = ("start", "stop", "reset", "save")
 
 
 @dataclass
@@ -49,10 +48,13 @@ class _Following:
 
 
 class AdaptedModels:
-    """Makes one loaded model at a time follow, as NAME_adapted in the registry that `registry` returns."""
+    """Makes one loaded model at a time follow, as NAME_adapted in the registry that `registry` returns.
 
-    def __init__(self, node: Node, registry: Callable[[], ModelRegistry]) -> None:
-        self._node, self._registry = node, registry
+    mechanisms: those that may change, see Adaptation.
+    """
+
+    def __init__(self, node: Node, registry: Callable[[], ModelRegistry], mechanisms: Sequence[str]) -> None:
+        self._node, self._registry, self._mechanisms = node, registry, mechanisms
         self._known: _Following | None = None
         self._lock = RLock()  # residuals and commands arrive in two threads
         group = MutuallyExclusiveCallbackGroup()
@@ -61,19 +63,19 @@ class AdaptedModels:
 
     def handle(self, registry: ModelRegistry, request: Any, response: Any) -> None:
         """Fill the response to AdaptModel. Raises PushPredictorError."""
-        if request.command not in (START, STOP, RESET, SAVE):
-            raise RequestError("command", request.command, "STOP (0), START (1), RESET (2) or SAVE (3)")
+        if request.command not in COMMANDS:
+            raise RequestError("command", request.command, f"one of {', '.join(COMMANDS)}")
         with self._lock:
-            if request.command == START:
+            if request.command == "start":
                 self.start(request.model)
             if (known := self._following) is None:
-                raise InactiveError("no model follows: START comes first")
+                raise InactiveError("no model follows: start comes first")
             self._end_push(known)
-            if request.command == RESET:
+            if request.command == "reset":
                 self._begin(known.name, known.running)
-            elif request.command == SAVE:
+            elif request.command == "save":
                 _save(known.adaptation, request.path)
-            elif request.command == STOP:
+            elif request.command == "stop":
                 known.running = False
             found = (self._following or known).adaptation
             response.success, response.name, response.message = True, found.adapted.name, str(found)
@@ -131,7 +133,7 @@ class AdaptedModels:
     def _begin(self, name: str, running: bool = True) -> None:
         registry = self._registry()
         served = registry.get(name)
-        adaptation = Adaptation(served.model, predict=served.predict_rows)
+        adaptation = Adaptation(served.model, self._mechanisms, predict=served.predict_rows)
         self._known = _Following(registry, served, name, adaptation, running)
         _publish(self._known)
 
