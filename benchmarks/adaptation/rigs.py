@@ -32,7 +32,7 @@ from benchmarks.points_rig.scenarios import Scenario
 from benchmarks.points_rig.sessions import plan_session
 from benchmarks.support.bags import write_bag
 from push_predictor.recordings.write import write_recording
-from push_predictor.simulation.changes import Moment
+from push_predictor.simulation.changes import Changes, Moment
 from push_predictor.simulation.physics import GRAVITY
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.types import Array
@@ -75,12 +75,15 @@ def _own(folder: Path, seed: int, name: str) -> None:
             slid = moment.conditions.values["slid_distance"]
             return slid / furthest if name == WEAR else np.ones(len(slid))
 
-        spec = replace(spec, changes=kind.acts(_size("own", name, rng), strength, world))
+        changes = kind.acts(_size("own", name, rng), strength, world)
+        assert isinstance(changes, Changes)  # the library has no errors of measurement
+        spec = replace(spec, changes=changes)
     write_recording(folder, simulate(spec))
 
 
 def _points(folder: Path, seed: int, name: str) -> None:
-    rig, rng, effects = draw_points_rig(np.random.default_rng([seed, 0])), _rng(seed, name), ()
+    rig, rng = draw_points_rig(np.random.default_rng([seed, 0])), _rng(seed, name)
+    effects: tuple[points_effects.Effect, ...] = ()
     planned = plan_session(rng, rig, _pushes(name))
     if name in KINDS:
         driver = points_drivers.Driver("linear" if name == WEAR else "constant", measure="distance")
@@ -91,7 +94,8 @@ def _points(folder: Path, seed: int, name: str) -> None:
 
 
 def _foreign(folder: Path, seed: int, name: str) -> None:
-    rig, rng, effects = draw_foreign_rig(np.random.default_rng([seed, 0])), _rng(seed, name), ()
+    rig, rng = draw_foreign_rig(np.random.default_rng([seed, 0])), _rng(seed, name)
+    effects: tuple[foreign_effects.Effect, ...] = ()
     inputs = draw_inputs(rng, rig, _pushes(name), PushDistribution())
     if name in KINDS:
         furthest = float(inputs.facts.slid.max())
