@@ -130,16 +130,16 @@ def markdown(found: Sequence[dict[str, Any]], table: str, level: str) -> str:
 
 def verdict(found: Sequence[dict[str, Any]], method: str) -> Iterator[str]:
     """For each target, how many rows at the levels all and simulator reach it, and which do not."""
-    seen = [row for row in found if row["table"] == "after" and row["pushes"] > 0 and method in row["gain"]]
     for level in ("all", "simulator"):
-        own = [row for row in seen if row["level"] == level]
+        own = [row for row in found if row["level"] == level and method in row["gain"]]
+        after = [row for row in own if row["table"] == "after"]
         for count, target in SHARES.items():
-            shares = {_name(row): row["share"][method]["value"] for row in own if row["pushes"] == count}
+            shares = {_name(row): row["share"][method]["value"] for row in after if row["pushes"] == count}
             known = {name: value for name, value in shares.items() if value is not None}
             yield _line(f"{level}: {target} of the oracle's gain after {count} pushes", known, target, np.inf)
         same = {_name(row): row["gain"][method]["value"] for row in own if row["change"] == NOTHING}
         yield _line(f"{level}: loss of at most {LOSS} nats where nothing changed", same, -LOSS, np.inf)
-        covered = {_name(row): float(np.mean(row["coverage"][method])) for row in own}
+        covered = {_name(row): float(np.mean(row["coverage"][method])) for row in after if row["pushes"]}
         yield _line(f"{level}: mean coverage from {COVERED[0]} to {COVERED[1]}", covered, *COVERED)
 
 
@@ -149,7 +149,7 @@ def _line(what: str, values: dict[str, float], low: float, high: float) -> str:
 
 
 def _name(row: dict[str, Any]) -> str:
-    return f"{row['rig']} {row['change']} {row['pushes']}"
+    return f"{row['rig']} {row['change']} {row['table']} {row['pushes']}"
 
 
 def _order(change: str) -> tuple[int, str]:

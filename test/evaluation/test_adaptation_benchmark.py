@@ -60,10 +60,10 @@ def test_the_next_pushes_are_the_first_in_time() -> None:
 
 def test_targets_name_what_misses_them() -> None:
     lines = list(verdict(rows([record("tilt", -2.6), record(NOTHING, -1.97, covered=0.92)]), "adapted"))
-    assert "all: 0.5 of the oracle's gain after 10 pushes: 1 of 2; not all nothing 10 (-0.030)" in lines[0]
-    assert "0.8 of the oracle's gain after 30 pushes: 0 of 2; not all tilt 30 (0.600)" in lines[1]
-    assert "0 of 2; not all nothing 10 (-0.030), all nothing 30 (-0.030)" in lines[2]
-    assert "2 of 4; not all nothing 10 (0.920), all nothing 30 (0.920)" in lines[3]
+    assert "all: 0.5 of the oracle's gain after 10 pushes: 1 of 2; not all nothing after 10 (-0.030)" in lines[0]
+    assert "0.8 of the oracle's gain after 30 pushes: 0 of 2; not all tilt after 30 (0.600)" in lines[1]
+    assert "0 of 5; not all nothing after 0 (-0.030), all nothing after 10 (-0.030), all nothing next" in lines[2]
+    assert "2 of 4; not all nothing after 10 (0.920), all nothing after 30 (0.920)" in lines[3]
 
 
 @pytest.mark.parametrize(("change", "tested"), [("tilt", range(100, 140)), (WEAR, range(30, 50))])
