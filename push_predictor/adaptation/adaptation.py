@@ -43,7 +43,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 USUAL = ("contact_friction", "contact_asymmetry", "pressure_spread", "centre_of_friction", "body_anisotropy")
-UNCHANGED = 0.9  # probability that nothing has changed before the first push
+UNCHANGED = 0.95  # probability that nothing has changed before the first push
 FORGOTTEN = 6.0  # nats: no hypothesis falls further behind the best, so that a later change is found
 SPREAD = 1.5  # standard deviation of a change in units of PARAMETERS' spread
 TRAINED_NOISE = 40.0  # independent windows that the deployed model's noise is worth
@@ -153,8 +153,12 @@ class Adaptation:
         """The parameters that follow, in the order of the mechanisms."""
         change, covariance = self._change
         half = CERTAIN * np.sqrt(np.diagonal(covariance))
-        columns = zip(self._names, self._values + change, half, self._values, strict=True)
-        return [AdaptedParameter(k, BY_NAME[k].unit, v, v - h, v + h, was) for k, v, h, was in columns]
+        now = self._values + change
+        columns = zip((BY_NAME[name] for name in self._names), now, now - half, now + half, self._values, strict=True)
+        return [
+            AdaptedParameter(p.name, p.unit, value, max(low, p.low), min(high, p.high), deployed)
+            for p, value, low, high, deployed in columns
+        ]
 
     @property
     def noise(self) -> Array:

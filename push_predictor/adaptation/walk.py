@@ -21,7 +21,11 @@ import numpy as np
 from push_predictor.models.mechanics.fit import DEGREES
 from push_predictor.types import Array
 
-SPEEDS = {0.0: 0.8, 0.02: 0.18, 0.3: 0.02}  # standard deviations of a change per push, and how often: none, wear, jumps
+SPEEDS = {
+    0.0: 0.85,
+    0.02: 0.14,
+    0.3: 0.01,
+}  # standard deviations per push, and how often: none, wear, jumps
 STEADY = 0.8  # probability that the speed stays, else it is drawn again: a jump takes some five pushes
 LINEARISED = 3  # times per push
 CORRELATION = 0.8  # of the windows of a push: they share the friction under it and what a model misses there

@@ -20,6 +20,7 @@ from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import mechanism_named
+from push_predictor.models.predictors import ExtendedPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.train import TrainingOptions, train_model
@@ -175,6 +176,54 @@ def test_a_prior_model_follows_in_its_own_parameters() -> None:
     assert adaptation.adapted.predictor.effects == ()
 
 
+def test_a_second_change_is_found_though_the_first_explained_much(deployed: PushModel) -> None:
+    first, both = constant("contact_friction", -0.2), constant("centre_of_friction", 0.0, 0.008)
+    adaptation = adapted_to(deployed, pushes(60, 1, first))
+    for push in each(pushes(30, 2, first, both)):
+        adaptation.update(push)
+    assert changes(adaptation)["centre_y"] == pytest.approx(0.008, abs=0.003)
+
+
+def test_while_it_is_open_whether_something_changed_the_interval_reaches_from_one_to_the_other(
+    deployed: PushModel,
+) -> None:
+    adaptation, change = Adaptation(deployed), -0.06
+    for push in each(pushes(40, 1, constant("contact_friction", change))):
+        adaptation.update(push)
+        friction = adaptation.parameters[0]
+        if 0.3 < (friction.value - friction.deployed) / change < 0.7:
+            assert friction.high - friction.low > 1.5 * abs(change)
+            return
+    raise AssertionError("it was never open")
+
+
+def test_no_interval_leaves_the_plausible_range(deployed: PushModel) -> None:
+    adaptation = Adaptation(deployed)
+    for push in each(pushes(12, 1, constant("contact_friction", -0.29))):
+        adaptation.update(push)
+        assert all(p.low >= 0.0 for p in adaptation.parameters if p.name == "contact_friction")
+
+
+def test_the_noise_is_a_factor_on_what_the_deployed_model_has(deployed: PushModel) -> None:
+    base = extended(deployed, slippery(-0.1), scale=(1.5, 1.0, 1.0))
+    adaptation = adapted_to(base, pushes(5, 1, slippery(-0.1)))
+    found = adaptation.adapted.predictor
+    assert isinstance(found, ExtendedPredictor)
+    np.testing.assert_allclose(found.scale, [1.5, 1.0, 1.0] * adaptation.noise)
+    prior = train_model(pushes(20, 1), square_rig(), "prior", name="prior")
+    adaptation = adapted_to(prior, pushes(5, 2))
+    before, after = prior.predictor, adaptation.adapted.predictor
+    assert isinstance(before, PriorPredictor) and isinstance(after, PriorPredictor)
+    np.testing.assert_allclose(after.noise.factor, before.noise.factor * adaptation.noise**2)
+
+
+def test_the_outputs_of_a_learnt_model_are_taken_one_by_one() -> None:
+    learnt = train_model(*square_pushes(60), "gp", name="gp")
+    apart = replace(learnt, predictor=learnt.predictor.with_independent_outputs())
+    table = square_pushes(4, seed=1)[0]
+    assert changes(adapted_to(learnt, table)) == pytest.approx(changes(adapted_to(apart, table)), abs=1e-9)
+
+
 def wrong(model: PushModel, **options: object) -> Adaptation:
     return Adaptation(model, **options)  # type: ignore[arg-type]
 
@@ -208,6 +257,7 @@ def walk(speeds: dict[float, float] | None = None) -> Walk:
 
 
 SLOPES = np.random.default_rng(0).standard_normal((4, 3, 2))
+GRAM = np.einsum("nkp,nkq->pq", SLOPES, SLOPES)
 
 
 def linear(change: Array) -> tuple[Array, Array]:
@@ -242,6 +292,37 @@ def test_the_speed_is_learnt() -> None:
             residual = SLOPES @ value + 1e-2 * rng.standard_normal((4, 3))
             found, _ = found.after(Observed(residual, covariance), linear)
         assert np.argmax(found.probability) == likelier
+
+
+def push_of(change: list[float], noise: float = 0.1) -> Observed:
+    """What these changes do, exactly; its covariance says that it may be off by `noise`."""
+    return Observed(SLOPES @ change, np.tile(noise**2 * np.eye(3), (4, 1, 1)))
+
+
+def test_a_push_far_from_what_is_known_moves_the_parameters_less_than_by_bayes() -> None:
+    found = walk()
+    for _ in range(20):
+        found, _ = found.after(push_of([0.0, 0.0]), linear)
+    odd = push_of([0.0, 0.0])._replace(residual=np.tile([3.0, -3.0, 3.0], (4, 1)))
+    after, _ = found.after(odd, linear)
+    gain = np.linalg.inv(
+        np.linalg.inv(found.covariance) + 100.0 / (1.0 + 3.0 * CORRELATION) * GRAM / found.noise.factor[0]
+    )
+    by_bayes = gain @ (100.0 / (1.0 + 3.0 * CORRELATION) * np.einsum("nkp,nk->p", SLOPES, odd.residual))
+    assert np.linalg.norm(after.mean - found.mean) < 0.1 * np.linalg.norm(by_bayes)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_push_that_only_implausible_parameters_explain_is_refused_and_the_next_plausible_one_is_not(
+    sign: float,
+) -> None:
+    start = walk({0.3: 1.0})
+    found = start
+    for _ in range(5):
+        found, _ = found.after(push_of([sign * 3.0, 0.0], 0.01), linear)
+    assert found.refused and abs(found.mean[0]) <= 1.0
+    found, _ = start.after(push_of([sign * 0.2, 0.1], 0.01), linear)
+    assert not found.refused and found.mean == pytest.approx([sign * 0.2, 0.1], abs=0.02)
 
 
 # --- a recording ------------------------------------------------------------------------------------------------
