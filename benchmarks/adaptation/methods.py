@@ -112,12 +112,9 @@ def retrained(tuesday: Tuesday) -> Scored:
 
 def extended(tuesday: Tuesday) -> Scored:
     """The model that `trace` extends, the deployed one where it refuses."""
-
-    def traced(seen: int) -> PushModel:
-        loaded = replace(tuesday.loaded, table=tuesday.between(0, seen), recordings=None)
-        return trace(tuesday.model, loaded).extended or tuesday.model
-
-    return _learning(tuesday, traced, tuesday.seen[-1:])
+    seen, model = tuesday.seen[-1:], tuesday.model
+    known = replace(tuesday.loaded, table=tuesday.between(0, seen[0]), recordings=None)
+    return _learning(tuesday, lambda _: trace(model, known).extended or model, seen)
 
 
 def adapted(tuesday: Tuesday, mechanisms: Sequence[str] = USUAL) -> Scored:

@@ -87,17 +87,12 @@ def scores_of(record: Record, method: str, table: str, seen: int) -> PushScores 
     scored = record.methods.get(method)
     if scored is None or (table == "next" and method == "extended"):  # which comes too late for these
         return None
-    found = scored.after.get(seen) if table == "after" else first(scored.running, record.pushes[:seen])
-    if found is None:
-        return None
-    return replace(found, push_id=np.char.add(f"{record.rig}/{record.change}/", found.push_id))
-
-
-def first(scores: PushScores, pushes: Sequence[str]) -> PushScores:
-    """The scores of these pushes, in their order."""
-    known = scores.push_id.tolist()
-    rows = [known.index(push) for push in pushes]
-    return PushScores(*(column[rows] for column in vars(scores).values()))
+    found = scored.after.get(seen)
+    if table == "next":
+        rows = np.isin(scored.running.push_id, record.pushes[:seen])
+        rows = np.flatnonzero(rows)[np.argsort(scored.running.push_id[rows])]  # in the same order for all methods
+        found = PushScores(*(column[rows] for column in vars(scored.running).values()))
+    return found and replace(found, push_id=np.char.add(f"{record.rig}/{record.change}/", found.push_id))
 
 
 def share(deployed: PushScores, other: PushScores, oracle: PushScores) -> Estimate:
