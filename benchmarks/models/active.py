@@ -9,7 +9,7 @@
 
 --data: the folder of the measured data: whole pushes of mit_square are chosen from four of five folds, and the fifth is
 predicted. --rigs: simulated ones, each with a pool of 300 pushes and 100 others to predict. `run` appends one line per
-trained model to FILE; `table` prints the tables of docs/results/prior.md.
+trained model to FILE; `table` prints the tables of docs/results/prior.md. "prior, adapted" follows push by push.
 
 Every way starts with its own first batch and grows to the sizes below; the model is trained again after each batch. The
 pushes that matter are those of the pool, of which a way sees the inputs of all and the outcomes of those it has chosen.
@@ -28,6 +28,7 @@ import numpy as np
 
 from benchmarks.measured.square import imported_square
 from benchmarks.models.active_table import REFERENCE, print_tables
+from push_predictor.adaptation import Adaptation
 from push_predictor.design.batch import CHOSEN_OF_PRIOR, FIRST, information_of
 from push_predictor.design.candidates import Courses
 from push_predictor.design.information import Information
@@ -50,6 +51,7 @@ LARGEST_CHOSEN = {"mit_square": 40, "simulated": 50}  # by other ways than the r
 MODELS: dict[str, tuple[str, MeanChoice]] = {
     "gp": ("gp", "zero"),
     "prior": ("prior", "zero"),
+    "prior, adapted": ("prior", "zero"),
     "gp, mechanics": ("gp", "mechanics"),
     "vhgp, mechanics": ("vhgp", "mechanics"),
 }
@@ -138,6 +140,11 @@ def _grow(case: Case, model: str, way: str, draw: int, sizes: Sequence[int], out
 
 def _train(case: Case, model: str, rows: PushTable) -> PushModel:
     kind, mean = MODELS[model]
+    if model == "prior, adapted":
+        adaptation = Adaptation(train_model(empty_table(), case.rig, kind, name=model))
+        for push in rows.pushes:
+            adaptation.update(rows.take(rows.push_id == push))
+        return adaptation.adapted
     return train_model(rows, case.rig, kind, name=model, options=TrainingOptions(mean=mean))
 
 

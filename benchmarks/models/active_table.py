@@ -137,10 +137,12 @@ def _count(pushes: float, curve: Curve) -> str:
 
 def _print_differences(curves: Mapping[tuple[str, str], Curve]) -> None:
     """`suggest` minus the other ways on the same predicted pushes."""
-    others = [way for way in dict.fromkeys(way for _, way in curves) if way != "suggest"]
+    if "suggest" not in (ways := list(dict.fromkeys(way for _, way in curves))):
+        return
+    others = [way for way in ways if way != "suggest"]
     heads = [f"minus {way}: {score}" for way in others for score in ("NMSE", "NLPD")]
     print("\n| model | pushes | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 2) + "|")
-    for model in dict.fromkeys(model for model, _ in curves):
+    for model in dict.fromkeys(model for model, way in curves if way == "suggest"):
         own = curves[model, "suggest"]
         for k, size in enumerate(own.sizes.tolist()):
             compared = [curves.get((model, way)) for way in others]
