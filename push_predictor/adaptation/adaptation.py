@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -47,6 +47,7 @@ UNCHANGED = 0.95  # probability that nothing has changed before the first push
 FORGOTTEN = 6.0  # nats: no hypothesis falls further behind the best, so that a later change is found
 SPREAD = 1.5  # standard deviation of a change in units of PARAMETERS' spread
 TRAINED_NOISE = 40.0  # independent windows that the deployed model's noise is worth
+NEGLIGIBLE = 0.05  # such standard deviations: a change this small and certain is left out
 ACCURACY = 3e-3  # of displacements, relative
 CERTAIN = 1.96
 LEVELS = 200  # quantiles of which a mean is taken
@@ -104,7 +105,7 @@ class Adaptation:
         else:
             names = tuple(name for each in mechanisms for name in mechanism_named(each).quantities)
             self._groups = _hypotheses(mechanisms)
-            covariance, windows = np.diag([(SPREAD * BY_NAME[name].spread) ** 2 for name in names]), TRAINED_NOISE
+            covariance, windows = np.diag(_spreads(mechanisms) ** 2), TRAINED_NOISE
         fitted = base.mechanics
         self._names, self._values = names, np.array([fitted.value(name) for name in names])
         self._mechanics = replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY))
@@ -280,15 +281,24 @@ def _usual_square(tails: Tails | None) -> Array:
 def _constant_effects(
     mechanisms: Sequence[str], change: Array, covariance: Array
 ) -> tuple[tuple[Effect, ...], dict[tuple[int, int], Array]]:
-    """Effects that are the same for every push, and the covariance of each two."""
+    """Effects that are the same for every push, and the covariance of each two.
+
+    A mechanism that has hardly changed, and is nearly certain not to have, is left out: it would cost time.
+    """
     ends = np.cumsum([0, *(len(mechanism_named(name).quantities) for name in mechanisms)])
-    parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+    size = np.sqrt(change**2 + np.diagonal(covariance)) / _spreads(mechanisms)
+    parts = [(name, slice(*ends)) for name, ends in zip(mechanisms, pairwise(ends.tolist()), strict=True)]
+    parts = [(name, own) for name, own in parts if np.any(size[own] > NEGLIGIBLE)]
     effects = tuple(
-        Effect(name, "constant", CONSTANT, change[own], covariance[own, own], np.ones(3))
-        for name, own in zip(mechanisms, parts, strict=True)
+        Effect(name, "constant", CONSTANT, change[own], covariance[own, own], np.ones(3)) for name, own in parts
     )
-    pairs = [(i, j) for i in range(len(parts)) for j in range(i + 1, len(parts))]
-    return effects, {(i, j): covariance[parts[i], parts[j]] for i, j in pairs}
+    pairs = combinations(range(len(parts)), 2)
+    return effects, {(i, j): covariance[parts[i][1], parts[j][1]] for i, j in pairs}
+
+
+def _spreads(mechanisms: Sequence[str]) -> Array:
+    """Prior standard deviations (p,) of changes of the parameters of mechanisms."""
+    return np.array([SPREAD * BY_NAME[name].spread for each in mechanisms for name in mechanism_named(each).quantities])
 
 
 def _check(model: PushModel, mechanisms: Sequence[str], speed: float | None) -> None:

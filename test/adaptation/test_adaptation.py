@@ -204,6 +204,12 @@ def test_no_interval_leaves_the_plausible_range(deployed: PushModel) -> None:
         assert all(p.low >= 0.0 for p in adaptation.parameters if p.name == "contact_friction")
 
 
+def test_mechanisms_that_certainly_stayed_cost_no_time(deployed: PushModel) -> None:
+    start, found = Adaptation(deployed), adapted_to(deployed, pushes(40, 1, constant("contact_friction", -0.15)))
+    assert len(start.adapted.predictor.effects) == 5
+    assert [effect.mechanism for effect in found.adapted.predictor.effects] == ["contact_friction"]
+
+
 def test_the_noise_is_a_factor_on_what_the_deployed_model_has(deployed: PushModel) -> None:
     base = extended(deployed, slippery(-0.1), scale=(1.5, 1.0, 1.0))
     adaptation = adapted_to(base, pushes(5, 1, slippery(-0.1)))
