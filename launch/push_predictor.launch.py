@@ -23,7 +23,7 @@ from push_predictor.nodes.parameter_tables import PUSH_REPLAY, PUSH_VALIDATOR
 from push_predictor.nodes.parameters import Param
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
 
-CHOICES = dict.fromkeys(("use_sim_time", "autostart", "rviz"), SWITCH) | {
+CHOICES = dict.fromkeys(("use_sim_time", "autostart", "adapt", "rviz"), SWITCH) | {
     "reliability": ("", "reliable", "best_effort")
 }
 
@@ -35,6 +35,7 @@ ARGUMENTS = (
     ("log_level", "info", "debug, info, warn, error or fatal."),
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
+    ("adapt", "false", "Let the model follow the rig, as NAME_adapted beside it."),
     ("recording", "", "Recording to replay: a folder, .mcap, .db3 or .bag file. Empty: none, the sensors are live."),
     ("model", "", "Model file to load and to validate, or default: the simulated one that ships with the package."),
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
@@ -73,7 +74,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
 def _server(given: dict[str, str]) -> dict[str, Any]:
     model = given["model"]
     models = {"models": [SHIPPED if model == SHIPPED else _path(model)]} if model else {}
-    return {**models, **_switch(given, "autostart", default=True)}
+    return {**models, **_switch(given, "autostart", default=True), **_switch(given, "adapt", default=False)}
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
