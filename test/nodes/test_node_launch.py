@@ -158,8 +158,9 @@ def test_parameter_file_applies_where_no_argument_is_given(launch_file):
     """In ROS the later of two sources wins, so an argument that was not given must not be passed at all."""
     for node in nodes(launch_file, params_file="/p.yaml", recording="/b").values():
         assert node["parameters"][0] == "/p.yaml"
-        assert not {"autostart", "use_sim_time", "play.rate"} & parameters(node).keys()
+        assert not {"autostart", "adapt", "use_sim_time", "play.rate"} & parameters(node).keys()
     assert parameters(nodes(launch_file, autostart="false")["predict_server"]) == {"autostart": False}
+    assert parameters(nodes(launch_file, adapt="true")["predict_server"]) == {"adapt": True}
 
 
 def test_rviz_is_optional_and_uses_the_installed_configuration(
