@@ -89,8 +89,8 @@ def scores_of(record: Record, method: str, table: str, seen: int) -> PushScores 
         return None
     found = scored.after.get(seen)
     if table == "next":
-        rows = np.isin(scored.running.push_id, record.pushes[:seen])
-        rows = np.flatnonzero(rows)[np.argsort(scored.running.push_id[rows])]  # in the same order for all methods
+        known = scored.running.push_id.tolist()
+        rows = [known.index(push) for push in record.pushes[:seen]]
         found = PushScores(*(column[rows] for column in vars(scored.running).values()))
     return found and replace(found, push_id=np.char.add(f"{record.rig}/{record.change}/", found.push_id))
 
