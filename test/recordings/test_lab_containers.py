@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab, write_db3, write_ros1
-from test_lab_topics import NAMES, TIP, UR, VICON, assert_same_windows, original, tf_lab, vicon_and_ur
+from test_lab_topics import NAMES, TIP, UR, VICON, assert_same_windows, original, tf_lab, vicon_and_ur, wrench
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import open_bag
@@ -62,8 +62,7 @@ def test_each_container_gives_the_windows_of_the_original(tmp_path: Path, write:
     lab = vicon_and_ur() if kind == "transforms" else tf_lab()
     topics = NAMES if kind == "transforms" else Topics("/tf:block", "/tf:tip", "/netft")
     if kind == "tf":
-        assert original().wrench is not None
-        lab.wrench("/netft", original().wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+        lab.wrench("/netft", wrench(), "geometry_msgs/msg/WrenchStamped", "wrench")
     path = write(lab, tmp_path / "lab")  # type: ignore[operator]
     assert_same_windows(read_recording(path, rig=original().rig, topics=topics))
 

@@ -27,7 +27,7 @@ from push_predictor.recordings.fields.pose_rows import composed, interpolated, i
 from push_predictor.recordings.fields.sources import POSE_TARGET, TF_TYPES, FieldReader, definitions_of
 from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_tree
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics, load_topics, save_topics, topics_path
 from push_predictor.recordings.windows.finder import find_windows
@@ -44,6 +44,12 @@ TIP = {
 @cache
 def original() -> Recording:
     return short_recording(7.0)
+
+
+def wrench() -> WrenchStream:
+    found = original().wrench
+    assert found is not None
+    return found
 
 
 def table(recording: Recording) -> PushTable:
@@ -81,8 +87,7 @@ def made_vicon_and_ur(kind: str, at: str) -> Lab:
     lab = Lab(frame="vicon_world")
     lab.pose(VICON, kind, original().slider, at)
     lab.pose(UR, kind, original().pusher, at)
-    assert original().wrench is not None
-    lab.wrench("/netft", original().wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    lab.wrench("/netft", wrench(), "geometry_msgs/msg/WrenchStamped", "wrench")
     return lab
 
 
@@ -132,8 +137,7 @@ def made_tf_lab(world: str) -> Lab:
 @pytest.mark.parametrize("world", ["world", "map"])
 def test_frames_of_tf_give_the_same_windows(tmp_path: Path, world: str) -> None:
     lab = tf_lab(world)
-    assert original().wrench is not None
-    lab.wrench("/netft", original().wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    lab.wrench("/netft", wrench(), "geometry_msgs/msg/WrenchStamped", "wrench")
     path = lab.mcap(tmp_path / "lab", original().rig)
     found = read_recording(path, topics=Topics("/tf:block", "/tf:tip", "/netft"))
     assert_same_windows(found)

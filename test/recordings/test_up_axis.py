@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("rosbags")
 from decoding import decoded, decoder_of, in_portions
 from lab_bags import LATENCY, Lab, pose_rows, short_recording
-from test_lab_topics import assert_same_windows, original
+from test_lab_topics import assert_same_windows, original, wrench
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.bag.messages import Messages
@@ -45,8 +45,8 @@ def test_the_up_axis_becomes_z_by_a_turn_and_handedness_stays(up: str) -> None:
     found = turned(np.tile(turn_of(up)[:, 3:], (4, 1)), vectors)
     np.testing.assert_allclose(found[0], [0.0, 0.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(found[1:]), 1.0)
-    wrench = wrenches_z_up(np.array([[*VECTORS[up], *VECTORS[up]]], np.float64), up)
-    np.testing.assert_allclose(wrench, [[0, 0, 1, 0, 0, 1]], atol=1e-12)
+    upright = wrenches_z_up(np.array([[*VECTORS[up], *VECTORS[up]]], np.float64), up)
+    np.testing.assert_allclose(upright, [[0, 0, 1, 0, 0, 1]], atol=1e-12)
 
 
 @pytest.mark.parametrize("up", UP_AXES)
@@ -132,8 +132,7 @@ def test_a_sensor_with_the_axes_of_the_tip_is_turned_with_it(tmp_path: Path) -> 
     assert one.wrench is not None and other.wrench is not None
     rows, force = pose_rows(original().pusher)[:1], np.array([[one.wrench.fx[5], one.wrench.fy[5]]])
     tip = as_seen(rows, "y", True)[:, 3:]
-    assert original().wrench is not None
-    raw = np.array([[original().wrench.fx[5], original().wrench.fy[5], 0.0]])
+    raw = np.array([[wrench().fx[5], wrench().fy[5], 0.0]])
     wanted = turned(turn_of("y")[:, 3:], turned(tip, raw))
     np.testing.assert_allclose([other.wrench.fx[5], other.wrench.fy[5]], wanted[0, :2], atol=1e-6)
     assert not np.allclose(wanted[0, :2], force)

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab
-from test_lab_topics import assert_same_windows, original, tf_lab
+from test_lab_topics import assert_same_windows, original, tf_lab, wrench
 from turning_sensor import (
     add_tip,
     add_wrench,
@@ -28,7 +28,7 @@ from turning_sensor import (
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.fields.pose_rows import about_points, in_world_axes, normalised, poses_at
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.streams import Recording, WrenchStream
+from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics
 
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -36,12 +36,6 @@ NAMES = Topics("/slider", "/tip", "/ft", wrench_frame="tip")
 QUARTER = np.array([[0.3, 0.1, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]])  # about z
 DOWN = np.array([[0.0, 0.0, 0.4, 1.0, 0.0, 0.0, 0.0]])  # half a turn about x: a tool that points down
 MILLISECOND = 1_000_000
-
-
-def wrench() -> WrenchStream:
-    found = original().wrench
-    assert found is not None
-    return found
 
 
 def lab_of_tip(values: np.ndarray | None = None, frame: str = "ft_link", poses: str = "world") -> Lab:

@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 from lab_bags import Lab
-from test_lab_topics import assert_same_windows, original
+from test_lab_topics import assert_same_windows, original, wrench
 from turning_sensor import add_tip, add_wrench, in_sensor_axes, tip_rows
 
 from push_predictor.cli import main
@@ -23,7 +23,7 @@ from push_predictor.errors import RecordingError, RequestError
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.fields.wrench_bias import BiasError, estimate_bias, gravity_direction
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.streams import Recording, WrenchStream
+from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics, load_topics
 from push_predictor.recordings.windows.clock_session import free_motion
 
@@ -129,12 +129,6 @@ def test_one_pose_that_jumps_changes_nothing() -> None:
 
 
 # --- free motion ------------------------------------------------------------------------------------------------------
-
-
-def wrench() -> WrenchStream:
-    found = original().wrench
-    assert found is not None
-    return found
 
 
 @cache
