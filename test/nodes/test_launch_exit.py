@@ -36,7 +36,7 @@ def run(
     return started(load_launch_file(file), arguments, words)
 
 
-@pytest.mark.parametrize(("file", "count"), [(MAIN, 3), (RECORD, 2)], ids=lambda value: getattr(value, "name", ""))
+@pytest.mark.parametrize(("file", "count"), [(MAIN, 4), (RECORD, 2)], ids=lambda value: getattr(value, "name", ""))
 def test_a_switch_is_true_or_false(file: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     declared = {a.args[0]: a.kwargs for a in actions(load_launch_file(file)) if "choices" in a.kwargs}
     switches = [name for name, kwargs in declared.items() if kwargs["default_value"] in ("true", "false")]
