@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PooledScores
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.claims import ENOUGH
@@ -91,12 +90,12 @@ def saturation(found: Curves, pairs: Sequence[Pair]) -> Evidence:
     sizes = [n for n in found.sizes(pairs, KIND, "push") if n <= ENOUGH]
     if len(sizes) < 2:
         return Evidence(note="Fewer than two training sizes.")
-    gains = _last_gains(found, pairs, sizes[-2], sizes[-1])
-    figures = [
+    figures = []
+    for (name, statistic), (_, measure, _) in zip(STATISTICS, MEASURES, strict=True):
+        gain = _last_gain(found, pairs, sizes[-2:], measure, statistic)
         # at fewer windows a gain shows only that performance has not saturated yet
-        Figure(name, gain if sizes[-1] >= ENOUGH else Estimate(gain.value, -np.inf, gain.high), text=gain.text())
-        for (name, _), gain in zip(STATISTICS, gains, strict=True)
-    ]
+        known = gain if sizes[-1] >= ENOUGH else Estimate(gain.value, -np.inf, gain.high)
+        figures.append(Figure(name, known, text=gain.text()))
     of = "one set, interval by push" if len(pairs) == 1 else f"mean over {len(pairs)} sets, with its interval (Student)"
     note = f"From n = {sizes[-2]} to {sizes[-1]}, {SPLIT_WORDS['push']}; {of}."
     return Evidence(figures, note)
@@ -142,33 +141,21 @@ def _ratio(cube: Array) -> Array:
     return np.asarray(np.divide(surfaces, shapes, out=np.full_like(shapes, np.inf), where=shapes > 0.0))
 
 
-def _last_gains(found: Curves, pairs: Sequence[Pair], n: int, more: int) -> tuple[Estimate, Estimate]:
-    """Relative gain in NMSE and gain in nats, per doubling: interval by push of one set, over several sets else."""
+def _last_gain(
+    found: Curves, pairs: Sequence[Pair], sizes: Sequence[int], measure: Measure, statistic: Statistic
+) -> Estimate:
+    """Gain between two sizes per doubling, relative in NMSE, else in nats: by push of one set, over several sets."""
+    doublings = float(np.log2(sizes[1] / sizes[0]))
+
+    def gain(before: Array, after: Array) -> Array:
+        return 1.0 - (after / before) ** (1.0 / doublings) if measure is nmse_of else (before - after) / doublings
+
     if len(pairs) == 1:
-        return _gains_by_push(found, pairs[0], n, more)
-    doublings = float(np.log2(more / n))
-    nmse, nats = [], []
-    for pair in pairs:
-        a, b = (np.mean(found.values([pair], KIND, "push", size, nmse_of)) for size in (n, more))
-        nmse.append(float(1.0 - (b / a) ** (1.0 / doublings)))
-        a, b = (np.mean(found.values([pair], KIND, "push", size, nlpd_of)) for size in (n, more))
-        nats.append(float((a - b) / doublings))
-    return over_seeds(nmse), over_seeds(nats)
-
-
-def _gains_by_push(found: Curves, pair: Pair, n: int, more: int) -> tuple[Estimate, Estimate]:
-    before, after = (found.push_scores(pair, KIND, "push", size) for size in (n, more))
-    doublings = float(np.log2(more / n))
-
-    def nmse(a: PooledScores, b: PooledScores) -> Array:
-        return np.asarray(1.0 - (total_nmse(b) / total_nmse(a)) ** (1.0 / doublings))
-
-    def nats(a: PooledScores, b: PooledScores) -> Array:
-        return np.asarray((total_nlpd(a) - total_nlpd(b)) / doublings)
-
-    all_pushes, drawn = (before.totals(), after.totals()), (before.resampled(), after.resampled())
-    by_nmse, by_nats = (of_draws(float(gain(*all_pushes)[0]), gain(*drawn)) for gain in (nmse, nats))
-    return by_nmse, by_nats
+        both = [found.push_scores(pairs[0], KIND, "push", n) for n in sizes]
+        value = gain(*(statistic(scores.totals()) for scores in both))
+        return of_draws(float(value[0]), gain(*(statistic(scores.resampled()) for scores in both)))
+    means = [[np.array(np.mean(found.values([pair], KIND, "push", n, measure))) for n in sizes] for pair in pairs]
+    return over_seeds([float(gain(*of_pair)) for of_pair in means])
 
 
 def _picture(study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair], axis: tuple[str, int]) -> Picture:
