@@ -12,7 +12,7 @@ import pytest
 from paper_studies import made_up_corpus, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
-from push_predictor_paper.fits.fit import SPLITS, Fit, Score
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score, random_split
 from push_predictor_paper.sections.learning_curves import band_or_range, circle, saturation, section, surface
 
 from push_predictor.evaluation.push_scores import PushScores
@@ -181,3 +181,14 @@ def test_a_measured_set_of_one_pair_gets_tables_of_its_own(tmp_path):
     made = section(replace(study, measured=(measured,)), measured)
     assert len(made.tables[0].rows) == 1 and [picture.path.exists() for picture in made.pictures] == [True]
     assert [made.evidence[claim].figures for claim in ("circle", "surface")] == [(), ()]
+
+
+@pytest.mark.parametrize("rows, tested", [(3500, 1000), (100, 30)])
+def test_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
+    order = np.random.default_rng(0).permutation(rows)
+    for seed in range(3):
+        split = random_split(rows, seed)
+        assert split.test.tolist() == order[:tested].tolist()
+        drawn = order[tested:][np.random.default_rng(1000 + seed).permutation(rows - tested)[:9]]
+        assert split.first(9).tolist() == drawn.tolist()
+        assert set(split.first(5).tolist()) < set(split.first(9).tolist()), "smaller sets lie within larger ones"
