@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet
-from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
+from push_predictor_paper.estimate import total_nmse
+from push_predictor_paper.fits.curves import Curves, gathered
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score, random_split
 from push_predictor_paper.sections.learning_curves import band_or_range, circle, saturation, section, surface
 
@@ -164,7 +165,7 @@ def test_the_mean_over_pairs_is_taken_seed_by_seed():
         (pair, "vhgp", "push", 10): tuple(score(Fit("vhgp", 10, "push", k), level + k, 0.0) for k in (0, 1))
         for pair, level in ((a, 1.0), (b, 2.0))
     }
-    assert Curves(cells).values([a, b], "vhgp", "push", 10, nmse_of) == pytest.approx([1.5, 2.5])
+    assert Curves(cells).values([a, b], "vhgp", "push", 10, total_nmse) == pytest.approx([1.5, 2.5])
 
 
 def test_two_folds_show_their_range_and_three_an_interval():

@@ -55,16 +55,6 @@ class Score:
     predicted: Array
     cpu: float = 0.0
 
-    @property
-    def nmse(self) -> Array:
-        """NMSE by output (3,)."""
-        return np.asarray(self.push_scores.totals().nmse[0])
-
-    @property
-    def nlpd(self) -> Array:
-        """NLPD by output (3,), moment-matched Gaussian, SI units."""
-        return np.asarray(self.push_scores.totals().nlpd[0])
-
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
     """Train and score all fits; those with more windows than the set has are skipped."""
