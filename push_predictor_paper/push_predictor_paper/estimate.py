@@ -10,33 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from push_predictor.evaluation.estimate import (
-    Estimate,
-    by_push,
-    difference_by_push,
-    of_draws,
-    total_exact_nlpd,
-    total_nlpd,
-    total_nmse,
-)
-from push_predictor.evaluation.estimate import Figure as Statistic
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
-
-__all__ = [
-    "Estimate",
-    "Statistic",
-    "by_push",
-    "difference_by_push",
-    "exactly",
-    "fold_weights",
-    "of_draws",
-    "of_ends",
-    "over_seeds",
-    "total_exact_nlpd",
-    "total_nlpd",
-    "total_nmse",
-]
 
 
 def exactly(value: float) -> Estimate:

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.measured import measured_corpora
-from push_predictor_paper.estimate import by_push, total_nlpd, total_nmse
 from push_predictor_paper.fits.fit import Fit, SplitName, random_split, scores
 from push_predictor_paper.work import Work
 
+from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor.evaluation.splits import FOLDS, split_by_push
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet
-from push_predictor_paper.estimate import total_nmse
 from push_predictor_paper.fits.curves import Curves, gathered
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score, random_split
 from push_predictor_paper.sections.learning_curves import band_or_range, circle, saturation, section, surface
 
+from push_predictor.evaluation.estimate import total_nmse
 from push_predictor.evaluation.push_scores import PushScores
 
 SHAPES, SURFACES = ("rect1", "ellip1", "ellip2"), ("plywood", "abs", "pu")

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.types import Array
-from push_predictor_paper.estimate import Estimate, fold_weights
+from push_predictor_paper.estimate import fold_weights
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.estimate import Figure as Statistic
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.data.corpus import Corpus, Pair
-from push_predictor_paper.estimate import Estimate, Statistic, over_seeds
+from push_predictor_paper.estimate import over_seeds
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score, SplitName, scores
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.study import Study

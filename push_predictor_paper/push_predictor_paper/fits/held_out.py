@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.push_scores import by_push
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.curves import curves
 from push_predictor_paper.fits.fit import KINDS, split_of
 from push_predictor_paper.plan import SPEEDS

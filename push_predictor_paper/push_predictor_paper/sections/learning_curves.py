@@ -10,11 +10,13 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws, total_nlpd, total_nmse
+from push_predictor.evaluation.estimate import Figure as Statistic
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.claims import ENOUGH
 from push_predictor_paper.data.corpus import Corpus, Pair
-from push_predictor_paper.estimate import Estimate, Statistic, of_draws, over_seeds, total_nlpd, total_nmse
+from push_predictor_paper.estimate import over_seeds
 from push_predictor_paper.fits.curves import Curves, curves
 from push_predictor_paper.fits.fit import SPLIT_SHORT, SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.painters.curves import LOOKS, Line, Panel, paint_curves

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor.evaluation.splits import FOLDS
 from push_predictor.recordings.table import PushTable
@@ -27,7 +28,7 @@ from push_predictor_paper.data.time_scaled import (
     speed_windows,
     training_rows,
 )
-from push_predictor_paper.estimate import Estimate, fold_weights, of_draws, of_ends, total_nmse
+from push_predictor_paper.estimate import fold_weights, of_ends
 from push_predictor_paper.painters.curves import LOOKS, SPEED_TICKS, Line, Panel, paint_curves
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text

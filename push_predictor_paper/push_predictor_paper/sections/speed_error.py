@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS
 from push_predictor_paper.fits.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
 from push_predictor_paper.painters.curves import KIND_LOOKS, SPEED_TICKS, Line, Panel, paint_curves
