@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from push_predictor_paper.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 
 from push_predictor.evaluation import push_scores as scores
+from push_predictor.evaluation.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.validation import Comparison, compare

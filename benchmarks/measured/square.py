@@ -47,6 +47,7 @@ def square_scores(pushes: PushSet, kind: str, n: int, split: SplitName) -> list[
 
 
 def _cells(scores: list[Score]) -> str:
-    nmse, nlpd = np.mean([s.nmse.sum() for s in scores]), np.mean([s.nlpd.sum() for s in scores])
+    totals = [s.push_scores.totals() for s in scores]
+    nmse, nlpd = np.mean([t.nmse.sum() for t in totals]), np.mean([t.nlpd.sum() for t in totals])
     cpu = np.mean([s.cpu for s in scores])
     return f"{figures(pooled([s.push_scores for s in scores]))} | {nmse:.3f}, {nlpd:.2f} | {cpu:.2f}"

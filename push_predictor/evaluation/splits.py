@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Splits into training and test data that keep pushes whole, and a random split of rows for comparison only."""
+"""Splits into training and test data, and resamples, that keep pushes whole."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from push_predictor.types import Array, IntArray
 
 BOOTSTRAP_DRAWS = 1000
 FOLDS = 5
-RANDOM_TEST_ROWS = 1000
-RANDOM_TEST_SHARE = 0.3  # of the rows, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +34,6 @@ def split_by_push(table: PushTable, fold: int) -> Split:
     folds = push_folds(table)
     others = np.flatnonzero(folds != fold)
     return Split(np.random.default_rng(fold).permutation(others), np.flatnonzero(folds == fold))
-
-
-def random_split(table: PushTable, seed: int) -> Split:
-    """Test up to 1000 random rows, the same for every seed; windows of one push are in both sets."""
-    order = np.random.default_rng(0).permutation(len(table))
-    tested = min(RANDOM_TEST_ROWS, int(RANDOM_TEST_SHARE * len(table)))
-    return Split(np.random.default_rng(RANDOM_TEST_ROWS + seed).permutation(order[tested:]), order[:tested])
 
 
 def push_folds(table: PushTable, folds: int = FOLDS, seed: int = 0) -> IntArray:

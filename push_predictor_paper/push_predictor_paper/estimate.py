@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Intervals over seeds, in addition to the library's intervals by push."""
+"""Intervals over seeds and folds, in addition to the library's intervals by push."""
 
 from __future__ import annotations
 
@@ -10,31 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from push_predictor.evaluation.estimate import (
-    Estimate,
-    by_push,
-    difference_by_push,
-    of_draws,
-    total_exact_nlpd,
-    total_nlpd,
-    total_nmse,
-)
-from push_predictor.evaluation.estimate import Figure as Statistic
-from push_predictor.types import Array
-
-__all__ = [
-    "Estimate",
-    "Statistic",
-    "by_push",
-    "difference_by_push",
-    "exactly",
-    "of_draws",
-    "of_ends",
-    "over_seeds",
-    "total_exact_nlpd",
-    "total_nlpd",
-    "total_nmse",
-]
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.types import Array, IntArray
 
 
 def exactly(value: float) -> Estimate:
@@ -55,3 +33,11 @@ def over_seeds(values: Sequence[float]) -> Estimate:
         return Estimate(mean, np.nan, np.nan)
     half = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
     return Estimate(mean, mean - half, mean + half)
+
+
+def fold_weights(push_id: np.ndarray, fold: IntArray) -> Array:
+    """Weights (1 + draws, n): each row once, then resampled folds (n,) and, within them, resampled pushes (n,)."""
+    drawn, (folds, number) = push_bootstrap(push_id), np.unique(fold, return_inverse=True)
+    count = len(folds)
+    again = np.random.default_rng(1).multinomial(count, np.full(count, 1.0 / count), size=len(drawn))
+    return np.vstack([np.ones(len(push_id)), drawn * again[:, number]])

@@ -9,9 +9,8 @@ import json
 import platform
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -93,14 +92,14 @@ QUICK_WARNING = (
 COUNTS = "Number of verdicts. Each claim and its number are in the table below."
 
 
-@dataclass(frozen=True)
+@dataclass
 class Checked:
     """A section with the verdicts on its claims."""
 
-    findings: Sequence[Finding]
-    tables: Sequence[Table]
-    pictures: Sequence[Picture]
-    notes: Sequence[str]
+    findings: list[Finding]
+    tables: list[Table]
+    pictures: list[Picture]
+    notes: list[str]
 
 
 def report_paper(
@@ -148,22 +147,23 @@ def report_paper(
 
 
 def checked(key: str, study: Study) -> Checked:
-    """Compute a section, and judge all its claims."""
-    if key in OF_STUDY:
-        return _checked(key, partial(OF_STUDY[key], study), "")
-    parts = [_checked(key, partial(OF_CORPUS[key], study, corpus), corpus.name) for corpus in study.corpora]
-    every = {f.name: [item for part in parts for item in getattr(part, f.name)] for f in fields(Checked)}
-    every["notes"] = list(dict.fromkeys(every["notes"]))
-    return Checked(**every)
+    """Compute a section, and judge all its claims: of the whole study, or of each of its corpora."""
+    found = Checked([], [], [], [])
+    for corpus in study.corpora if key in OF_CORPUS else (None,):
+        section = _section(key, study, corpus)
+        of = corpus.name if corpus else ""
+        found.findings += [judged(claim, section.evidence[name], of) for name, claim in CLAIMS[key].items()]
+        found.tables += section.tables
+        found.pictures += section.pictures
+        found.notes += [note for note in section.notes if note not in found.notes]
+    return found
 
 
-def _checked(key: str, section_of: Callable[[], Section], of: str) -> Checked:
+def _section(key: str, study: Study, corpus: Corpus | None) -> Section:
     try:
-        section = section_of()
+        return OF_CORPUS[key](study, corpus) if corpus else OF_STUDY[key](study)
     except TooFewError as error:
-        section = Section({claim: Evidence(note=str(error)) for claim in CLAIMS[key]})
-    findings = [judged(claim, section.evidence[name], of) for name, claim in CLAIMS[key].items()]
-    return Checked(findings, section.tables, section.pictures, section.notes)
+        return Section({claim: Evidence(note=str(error)) for claim in CLAIMS[key]})
 
 
 def _files(key: str, section: Checked) -> list[str]:
@@ -176,7 +176,7 @@ def _section_json(key: str, section: Checked) -> dict[str, Any]:
         "title": TITLES[key],
         "findings": [finding.json() for finding in section.findings],
         "tables": [table.json() for table in section.tables],
-        "notes": list(section.notes),
+        "notes": section.notes,
     }
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.reporting.canvas import Picture, draw
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.verdict import Evidence
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from push_predictor_paper.estimate import Estimate
+from push_predictor.evaluation.estimate import Estimate
 
 Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)

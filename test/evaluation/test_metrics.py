@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from scipy.stats import multivariate_normal, norm, rankdata
 
 from push_predictor.evaluation.metrics import coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
-from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, random_split, split_by_push
+from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, split_by_push
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.types import Array
@@ -118,18 +118,6 @@ def test_folds_do_not_depend_on_the_order_of_rows() -> None:
         assert split.test.tolist() == np.flatnonzero(dealt == fold).tolist()
         expected = np.random.default_rng(fold).permutation(np.flatnonzero(dealt != fold))
         assert split.first(7).tolist() == expected[:7].tolist()
-
-
-@pytest.mark.parametrize("rows, tested", [(3500, 1000), (100, 30)])
-def test_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
-    table = pushes([rows])
-    order = np.random.default_rng(0).permutation(rows)
-    for seed in range(3):
-        split = random_split(table, seed)
-        assert split.test.tolist() == order[:tested].tolist()
-        drawn = order[tested:][np.random.default_rng(1000 + seed).permutation(rows - tested)[:9]]
-        assert split.first(9).tolist() == drawn.tolist()
-        assert set(split.first(5).tolist()) < set(split.first(9).tolist()), "smaller sets lie within larger ones"
 
 
 def test_bootstrap_draws_as_many_pushes_as_there_are() -> None:

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.measured import measured_corpora
-from push_predictor_paper.estimate import by_push, total_nlpd, total_nmse
-from push_predictor_paper.fits.fit import Fit, SplitName, scores
+from push_predictor_paper.fits.fit import Fit, SplitName, random_split, scores
 from push_predictor_paper.work import Work
 
+from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled
-from push_predictor.evaluation.splits import FOLDS, random_split, split_by_push
+from push_predictor.evaluation.splits import FOLDS, split_by_push
 
 PAIR = ("rect1", "unknown")
 
@@ -48,7 +48,7 @@ def test_the_splits_have_the_rows_that_the_tables_of_the_docs_state(found: tuple
     folds = np.random.default_rng(0).permutation(89)[push] % 5
     order = np.random.default_rng(0).permutation(3500)
     for k in range(FOLDS):
-        whole, rows = split_by_push(table, k), random_split(table, k)
+        whole, rows = split_by_push(table, k), random_split(len(table), k)
         others = np.flatnonzero(folds != k)
         np.testing.assert_array_equal(whole.test, np.flatnonzero(folds == k))
         np.testing.assert_array_equal(whole.training, others[np.random.default_rng(k).permutation(len(others))])

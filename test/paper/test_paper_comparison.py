@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_study, verdict_on
 from push_predictor_paper.claims import CLAIMS
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing, below_zero_from, crossing
 from push_predictor_paper.fits.curves import Curves
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score
 from push_predictor_paper.sections.comparison import _paper_table, comparison_evidence, crossings_of, improves, section
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.push_scores import PushScores
 
 CORPUS = made_up_corpus()

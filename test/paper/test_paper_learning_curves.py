@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.corpus import Corpus, PushSet
-from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
-from push_predictor_paper.fits.fit import SPLITS, Fit, Score
+from push_predictor_paper.fits.curves import Curves, gathered
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score, random_split
 from push_predictor_paper.sections.learning_curves import band_or_range, circle, saturation, section, surface
 
+from push_predictor.evaluation.estimate import total_nmse
 from push_predictor.evaluation.push_scores import PushScores
 
 SHAPES, SURFACES = ("rect1", "ellip1", "ellip2"), ("plywood", "abs", "pu")
@@ -164,7 +165,7 @@ def test_the_mean_over_pairs_is_taken_seed_by_seed():
         (pair, "vhgp", "push", 10): tuple(score(Fit("vhgp", 10, "push", k), level + k, 0.0) for k in (0, 1))
         for pair, level in ((a, 1.0), (b, 2.0))
     }
-    assert Curves(cells).values([a, b], "vhgp", "push", 10, nmse_of) == pytest.approx([1.5, 2.5])
+    assert Curves(cells).values([a, b], "vhgp", "push", 10, total_nmse) == pytest.approx([1.5, 2.5])
 
 
 def test_two_folds_show_their_range_and_three_an_interval():
@@ -181,3 +182,14 @@ def test_a_measured_set_of_one_pair_gets_tables_of_its_own(tmp_path):
     made = section(replace(study, measured=(measured,)), measured)
     assert len(made.tables[0].rows) == 1 and [picture.path.exists() for picture in made.pictures] == [True]
     assert [made.evidence[claim].figures for claim in ("circle", "surface")] == [(), ()]
+
+
+@pytest.mark.parametrize("rows, tested", [(3500, 1000), (100, 30)])
+def test_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
+    order = np.random.default_rng(0).permutation(rows)
+    for seed in range(3):
+        split = random_split(rows, seed)
+        assert split.test.tolist() == order[:tested].tolist()
+        drawn = order[tested:][np.random.default_rng(1000 + seed).permutation(rows - tested)[:9]]
+        assert split.first(9).tolist() == drawn.tolist()
+        assert set(split.first(5).tolist()) < set(split.first(9).tolist()), "smaller sets lie within larger ones"

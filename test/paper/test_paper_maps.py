@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
 from push_predictor_paper.plan import GRID_SPEED
@@ -41,6 +40,7 @@ from push_predictor_paper.statistics.grid_maps import (
     unbiased,
 )
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.types import Array
 
 GRID = replace(PLAN, contacts=11, angle_step=0.25, repetitions=24)

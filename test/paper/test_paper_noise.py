@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_grid, verdict_on
 from push_predictor_paper.data.repetitions import RepeatedGrid
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.map_models import ModelMap
 from push_predictor_paper.sections.noise import learned_figures, shape, size, span
 from push_predictor_paper.statistics.noise import (
@@ -25,6 +24,7 @@ from push_predictor_paper.statistics.noise import (
     spans,
 )
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.types import Array
 
 GRID = replace(PLAN, contacts=5, angle_step=0.5, repetitions=60)

@@ -21,7 +21,6 @@ from push_predictor_paper.data.time_scaled import (
     speed_windows,
     training_rows,
 )
-from push_predictor_paper.estimate import Estimate, total_nmse
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import TooFewError
 from push_predictor_paper.sections.quasi_static import (
@@ -37,6 +36,7 @@ from push_predictor_paper.sections.quasi_static import (
     turn_of,
 )
 
+from push_predictor.evaluation.estimate import Estimate, total_nmse
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array

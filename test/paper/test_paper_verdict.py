@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from paper_studies import verdict_on
 from push_predictor_paper.claims import CLAIMS
-from push_predictor_paper.estimate import Estimate, exactly, of_ends, over_seeds
+from push_predictor_paper.estimate import exactly, of_ends, over_seeds
 from push_predictor_paper.report import OF_CORPUS, OF_STUDY, TITLES
 from push_predictor_paper.section import Number, Table
 from push_predictor_paper.statistics.modes import count_with_modes
 from push_predictor_paper.verdict import Bound, Claim, Evidence, Figure, judged, verdict_of
+
+from push_predictor.evaluation.estimate import Estimate
 
 WITHIN, WIDER = Bound(0.0, 1.0), Bound(0.0, 2.0)
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.push_scores import PushScores
-from push_predictor.evaluation.splits import BOOTSTRAP_DRAWS, push_bootstrap
 from push_predictor.types import Array
-from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.estimate import fold_weights
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,8 @@ def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
     The first size where all gaps lie below 0, inf where the last does not.
     """
     place = np.log(np.asarray(sizes, dtype=np.float64))
-    after = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1).sum(
-        axis=1
-    )  # number of sizes, counted from the last
+    below = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1)
+    after = below.sum(axis=1)  # number of sizes, counted from the last
     k = np.minimum(len(sizes) - after, len(sizes) - 1)
     rows, before = np.arange(len(gaps)), np.maximum(k - 1, 0)
     ahead, at = gaps[rows, before], gaps[rows, k]
@@ -74,21 +73,11 @@ def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
 
 def _gap(learned: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
     """Total NMSE of the first minus that of the second, (1 + draws,): the value, then each draw."""
-    weights = _weights(learned)
+    fold = np.repeat(np.arange(len(learned)), [len(scores.push_id) for scores in learned])
+    weights = fold_weights(np.concatenate([scores.push_id for scores in learned]), fold)
     return _total(learned, weights) - _total(baseline, weights)
 
 
-def _weights(scores: Sequence[PushScores]) -> list[Array]:
-    """By seed, the weight of each of its pushes, (1 + draws, p)."""
-    names = np.unique(np.concatenate([push_scores.push_id for push_scores in scores]))
-    pushes = push_bootstrap(names)
-    count = len(scores)
-    seeds = np.random.default_rng(1).multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS)
-    drawn = [pushes[:, np.searchsorted(names, t.push_id)] * seeds[:, k, None] for k, t in enumerate(scores)]
-    return [np.vstack([np.ones((1, weights.shape[1])), weights]) for weights in drawn]
-
-
-def _total(scores: Sequence[PushScores], weights: Sequence[Array]) -> Array:
-    error = sum((w @ push_scores.error for w, push_scores in zip(weights, scores, strict=True)), np.zeros(()))
-    spread = sum((w @ push_scores.spread for w, push_scores in zip(weights, scores, strict=True)), np.zeros(()))
-    return np.asarray((error / spread).sum(axis=1))
+def _total(folds: Sequence[PushScores], weights: Array) -> Array:
+    error, spread = (np.concatenate(sums) for sums in zip(*((s.error, s.spread) for s in folds), strict=True))
+    return np.asarray(((weights @ error) / (weights @ spread)).sum(axis=1))

@@ -5,31 +5,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.estimate import Figure as Statistic
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.data.corpus import Corpus, Pair
-from push_predictor_paper.estimate import Estimate, over_seeds
+from push_predictor_paper.estimate import over_seeds
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score, SplitName, scores
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.study import Study
 
 Cell = tuple[Pair, str, SplitName, int]  # pair, kind of model, split, training windows
-Measure = Callable[[Score], float]
 OTHER_SEEDS = 3  # draws of the random split on pairs other than the reference
-
-
-def nmse_of(score: Score) -> float:
-    """NMSE summed over the outputs."""
-    return float(score.nmse.sum())
-
-
-def nlpd_of(score: Score) -> float:
-    """NLPD summed over the outputs, moment-matched Gaussian, SI units."""
-    return float(score.nlpd.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +34,13 @@ class Curves:
         held = [{n for p, k, s, n in self.cells if (p, k, s) == (pair, kind, split)} for pair in pairs]
         return tuple(sorted(set.intersection(*held))) if held else ()
 
-    def values(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Measure) -> list[float]:
+    def values(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Statistic) -> list[float]:
         """Mean of a measure over pairs, seed by seed."""
-        rows = [[measure(score) for score in self.cells[pair, kind, split, n]] for pair in pairs]
+        cells = [self.cells[pair, kind, split, n] for pair in pairs]
+        rows = [[float(measure(score.push_scores.totals())[0]) for score in cell] for cell in cells]
         return [float(np.mean(seed)) for seed in zip(*rows, strict=False)]  # the reference pair has more seeds
 
-    def over_seeds(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Measure) -> Estimate:
+    def over_seeds(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Statistic) -> Estimate:
         """The mean of a measure over pairs and seeds, with its interval over seeds."""
         return over_seeds(self.values(pairs, kind, split, n, measure))
 

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from push_predictor.evaluation.push_scores import PushScores, push_scores
-from push_predictor.evaluation.splits import Split, random_split, split_by_push
+from push_predictor.evaluation.splits import Split, split_by_push
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
@@ -23,6 +23,8 @@ from push_predictor_paper.plan import WINDOW
 from push_predictor_paper.work import Work
 
 SplitName = Literal["push", "random", "none"]
+RANDOM_TEST_ROWS = 1000
+RANDOM_TEST_SHARE = 0.3  # of the rows, at most
 SPLITS: tuple[SplitName, ...] = ("push", "random")
 SPLIT_WORDS = {"push": "whole pushes held out (5 folds)", "random": "random split of windows"}
 SPLIT_SHORT = {"push": "by push", "random": "random"}
@@ -52,16 +54,6 @@ class Score:
     push_scores: PushScores
     predicted: Array
     cpu: float = 0.0
-
-    @property
-    def nmse(self) -> Array:
-        """NMSE by output (3,)."""
-        return np.asarray(self.push_scores.totals().nmse[0])
-
-    @property
-    def nlpd(self) -> Array:
-        """NLPD by output (3,), moment-matched Gaussian, SI units."""
-        return np.asarray(self.push_scores.totals().nlpd[0])
 
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
@@ -113,8 +105,14 @@ def split_of(pushes: PushSet, fit: Fit) -> Split:
     if fit.split == "none":
         rows = np.random.default_rng(fit.seed).permutation(len(pushes.table))
         return Split(rows, np.zeros(0, dtype=np.int64))
-    split = split_by_push if fit.split == "push" else random_split
-    return split(pushes.table, fit.seed)
+    return split_by_push(pushes.table, fit.seed) if fit.split == "push" else random_split(len(pushes.table), fit.seed)
+
+
+def random_split(rows: int, seed: int) -> Split:
+    """Test up to 1000 random rows, the same for every seed; windows of one push are in both sets."""
+    order = np.random.default_rng(0).permutation(rows)
+    tested = min(RANDOM_TEST_ROWS, int(RANDOM_TEST_SHARE * rows))
+    return Split(np.random.default_rng(RANDOM_TEST_ROWS + seed).permutation(order[tested:]), order[:tested])
 
 
 def trainable(pushes: PushSet, fit: Fit) -> int:

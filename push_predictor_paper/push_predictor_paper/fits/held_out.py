@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
+from push_predictor.evaluation.push_scores import by_push
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.curves import curves
 from push_predictor_paper.fits.fit import KINDS, split_of
 from push_predictor_paper.plan import SPEEDS
@@ -147,9 +148,7 @@ def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
 def by_drawn_pushes(push_id: np.ndarray, columns: Sequence[Array], figure: Callable[[list[Array]], Array]) -> Estimate:
     """A figure of sums over windows of columns (n, k), with interval by push; none for too few pushes."""
     pushes, push = np.unique(push_id, return_inverse=True)
-    sums = [np.zeros((len(pushes), column.shape[1])) for column in columns]
-    for total, column in zip(sums, columns, strict=True):
-        np.add.at(total, push, column)
+    sums = [by_push(push, column) for column in columns]
     value = float(figure([total.sum(axis=0, keepdims=True) for total in sums])[0])
     if len(pushes) < FEWEST_PUSHES:
         return Estimate(value, np.nan, np.nan)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.reporting.canvas import COLOURS, grid, outside_legend
 from push_predictor.types import Array
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing
 
 if TYPE_CHECKING:

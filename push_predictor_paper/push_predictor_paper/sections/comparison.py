@@ -10,14 +10,8 @@ from functools import partial
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PooledScores, PushScores
-from push_predictor.recordings.table import OUTPUTS
-from push_predictor.reporting.canvas import Picture
-from push_predictor.types import Array
-from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.estimate import (
+from push_predictor.evaluation.estimate import (
     Estimate,
-    Statistic,
     by_push,
     difference_by_push,
     of_draws,
@@ -25,6 +19,12 @@ from push_predictor_paper.estimate import (
     total_nlpd,
     total_nmse,
 )
+from push_predictor.evaluation.estimate import Figure as Statistic
+from push_predictor.evaluation.push_scores import PooledScores, PushScores
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.reporting.canvas import Picture
+from push_predictor.types import Array
+from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.fits.crossing import Crossing, crossing
 from push_predictor_paper.fits.curves import Curves, curves
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_SHORT, SPLIT_WORDS, SPLITS, SplitName

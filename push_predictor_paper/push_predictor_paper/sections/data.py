@@ -10,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.claims import LEAST_WINDOWS, SD_KNOWN
 from push_predictor_paper.data.corpus import Corpus, learning_spec
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate, exactly
+from push_predictor_paper.estimate import exactly
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import Number, Section, Table, speed_text
 from push_predictor_paper.study import Study

@@ -12,11 +12,11 @@ from functools import partial
 import numpy as np
 from scipy.special import digamma
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer
 from push_predictor_paper.fits.map_models import reference_maps
 from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import of_draws
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.claims import LEVEL
 from push_predictor_paper.data.repetitions import DRAWS, FEWEST, STEP, RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import of_draws
 from push_predictor_paper.painters.trajectories import Trajectories, paint_trajectories
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text

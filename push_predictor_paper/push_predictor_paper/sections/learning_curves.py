@@ -10,13 +10,14 @@ from functools import partial
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PooledScores
+from push_predictor.evaluation.estimate import Estimate, of_draws, total_nlpd, total_nmse
+from push_predictor.evaluation.estimate import Figure as Statistic
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.claims import ENOUGH
 from push_predictor_paper.data.corpus import Corpus, Pair
-from push_predictor_paper.estimate import Estimate, Statistic, of_draws, over_seeds, total_nlpd, total_nmse
-from push_predictor_paper.fits.curves import Curves, Measure, curves, nlpd_of, nmse_of
+from push_predictor_paper.estimate import over_seeds
+from push_predictor_paper.fits.curves import Curves, curves
 from push_predictor_paper.fits.fit import SPLIT_SHORT, SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.painters.curves import LOOKS, Line, Panel, paint_curves
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
@@ -25,8 +26,7 @@ from push_predictor_paper.verdict import Evidence, Figure
 
 KIND, CIRCLE = "vhgp", "ellip1"
 SHAPE_WORDS = {"rect1": "square", CIRCLE: "circle", "ellip2": "ellipse 2", "ellip3": "ellipse 3"}
-MEASURES: tuple[tuple[str, Measure, str], ...] = (("NMSE", nmse_of, ".3f"), ("NLPD", nlpd_of, ".2f"))
-STATISTICS: tuple[tuple[str, Statistic], ...] = (("NMSE", total_nmse), ("NLPD", total_nlpd))
+MEASURES: tuple[tuple[str, Statistic, str], ...] = (("NMSE", total_nmse, ".3f"), ("NLPD", total_nlpd, ".2f"))
 FEWEST_FOR_BAND = 3  # folds
 AXES = (("surface", 1), ("shape", 0))  # what a figure compares, and its place in a pair
 NOTES = (
@@ -81,9 +81,7 @@ def surface(found: Curves, pairs: Sequence[Pair]) -> Evidence:
         f"Standard deviations of the means at n = {sizes[-1]}, {SPLIT_WORDS['push']}; intervals resample the pushes of "
         "each set and hold for these surfaces and shapes only."
     )
-    return Evidence(
-        [Figure(name, _spreads(found, whole, sizes[-1], statistic)) for name, statistic in STATISTICS], note
-    )
+    return Evidence([Figure(name, _spreads(found, whole, sizes[-1], measure)) for name, measure, _ in MEASURES], note)
 
 
 def saturation(found: Curves, pairs: Sequence[Pair]) -> Evidence:
@@ -91,12 +89,12 @@ def saturation(found: Curves, pairs: Sequence[Pair]) -> Evidence:
     sizes = [n for n in found.sizes(pairs, KIND, "push") if n <= ENOUGH]
     if len(sizes) < 2:
         return Evidence(note="Fewer than two training sizes.")
-    gains = _last_gains(found, pairs, sizes[-2], sizes[-1])
-    figures = [
+    figures = []
+    for name, measure, _ in MEASURES:
+        gain = _last_gain(found, pairs, sizes[-2:], measure)
         # at fewer windows a gain shows only that performance has not saturated yet
-        Figure(name, gain if sizes[-1] >= ENOUGH else Estimate(gain.value, -np.inf, gain.high), text=gain.text())
-        for (name, _), gain in zip(STATISTICS, gains, strict=True)
-    ]
+        known = gain if sizes[-1] >= ENOUGH else Estimate(gain.value, -np.inf, gain.high)
+        figures.append(Figure(name, known, text=gain.text()))
     of = "one set, interval by push" if len(pairs) == 1 else f"mean over {len(pairs)} sets, with its interval (Student)"
     note = f"From n = {sizes[-2]} to {sizes[-1]}, {SPLIT_WORDS['push']}; {of}."
     return Evidence(figures, note)
@@ -107,7 +105,7 @@ def _word(shape: str) -> str:
     return SHAPE_WORDS.get(shape, shape)
 
 
-def _harder(found: Curves, pairs: Sequence[Pair], shape: str, n: int, measure: Measure) -> Estimate:
+def _harder(found: Curves, pairs: Sequence[Pair], shape: str, n: int, measure: Statistic) -> Estimate:
     gaps: list[float] = []
     for other, surface_name in pairs:
         if other == shape and (CIRCLE, surface_name) in pairs:
@@ -125,13 +123,13 @@ def _complete(pairs: Sequence[Pair]) -> list[list[Pair]]:
     return [[(s, u) for u in surfaces] for s in shapes] if len(shapes) > 1 and len(surfaces) > 1 else []
 
 
-def _spreads(found: Curves, whole: list[list[Pair]], n: int, statistic: Statistic) -> Estimate:
+def _spreads(found: Curves, whole: list[list[Pair]], n: int, measure: Statistic) -> Estimate:
     """Spread over surfaces divided by that over shapes."""
     values, draws = [], []
     for k, pair in enumerate(pair for row in whole for pair in row):
         push_scores = found.push_scores(pair, KIND, "push", n)
-        values.append(statistic(push_scores.totals()))
-        draws.append(statistic(push_scores.resampled(k)))  # a seed of its own: the sets are of different pushes
+        values.append(measure(push_scores.totals()))
+        draws.append(measure(push_scores.resampled(k)))  # a seed of its own: the sets are of different pushes
     shape = (len(whole), len(whole[0]), -1)
     return of_draws(float(_ratio(np.reshape(values, shape))[0]), _ratio(np.reshape(draws, shape)))
 
@@ -142,33 +140,19 @@ def _ratio(cube: Array) -> Array:
     return np.asarray(np.divide(surfaces, shapes, out=np.full_like(shapes, np.inf), where=shapes > 0.0))
 
 
-def _last_gains(found: Curves, pairs: Sequence[Pair], n: int, more: int) -> tuple[Estimate, Estimate]:
-    """Relative gain in NMSE and gain in nats, per doubling: interval by push of one set, over several sets else."""
+def _last_gain(found: Curves, pairs: Sequence[Pair], sizes: Sequence[int], measure: Statistic) -> Estimate:
+    """Gain between two sizes per doubling, relative in NMSE, else in nats: by push of one set, over several sets."""
+    doublings = float(np.log2(sizes[1] / sizes[0]))
+
+    def gain(before: Array, after: Array) -> Array:
+        return 1.0 - (after / before) ** (1.0 / doublings) if measure is total_nmse else (before - after) / doublings
+
     if len(pairs) == 1:
-        return _gains_by_push(found, pairs[0], n, more)
-    doublings = float(np.log2(more / n))
-    nmse, nats = [], []
-    for pair in pairs:
-        a, b = (np.mean(found.values([pair], KIND, "push", size, nmse_of)) for size in (n, more))
-        nmse.append(float(1.0 - (b / a) ** (1.0 / doublings)))
-        a, b = (np.mean(found.values([pair], KIND, "push", size, nlpd_of)) for size in (n, more))
-        nats.append(float((a - b) / doublings))
-    return over_seeds(nmse), over_seeds(nats)
-
-
-def _gains_by_push(found: Curves, pair: Pair, n: int, more: int) -> tuple[Estimate, Estimate]:
-    before, after = (found.push_scores(pair, KIND, "push", size) for size in (n, more))
-    doublings = float(np.log2(more / n))
-
-    def nmse(a: PooledScores, b: PooledScores) -> Array:
-        return np.asarray(1.0 - (total_nmse(b) / total_nmse(a)) ** (1.0 / doublings))
-
-    def nats(a: PooledScores, b: PooledScores) -> Array:
-        return np.asarray((total_nlpd(a) - total_nlpd(b)) / doublings)
-
-    all_pushes, drawn = (before.totals(), after.totals()), (before.resampled(), after.resampled())
-    by_nmse, by_nats = (of_draws(float(gain(*all_pushes)[0]), gain(*drawn)) for gain in (nmse, nats))
-    return by_nmse, by_nats
+        both = [found.push_scores(pairs[0], KIND, "push", n) for n in sizes]
+        value = gain(*(measure(scores.totals()) for scores in both))
+        return of_draws(float(value[0]), gain(*(measure(scores.resampled()) for scores in both)))
+    means = [[np.array(np.mean(found.values([pair], KIND, "push", n, measure))) for n in sizes] for pair in pairs]
+    return over_seeds([float(gain(*of_pair)) for of_pair in means])
 
 
 def _picture(study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair], axis: tuple[str, int]) -> Picture:
@@ -200,7 +184,7 @@ def _picture(study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair],
     )
 
 
-def _lines(found: Curves, pairs: Sequence[Pair], split: SplitName, measure: Measure, place: int) -> list[Line]:
+def _lines(found: Curves, pairs: Sequence[Pair], split: SplitName, measure: Statistic, place: int) -> list[Line]:
     lines = []
     for k, name in enumerate(dict.fromkeys(pair[place] for pair in pairs)):
         group = [pair for pair in pairs if pair[place] == name]

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.report.maps import colour_scale
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import SYMBOLS, UNIT_NAMES, UNITS, Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import FEWEST, RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate, of_draws, over_seeds
+from push_predictor_paper.estimate import over_seeds
 from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.painters.maps import Map, paint_maps

@@ -10,11 +10,12 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.reporting.canvas import SYMBOLS, Picture
 from push_predictor.types import Array
 from push_predictor_paper.claims import LEVEL
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate, exactly, of_draws
+from push_predictor_paper.estimate import exactly
 from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.painters.histograms import WIDTHS, Histogram, paint_histograms, shown_values
 from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture

@@ -10,12 +10,13 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import SYMBOLS, Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.repetitions import RepeatedGrid
-from push_predictor_paper.estimate import Estimate, of_ends, over_seeds
+from push_predictor_paper.estimate import of_ends, over_seeds
 from push_predictor_paper.fits.map_models import ModelMap, square_maps, surface_maps
 from push_predictor_paper.painters.curves import LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps

@@ -11,8 +11,9 @@ from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled
-from push_predictor.evaluation.splits import FOLDS, push_bootstrap
+from push_predictor.evaluation.splits import FOLDS
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
@@ -27,7 +28,7 @@ from push_predictor_paper.data.time_scaled import (
     speed_windows,
     training_rows,
 )
-from push_predictor_paper.estimate import Estimate, of_draws, of_ends, total_nmse
+from push_predictor_paper.estimate import fold_weights, of_ends
 from push_predictor_paper.painters.curves import LOOKS, SPEED_TICKS, Line, Panel, paint_curves
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
@@ -83,7 +84,7 @@ class Brackets:
         """The value, then its resamples of folds with their models, and of pushes within."""
         push_scores = self.scores[series][bracket]
         speed, push = np.array([number_of(name) for name in push_scores.push_id.tolist()]).T
-        weights = _weights(push) * np.isin(speed, numbers)
+        weights = fold_weights(push, push % FOLDS) * np.isin(speed, numbers)
         with np.errstate(invalid="ignore", divide="ignore"):  # a draw without any such push
             return total_nmse(push_scores.totals(weights))
 
@@ -195,15 +196,6 @@ def departure(slowest: Array, other: Array) -> Estimate:
     squared = ((other - slowest) ** 2 / slowest.var(axis=0)).sum(axis=1)
     rows = np.random.default_rng(0).integers(0, len(squared), (1000, len(squared)))
     return of_draws(float(squared.mean()), squared[rows].mean(axis=1))
-
-
-def _weights(push: np.ndarray) -> Array:
-    """Weights (1 + draws, p) of pushes: each once, then resampled folds and, within them, resampled pushes."""
-    drawn = push_bootstrap(push)
-    folds, fold = np.unique(push % FOLDS, return_inverse=True)
-    count = len(folds)
-    again = np.random.default_rng(1).multinomial(count, np.full(count, 1.0 / count), size=len(drawn))
-    return np.vstack([np.ones(len(push)), drawn * again[:, fold]])
 
 
 def _rows(series: str, speeds: int, rows: int, same_size: int) -> int:

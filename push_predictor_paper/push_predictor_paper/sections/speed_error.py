@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS
 from push_predictor_paper.fits.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
 from push_predictor_paper.painters.curves import KIND_LOOKS, SPEED_TICKS, Line, Panel, paint_curves
@@ -31,13 +31,7 @@ NOTES = (
 )
 
 
-@dataclass(frozen=True)
-class SpeedCurve:
-    """One kind of model by speed: NMSE within it, bias along and across the push in per cent of the travel."""
-
-    nmse: tuple[Estimate, ...]
-    along: tuple[Estimate, ...]
-    across: tuple[Estimate, ...]
+Curves = Mapping[str, Sequence[Estimate]]  # by kind of model, at each speed
 
 
 def section(study: Study, corpus: Corpus) -> Section:
@@ -45,9 +39,11 @@ def section(study: Study, corpus: Corpus) -> Section:
     windows = held_out(study, corpus)
     if windows is None or len(windows.speeds) < 2:
         raise TooFewError(f"{corpus.name}: too few windows to train a model, or of one speed only.")
-    found = {kind: _curve(windows, kind) for kind in KINDS}
+    by_speed = [windows.at(k) for k in range(len(windows.speeds))]
+    nmse = {kind: [within_nmse(at, (kind,)) for at in by_speed] for kind in KINDS}
+    found = (nmse, _bias(by_speed, 0), _bias(by_speed, 1))
     evidence = {"unreliable": unreliable(windows), "captured": captured(windows)}
-    return Section(evidence, (_table(corpus, windows, found),), (_picture(study, corpus, windows, found),), NOTES)
+    return Section(evidence, (_table(corpus, windows, *found),), (_picture(study, corpus, windows, *found),), NOTES)
 
 
 def unreliable(windows: HeldOut) -> Evidence:
@@ -100,21 +96,17 @@ def _centred(ranks: Array, weights: Array) -> Array:
     return np.asarray(ranks - np.sum(weights * ranks, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
 
 
-def _curve(windows: HeldOut, kind: str) -> SpeedCurve:
-    at = [windows.at(k) for k in range(len(windows.speeds))]
-    return SpeedCurve(
-        tuple(within_nmse(w, (kind,)) for w in at),
-        tuple(bias(w, kind, 0).times(100.0) for w in at),
-        tuple(bias(w, kind, 1).times(100.0) for w in at),
-    )
+def _bias(windows: Sequence[HeldOut], output: int) -> Curves:
+    """Bias at each speed, per cent of the pusher's travel."""
+    return {kind: [bias(at, kind, output).times(100.0) for at in windows] for kind in KINDS}
 
 
-def _table(corpus: Corpus, windows: HeldOut, found: dict[str, SpeedCurve]) -> Table:
+def _table(corpus: Corpus, windows: HeldOut, nmse: Curves, along: Curves, across: Curves) -> Table:
     rows = []
     for k in range(len(windows.speeds)):
-        at, analytical = windows.at(k), found["analytical"]
-        biases = (Number(analytical.along[k], ".1f"), Number(analytical.across[k], ".1f"))
-        rows.append((at.speed_range, at.pushes, len(at.push_id), *(Number(c.nmse[k]) for c in found.values()), *biases))
+        at = windows.at(k)
+        biases = (Number(part["analytical"][k], ".1f") for part in (along, across))
+        rows.append((at.speed_range, at.pushes, len(at.push_id), *(Number(c[k]) for c in nmse.values()), *biases))
     caption = (
         f"NMSE (sum of 3) over the variance at each speed, and bias of the analytical model. "
         f"{corpus.reference_name}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}; "
@@ -126,20 +118,19 @@ def _table(corpus: Corpus, windows: HeldOut, found: dict[str, SpeedCurve]) -> Ta
     return Table(caption, head, tuple(rows))
 
 
-def _picture(study: Study, corpus: Corpus, windows: HeldOut, found: dict[str, SpeedCurve]) -> Picture:
+def _picture(study: Study, corpus: Corpus, windows: HeldOut, nmse: Curves, along: Curves, across: Curves) -> Picture:
     speeds = (1e3 * windows.speeds).tolist()
     ticks = [tick for tick in SPEED_TICKS if min(speeds) / 1.15 <= tick <= 1.15 * max(speeds)]
 
-    def panel(part: str, title: str, label: str) -> Panel:
-        lines = [Line(KIND_NAMES[kind], KIND_LOOKS[kind], speeds, getattr(found[kind], part)) for kind in KINDS]
-        nmse = part == "nmse"
-        return Panel(title, "speed (mm/s)", label, lines, ticks, ratio=nmse, zero=not nmse)
+    def panel(curves: Curves, title: str, label: str) -> Panel:
+        lines = [Line(KIND_NAMES[kind], KIND_LOOKS[kind], speeds, curves[kind]) for kind in KINDS]
+        return Panel(title, "speed (mm/s)", label, lines, ticks, ratio=curves is nmse, zero=curves is not nmse)
 
     share = "observed − predicted (% of travel)"
     panels = [
-        panel("nmse", "NMSE within the speed", "NMSE, sum of 3"),
-        panel("along", "bias along the push", share),
-        panel("across", "bias across the push", share),
+        panel(nmse, "NMSE within the speed", "NMSE, sum of 3"),
+        panel(along, "bias along the push", share),
+        panel(across, "bias across the push", share),
     ]
     return picture(
         study.file("speed_error", corpus),

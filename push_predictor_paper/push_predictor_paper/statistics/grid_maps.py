@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import Repetitions
-from push_predictor_paper.estimate import Estimate, of_draws
 
 BLOCK = (0.2, 0.4)  # of the side, rad: neighbouring pushes are alike and are resampled as a block
 DRAWS = 400

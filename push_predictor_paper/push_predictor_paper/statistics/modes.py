@@ -18,12 +18,12 @@ import numpy as np
 from diptest import dipstat
 from scipy.stats import shapiro
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.metrics import gaussian_nlpd
 from push_predictor.models.gaussian_process.prediction import exact_log_density, gaussian_log_density
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.fit import Fit, trained
 
 ROUNDING = 1e-12  # dips closer than this are equal

@@ -12,9 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.map_models import ModelMap
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
