@@ -30,7 +30,7 @@ from msg_adapters.predictions import (
     query_to_request,
     refuse,
 )
-from msg_adapters.residuals import residual_to_message
+from msg_adapters.residuals import residual_to_message, residuals_to_table
 from msg_adapters.rigs import rig_from_message, rig_to_message
 from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import RequestError, RigError
@@ -40,6 +40,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor_interfaces.msg import PushResidual
 
 CORRELATIONS = st.floats(-0.95, 0.95)
@@ -160,6 +161,19 @@ def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlati
     gap, standardised = np.array(message.observed) - message.predicted, np.array(message.standardised)
     assert standardised @ standardised == pytest.approx(gap @ np.linalg.solve(covariance, gap), rel=1e-6, abs=1e-9)
     assert standardised[0] == pytest.approx(gap[0] / spreads[0], rel=1e-9)
+
+
+def test_residuals_come_back_as_rows_of_a_table_with_their_covariates():
+    windows = [replace(window, covariates={"slider_heading": 0.5 + k}) for k, window in enumerate(made_up_windows(3))]
+    sent = [over_the_wire(residual_to_message("vhgp", w, PREDICTED, np.eye(3), True, "world")) for w in windows]
+    found, table = residuals_to_table(sent), windows_to_table(windows)
+    for name in ("inputs", "duration", "outcomes", "push_id"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(table, name))
+    assert found.covariates.keys() == {"slider_heading"}
+    np.testing.assert_array_equal(found.covariates["slider_heading"], [0.5, 1.5, 2.5])
+    sent[1].covariate_values = []
+    with pytest.raises(RequestError, match="covariate_values length: 0 is not accepted, give 1 values"):
+        residuals_to_table(sent)
 
 
 def test_a_residual_survives():
