@@ -23,7 +23,7 @@ from push_predictor.models.effects.effect import products
 from push_predictor.models.mechanics.ladder import all_supports_known
 from push_predictor.models.mechanics.parameters import QUASI_STATIC
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, mechanism_named
-from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED, screening_bases
+from push_predictor.residuals.evidence.drivers import CONSTANT, at_touch, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
@@ -218,11 +218,7 @@ class Nuisance:
 
     @cached_property
     def _late_touch(self) -> Array:
-        since = self.evidence.table.covariates.get("time_since_contact")
-        if since is None:
-            return np.empty((len(self.evidence.table), 3, 0))
-        first = (since < SETTLED).astype(np.float64)
-        return whitened_response(self.evidence, "pusher_travel") * first[:, None, None]
+        return whitened_response(self.evidence, "pusher_travel") * at_touch(self.evidence.table)[:, None, None]
 
 
 def _orthonormal(columns: Array, residualizer: Residualizer) -> Array | None:

@@ -44,7 +44,7 @@ from push_predictor.residuals.channels.contrast import (
     sizes,
     stacked,
 )
-from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
+from push_predictor.residuals.evidence.drivers import CONSTANT, at_touch
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES
 from push_predictor.types import Array
@@ -87,7 +87,7 @@ def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
     touch = place + rotate(outline.point(contact), heading)
     turned = np.column_stack([-touch[:, 1], touch[:, 0]])
     return {
-        "clock_offset": (-velocity * np.cos(angle) * _settled(table))[:, None],
+        "clock_offset": (-velocity * np.cos(angle) * (1.0 - at_touch(table)))[:, None],
         "frame_rotation": -np.sum(outward * turned, axis=1)[:, None],
         "frame_shift": -outward,
     }
@@ -113,7 +113,7 @@ def _gap_of(both: Stacked, outline: Outline) -> Quantity:
 def _geometry(table: PushTable, outline: Outline) -> Array:
     """Controls of the gap (n, m): a function of the contact point, compliance, transient of the first window."""
     shape = _edges(table.inputs[:, 1], outline) if len(outline.vertices) <= MOST_EDGES else _around(table.inputs[:, 1])
-    first = 1.0 - _settled(table)
+    first = at_touch(table)
     columns = [shape, first, first * table.inputs[:, 0], first * table.inputs[:, 0] * np.cos(table.inputs[:, 2])]
     if "normal_force" in table.covariates:
         columns.append(table.covariates["normal_force"])
@@ -138,11 +138,6 @@ def _edges(contact: Array, outline: Outline) -> Array:
 def _around(contact: Array) -> Array:
     turn = 2.0 * np.pi * contact
     return np.column_stack([np.ones_like(turn), *(f(k * turn) for k in (1, 2, 3) for f in (np.cos, np.sin))])
-
-
-def _settled(table: PushTable) -> Array:
-    since = table.covariates.get("time_since_contact")
-    return np.ones(len(table)) if since is None else (since >= SETTLED).astype(np.float64)
 
 
 def _sized(gap: Quantity, chosen: Sequence[Chosen], seed: int) -> tuple[ChannelEffect, ...]:

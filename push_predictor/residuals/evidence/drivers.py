@@ -47,6 +47,12 @@ def driver_names(table: PushTable) -> list[str]:
     return [name for name, column in table.covariates.items() if name not in NO_CAUSES and _varies(column)]
 
 
+def at_touch(table: PushTable) -> Array:
+    """1 for windows that begin with the first touch of a push, 0 for others (n,); all 0 where it was not recorded."""
+    since = table.covariates.get("time_since_contact", np.full(len(table), np.inf))
+    return np.asarray(since < SETTLED, dtype=np.float64)
+
+
 def two_dimensional(table: PushTable) -> DriverBasis:
     """A second-order map over the position on the table."""
     x, y = (table.covariates[name] for name in PLACE)

@@ -4,7 +4,8 @@
 """The name of an effect: which covariates and which mechanisms remain possible, and whether any mechanism fits.
 
 What was tried in place of a term remains possible unless its gain is smaller by more than chance from block to block. A
-mechanism is named only if the generic polynomial along the same covariate gains little in addition to it.
+mechanism is named only if little is gained in addition by what no mechanism does: a polynomial along the same
+covariate, or an effect that passes with the first window of a push.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.special import ndtri
 
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.joint_fit import Fit, standard_error
+from push_predictor.residuals.evidence.drivers import at_touch
 from push_predictor.types import Array
 
 REJECTED = 0.01  # probability that a rival which is rejected is the right one
@@ -72,14 +74,17 @@ def chosen_of(tried: Sequence[Trial]) -> Trial:
 
 
 def unexplained_share(chosen: Trial, base: Fit) -> float:
-    """Share of the gain along its covariate that only the generic polynomial achieves; 0 if that may be chance."""
+    """Share of the gain along its covariate that the mechanism cannot achieve; 0 if that may be chance.
+
+    The generic polynomial may do what it cannot. And parameters of the mechanics act on all windows of a push alike:
+    what acts on the first only wears off as the slider moves.
+    """
     c, fit = chosen.candidate, chosen.fit
-    generic = candidate(fit.rows.evidence, None, c.covariate, c.basis)
-    more = fit.with_columns(generic.plain) - fit.scores
-    if not surely(more, REJECTED):
-        return 0.0
-    gain = float((fit.scores - base.scores).sum())
-    return float(more.sum()) / (float(more.sum()) + max(gain, 0.0))
+    evidence = fit.rows.evidence
+    generic, first = candidate(evidence, None, c.covariate, c.basis), at_touch(evidence.table)[:, None, None]
+    gain = max(float((fit.scores - base.scores).sum()), 0.0)
+    more = [fit.with_columns(columns) - fit.scores for columns in (generic.plain, c.plain * first)]
+    return max([float(m.sum()) / (float(m.sum()) + gain) for m in more if surely(m, REJECTED)], default=0.0)
 
 
 def surely(gains: Array, level: float) -> bool:

@@ -22,7 +22,7 @@ from push_predictor.reporting.chart import HALF, SMALL, Band, Bars, Chart, Colum
 from push_predictor.reporting.html import number
 from push_predictor.residuals.channels.measurement import NEEDED, gap_responses
 from push_predictor.residuals.channels.sensor_zero import WRENCH_BIAS
-from push_predictor.residuals.evidence.drivers import SETTLED
+from push_predictor.residuals.evidence.drivers import at_touch
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.phrases import bare, capitalised, covariate_phrase, interval, shown_unit_of
@@ -58,8 +58,7 @@ def gap_chart(trace: Trace) -> Chart | None:
         return None
     name = str(effects[0].mechanism)
     sizes = np.array([e.parameter.value for e in effects if e.mechanism == name and e.parameter is not None])
-    settled = table.covariates.get("time_since_contact", np.full(len(table), np.inf)) >= SETTLED
-    shown = table.take(settled)
+    shown = table.take(at_touch(table) == 0.0)
     fitted = 1e3 * gap_responses(shown, trace.model.rig.outline)[name] @ sizes
     axis = Axis(fitted, "Gap that the error causes, as fitted (mm)", {})
     gap = Values(axis, shown.push_id, 1e3 * shown.covariates["contact_gap"])
