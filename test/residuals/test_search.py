@@ -17,6 +17,7 @@ from square_session import (
     EXACT,
     FOUR,
     NOISE,
+    WINDOWS,
     baseline,
     learnt,
     linear,
@@ -89,6 +90,20 @@ class TestNames:
         first = searched(learnt(), replace(table, outcomes=table.outcomes + drift)).terms[0]
         assert first.best.covariate == "topic:/temperature"
         assert (first.mechanism, first.naming.resembles) == (None, "contact_friction")
+
+    @pytest.mark.parametrize("passes", [False, True])
+    def test_effect_that_passes_as_the_slider_moves_is_not_named_after_a_mechanism(self, passes: bool) -> None:
+        """The contact is more slippery, in all windows of a push or in the first only."""
+        plain = pushes(COUNT, 208)
+        since = np.resize(0.2 * np.arange(WINDOWS), len(plain))
+        timed = replace(plain, covariates={**plain.covariates, "time_since_contact": since})
+        table = with_effect(timed, "contact_friction", DriverBasis("constant"), -0.15)
+        if passes:
+            table = replace(table, outcomes=np.where(since[:, None] > 0.0, plain.outcomes, table.outcomes))
+        first = searched(ANALYTICAL, table, drivers=()).terms[0]
+        assert first.best.mechanism == "contact_friction"
+        assert (first.mechanism is None) == passes
+        assert first.naming.resembles == ("contact_friction" if passes else None)
 
     @pytest.mark.slow
     def test_correlated_covariates_stay_undecided(self) -> None:
