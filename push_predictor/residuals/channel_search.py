@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The search of all channels: errors of measurement, then the motion, then the force."""
+"""The search of all channels: errors of measurement, the motion, its noise, the force, the zero of its sensor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.channels.wrench import wrench_effects
 from push_predictor.residuals.evidence.loading import cut_again
 from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence, evidence_of, held_out_rows
-from push_predictor.residuals.question import SHARES, Question, unseen
+from push_predictor.residuals.question import ALPHA_SHARES, Question, unseen
 from push_predictor.watch import Watch, no_watch
 
 # Share of the windows, or of the mean squared residual, from which an error of the force sensor does harm. The mean
@@ -50,23 +50,23 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
     """What is found on each channel, before a model is extended or a held-out push is opened; watch: see `trace`."""
     training, seed, evidence = question.model.training, question.seed, question.evidence
     watch("measurement", 0.1)
-    level = question.share("measurement")
+    level = question.alpha_of("measurement")
     measured = measurement_errors(question.windows, training, question.loaded.rig, level, seed)
-    measured = None if measured is None else measured.family_wise(SHARES["measurement"])
+    measured = None if measured is None else measured.family_wise(ALPHA_SHARES["measurement"])
     if measured is not None and measured.effects:
         corrected = _corrected(question, measured.effects)
         if _explains_residuals(question, corrected):
             return Searched(measured, corrected=corrected)
     watch("motion", 0.15)
     motion = motion_effects(
-        question.model, evidence, question.share("mean"), question.covariates, seed, inside=question.inside
-    ).family_wise(SHARES["mean"])
+        question.model, evidence, question.alpha_of("motion"), question.covariates, seed, inside=question.inside
+    ).family_wise(ALPHA_SHARES["motion"])
     noise = _noise(question, motion)
     watch("force", 0.6)
     known = question.windows.take(question.inside)  # faster pushes need more force; training does not show how much
-    forces = wrench_effects(known, training, evidence.mechanics, question.share("force"), seed)
-    zero = zero_shift(known, training, question.share("zero")).family_wise(SHARES["zero"])
-    found = Searched(measured, motion, noise, forces.family_wise(SHARES["force"]), zero)
+    forces = wrench_effects(known, training, evidence.mechanics, question.alpha_of("force"), seed)
+    zero = zero_shift(known, training, question.alpha_of("zero")).family_wise(ALPHA_SHARES["zero"])
+    found = Searched(measured, motion, noise, forces.family_wise(ALPHA_SHARES["force"]), zero)
     if not zero.effects:
         return found
     corrected = _corrected(question, zero.effects)
@@ -82,9 +82,9 @@ def _noise(question: Question, motion: MotionFinding) -> ChannelFinding:
     evidence, z = question.evidence.take(inside), motion.unexplained[inside]
     if len(evidence.table.pushes) < FEWEST_PUSHES:
         return NOTHING_FOUND
-    share, names, training = question.share("noise"), question.covariates, motion.training
-    found = variance_effects(question.model, evidence, z, share, question.seed, names=names, training=training)
-    return found.family_wise(SHARES["noise"])
+    alpha, names, training = question.alpha_of("noise"), question.covariates, motion.training
+    found = variance_effects(question.model, evidence, z, alpha, question.seed, names=names, training=training)
+    return found.family_wise(ALPHA_SHARES["noise"])
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Eviden
 from push_predictor.types import BoolArray
 
 # Of alpha, by channel: every kind of false alarm counts.
-SHARES = {"measurement": 0.2, "mean": 0.45, "noise": 0.15, "force": 0.1, "zero": 0.1}
+ALPHA_SHARES = {"measurement": 0.2, "motion": 0.45, "noise": 0.15, "force": 0.1, "zero": 0.1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +81,9 @@ class Question:
             trained=pushes - len(loaded.table.pushes),
         )
 
-    def share(self, channel: str) -> float:
+    def alpha_of(self, channel: str) -> float:
         """The part of alpha that a channel may spend."""
-        return SHARES[channel] * self.alpha
+        return ALPHA_SHARES[channel] * self.alpha
 
 
 def unseen(model: PushModel, table: PushTable) -> PushTable:

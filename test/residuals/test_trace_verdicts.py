@@ -32,7 +32,7 @@ from push_predictor.residuals.evidence.input_shift import about_mechanics
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again, with_inputs
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace, trace_json
-from push_predictor.residuals.question import SHARES, Question
+from push_predictor.residuals.question import ALPHA_SHARES, Question
 from push_predictor.residuals.reporting.notes import _of_data
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.sentences import answer
@@ -131,7 +131,7 @@ def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(m
     found_by_channel(monkeypatch, noise=ChannelFinding((NOISE,)), forces=ChannelFinding((effect,)))
     both = trace(learnt(), faultless())
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
-    assert [(e.mechanism, e.p_value) for e in both.effects] == [("surface_friction", 0.0005 / SHARES["force"])]
+    assert [(e.mechanism, e.p_value) for e in both.effects] == [("surface_friction", 0.0005 / ALPHA_SHARES["force"])]
     assert any("noise of the motion changed as well" in note and "speed" in note for note in both.notes)
 
 
@@ -155,7 +155,7 @@ def test_effect_that_only_resembles_a_mechanism_has_no_size_and_its_rest_is_no_s
     assert (found.verdict, found.mechanisms) == ("driver_only", ())
     (effect,) = found.effects
     assert (effect.mechanism, effect.resembles, effect.parameter) == (None, "tilted_surface", None)
-    assert effect.p_value == 0.001 / SHARES["mean"] and sum(SHARES.values()) == pytest.approx(1.0)
+    assert effect.p_value == 0.001 / ALPHA_SHARES["motion"] and sum(ALPHA_SHARES.values()) == pytest.approx(1.0)
     assert [term.mechanism for term in found.terms] == ["tilted_surface", None]
     json.dumps(trace_json(found))
     write_trace_report(tmp_path / "page.html", found)  # pairs effects with terms

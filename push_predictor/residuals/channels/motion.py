@@ -23,12 +23,13 @@ from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_b
 from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES, Evidence
 from push_predictor.residuals.outcome import Tested, best_of, in_trace
 from push_predictor.residuals.selection.gate import Baseline, Gate, baseline_of
-from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED, REJECTED
 from push_predictor.residuals.selection.power import minimum_detectable
 from push_predictor.residuals.selection.search import Label, SearchResult, Term, search
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
+DIFFERENT = 0.01  # probability that an effect which differs from that in training is the same
+LEFT = 0.15  # of the gain of a larger effect: less is what its fit leaves
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
 
@@ -150,7 +151,7 @@ def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseli
 def _is_left(term: Term, larger: Sequence[Term]) -> bool:
     """Whether a term is what the fit of a larger one leaves: small beside one with its mechanism or covariate."""
     return any(
-        term.gain < MOST_UNEXPLAINED * other.gain
+        term.gain < LEFT * other.gain
         and (term.best.mechanism == other.best.mechanism or {*term.naming.covariates} & {*other.naming.covariates})
         for other in larger
     )
@@ -180,7 +181,7 @@ def _changed(found: SearchResult, inputs: InputsBasis, baseline: Baseline) -> li
 def _differ(one: Effect, other: Effect) -> bool:
     change, covariance = one.coefficients - other.coefficients, one.covariance + other.covariance
     square = float(change @ np.linalg.pinv(covariance, hermitian=True) @ change)
-    return bool(chdtrc(len(change), square) <= REJECTED)
+    return bool(chdtrc(len(change), square) <= DIFFERENT)
 
 
 def _separable(candidate: Candidate, inside: float) -> bool:

@@ -5,9 +5,9 @@
 
 A term is a mechanism, a covariate and a form. Without what passes the gate (gate.py) there is no effect. Every move is
 judged by what the joint fit gains on blocks of pushes that it was not fitted to (candidates/joint_fit.py). A term is
-added, or kept, if it gains more than the standard error of that gain, and a further one also as much as a step of the
-ladder of mechanics. An exchange puts another in place of one where that gains more: it undoes a choice that later terms
-made wrong.
+added, or kept, if it gains more than the standard error of that gain, and a further one also `least_gain` for each of
+its coefficients, as parameters of the mechanics must. An exchange puts another in place of one where that gains more:
+it undoes a choice that later terms made wrong.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class _Search:
     # --- moves -------------------------------------------------------------------------------------------------------
 
     def _worthwhile(self, after: Fit, before: Fit, further: bool) -> bool:
-        """Whether an addition gains more than its error; a further one as much as a step of the ladder, too."""
+        """Whether an addition gains more than its error, and a further one `least_gain` for each coefficient, too."""
         size = len(after.coefficients) - len(before.coefficients)
         least = least_gain(len(self.rows.evidence.table.pushes)) * size if further else 0.0
         gains = after.scores - before.scores
