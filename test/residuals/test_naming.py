@@ -69,6 +69,14 @@ def test_a_covariate_remains_unless_it_is_worse_by_more_than_chance(
     assert found.covariates == (("elapsed_time", "push_index") if kept else ("elapsed_time",))
 
 
+@pytest.mark.parametrize("first", ["elapsed_time", "push_index"])
+def test_covariates_that_are_one_in_other_units_remain_whatever_the_rounding(evidence: Evidence, first: str) -> None:
+    chosen = made(evidence, "contact_friction", first, (500.0 + 1e-9) * EVEN)
+    (other,) = {"elapsed_time", "push_index"} - {first}
+    rival = made(evidence, "contact_friction", other, 500.0 * EVEN)
+    assert set(naming_of(chosen, [rival], base()).covariates) == {first, other}
+
+
 @pytest.mark.parametrize(("advantage", "kept"), [(20.0, True), (25.0, False)])
 def test_a_mechanism_remains_unless_it_is_worse_by_more_than_chance(
     evidence: Evidence, advantage: float, kept: bool

@@ -21,6 +21,7 @@ from push_predictor.residuals.evidence.drivers import at_touch
 from push_predictor.types import Array
 
 REJECTED = 0.01  # probability that a rival which is rejected is the right one
+ROUNDING = 1e-6  # nats: fits along covariates that are one in other units differ by less
 MOST_UNEXPLAINED = 0.15  # of the gain along a covariate: mechanics that are nearly right leave as much of an effect
 
 
@@ -89,7 +90,7 @@ def unexplained_share(chosen: Trial, base: Fit) -> float:
 
 def surely(gains: Array, level: float) -> bool:
     """Whether a gain (b,) of blocks is larger than zero by more than chance; level: probability of such a chance."""
-    return float(gains.sum()) > -float(ndtri(level)) * standard_error(gains)
+    return float(gains.sum()) > ROUNDING - float(ndtri(level)) * standard_error(gains)
 
 
 def _possible(other: Trial, chosen: Trial) -> bool:
