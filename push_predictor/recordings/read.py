@@ -12,7 +12,7 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import POSE
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder, name_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic

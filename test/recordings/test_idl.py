@@ -14,8 +14,7 @@ pytest.importorskip("rosbags")
 from lab_bags import Lab, short_recording
 from mcap.writer import Writer
 
-from push_predictor.recordings.bag.idl import msg_of_idl
-from push_predictor.recordings.bag.message_types import Field, parse_definitions
+from push_predictor.recordings.bag.message_types import Field, msg_of_idl, parse_definitions
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.topics import Topics
 

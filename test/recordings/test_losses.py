@@ -13,7 +13,7 @@ import zstandard
 from lab_bags import short_recording
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.bag.reader import is_bag_file
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.checks.check import LISTED, check_recording

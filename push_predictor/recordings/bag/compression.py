@@ -11,7 +11,7 @@ from pathlib import Path
 import zstandard
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 
 ENDING = ".zstd"
 FRAME = b"\x28\xb5\x2f\xfd"  # the first bytes of a zstd frame

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal, InvalidOperation
 from heapq import merge
 from pathlib import Path
@@ -16,8 +16,7 @@ from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
-from push_predictor.recordings.bag.messages import RawMessage
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import BagFile, Notes, RawMessage
 from push_predictor.recordings.bag.spreadsheet import ERRORS, Column, cells_of, column_of
 from push_predictor.types import Array, IntArray
 
@@ -38,8 +37,8 @@ PARQUET = (
 _LATEST = 2**31 * 10**9  # ns; a header has 32 bits of seconds
 
 
-class CsvStreams:
-    """The streams in slider.csv, pusher.csv, wrench.csv and further files; the attributes are those of McapFile.
+class CsvStreams(BagFile):
+    """The streams in slider.csv, pusher.csv, wrench.csv and further files.
 
     Each may be a Parquet file with the same columns instead. time is in s; x, y, z in m; heading in rad; force in N,
     torque in N m. Each further column of another file is a scalar named /FILE/COLUMN. Raises RecordingError that names
@@ -47,25 +46,17 @@ class CsvStreams:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder
-        self.notes = Notes()
-        self.schemas: dict[str, str] = {}
-        self.qos: dict[str, str] = {}
-        self.metadata: dict[str, Mapping[str, str]] = {}
+        super().__init__(folder)
         self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
         for file in _files(folder):
             if file.suffix.lower() == ".csv" or file.stem.lower() in STREAMS or _parquet_is_read():
                 self._streams |= _streams(file, self.notes)
             else:
                 self.notes.add(f"{file.name} is ignored; {PARQUET}")
-
-    @property
-    def topics(self) -> dict[str, str]:
-        """{topic: type}."""
-        return {topic: kind for topic, (kind, _, _) in self._streams.items()}
+        self.topics = {topic: kind for topic, (kind, _, _) in self._streams.items()}
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """CDR messages in order of time, of all topics or of the given ones; those of a topic in its file's order."""
+        """See BagFile; in order of time, those of a topic in its file's order."""
         wanted = [topic for topic in self._streams if topics is None or topic in topics]
         return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
 

@@ -1,13 +1,14 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages of one topic, many at a time, without a Python object for each."""
+"""What every file of a bag gives: raw messages, single or many of one topic at a time, and notes on what is lost."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,51 @@ class RawMessage(NamedTuple):
     type: str
     log_time: int
     data: bytes
+
+
+class Notes(list[str]):
+    """Sentences, each once. losses: those of them about data that are missing or cannot be read."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.losses: list[str] = []
+
+    def add(self, text: str, *, lost: bool = False) -> None:
+        """Add a sentence, if it is new. lost: data are missing for it."""
+        if text in self:
+            return
+        self.append(text)
+        if lost:
+            self.losses.append(text)
+
+    def add_all(self, other: Notes) -> None:
+        """Add the sentences of others."""
+        for text in other:
+            self.add(text, lost=text in other.losses)
+
+
+class BagFile:
+    """One file, or a folder of streams.
+
+    topics: {topic: type, '' if its schema is missing}; schemas: {type: definition text}; qos: {topic: offered QoS as
+    YAML text, '' if unknown}; metadata: {record name: {key: value}}; notes: damage found so far. name: of the file in
+    notes, by default its path.
+    """
+
+    def __init__(self, path: Path, name: str = "") -> None:
+        self.path, self.name = path, name or str(path)
+        self.topics: dict[str, str] = {}
+        self.schemas: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
+        self.metadata: dict[str, Mapping[str, str]] = {}
+        self.notes = Notes()
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
+        """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
+        raise NotImplementedError
+
+    def _lost(self, what: str) -> None:
+        self.notes.add(f"{self.name}: {what}", lost=True)
 
 
 @dataclass(frozen=True, eq=False)

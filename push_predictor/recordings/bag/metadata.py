@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
 
 METADATA_FILE = "metadata.yaml"
