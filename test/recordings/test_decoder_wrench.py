@@ -126,7 +126,7 @@ def test_transforms_of_a_sensor_are_forgotten_when_no_wrench_needs_them() -> Non
             decided, poses = buffer.at("ft", "world", at, "wrench")
             buffer.forget()
             assert decided.tolist() == (at <= stamps[number]).tolist() and not np.isnan(poses).any()
-    assert 500 <= len(buffer._histories["ft"].edge.stamp) < 1700
+    assert 500 <= len(buffer.histories["ft"].edge.stamp) < 1700
 
 
 def biased(frame: str) -> Array:
