@@ -116,7 +116,7 @@ def test_a_frame_that_tf_does_not_have_is_named_and_its_wrenches_wait() -> None:
 
 
 def test_transforms_of_a_sensor_are_forgotten_when_no_wrench_needs_them() -> None:
-    buffer, made, stamps = TransformBuffer([]), Lab(), np.arange(0, 25 * SECOND, SECOND // 100)
+    buffer, made, stamps = TransformBuffer(), Lab(), np.arange(0, 25 * SECOND, SECOND // 100)
     rows = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
     made.transform("/tf", "world", "ft", stamps, rows)
     for number, (sent, topic, data) in enumerate(made.in_order()):

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 
 from push_predictor.errors import RecordingError, RigError
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
+from push_predictor.recordings.bag.messages import encode
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
@@ -32,7 +32,7 @@ Content = dict[str, tuple[MessageType, list[bytes]]]
 
 
 def pose_topics() -> Content:
-    messages = encode(STAMP, POSES, POSE_STAMPED)
+    messages = encode(STAMP, POSES)
     return {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
 
 
@@ -198,7 +198,7 @@ def test_folder_without_recordings_and_missing_path_are_errors(tmp_path: Path) -
 
 def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
     poses = pose_topics()
-    wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6], WRENCH_STAMPED))}
+    wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6]))}
     with pytest.raises(RecordingError, match="topic /slider/pose is of type 'geometry_msgs/msg/WrenchStamped'"):
         read_recording(write_mcap(tmp_path / "wrong.mcap", wrong))
     with pytest.raises(RecordingError, match="/pose is encoded as 'json', cdr is accepted"):
@@ -210,7 +210,7 @@ def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_p
 def test_unusable_samples_are_discarded_and_counted(tmp_path: Path) -> None:
     values = POSES.copy()
     values[3, 0], values[5, 1], values[7, 3:] = np.nan, np.inf, 0.0
-    messages = encode(STAMP, values, POSE_STAMPED)
+    messages = encode(STAMP, values)
     messages[9] = messages[9][:40]
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/slider/pose": (POSE, messages)})
     read = read_recording(path)
@@ -225,7 +225,7 @@ def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Pa
     heading = np.linspace(-3.1, 3.1, N)
     values = POSES.copy()
     values[:, 5], values[:, 6] = -1.7 * np.sin(heading / 2.0), -1.7 * np.cos(heading / 2.0)
-    turned = {"/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    turned = {"/slider/pose": (POSE, encode(STAMP, values))}
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **turned})
     np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
 
@@ -233,7 +233,7 @@ def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Pa
 def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:
     stamp = STAMP.copy()
     stamp[[4, 5]] = stamp[[5, 4]]
-    messages = encode(stamp, POSES, POSE_STAMPED)
+    messages = encode(stamp, POSES)
     topics = {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
     path = write_mcap(tmp_path / "a.mcap", topics, STAMP + 7)
     np.testing.assert_array_equal(read_recording(path).slider.stamp, stamp)
@@ -242,14 +242,14 @@ def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:
 def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
     value = np.linspace(20.0, 21.0, N)[:, None]
     other = STAMP - 10**9
-    with_variance = encode(other, np.column_stack([value, 0.0 * value]), Layout(header=True, count=2), "sensor")
+    with_variance = encode(other, np.column_stack([value, 0.0 * value]), frame_id="sensor")
 
     def kind(name: str) -> MessageType:
         return MessageType(name, "", "")
 
     topics: Content = {
-        "/float64": (FLOAT64, encode(STAMP, value, Layout(False, 1))),
-        "/float32": (kind("std_msgs/msg/Float32"), encode(STAMP, value, Layout(False, 1, 4))),
+        "/float64": (FLOAT64, encode(STAMP, value, header=False)),
+        "/float32": (kind("std_msgs/msg/Float32"), [b"\0\1\0\0" + number.tobytes() for number in value.astype("<f4")]),
         "/temperature": (kind("sensor_msgs/msg/Temperature"), with_variance),
         "/humidity": (kind("sensor_msgs/msg/RelativeHumidity"), with_variance),
         "/pressure": (kind("sensor_msgs/msg/FluidPressure"), with_variance),

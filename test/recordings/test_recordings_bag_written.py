@@ -16,8 +16,8 @@ import yaml
 from mcap.opcode import Opcode
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH
+from push_predictor.recordings.bag.messages import encode
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.read import read_recording
@@ -195,7 +195,7 @@ def test_bags_compressed_by_rosbag2_are_decompressed(tmp_path: Path, recording: 
 def test_messages_that_cannot_be_decompressed_are_skipped_and_counted(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "a") as writer:
         writer.add_topic("x", FLOAT64.name, FLOAT64.definition)
-        for k, data in enumerate((b"\x28\xb5\x2f\xfd damaged", *encode(STAMP[:2], np.ones((2, 1)), SCALAR_LAYOUT))):
+        for k, data in enumerate((b"\x28\xb5\x2f\xfd damaged", *encode(STAMP[:2], np.ones((2, 1)), header=False))):
             writer.write("x", k, data)
     for read in (lambda bag: list(bag.messages()), lambda bag: [m for of in bag.portions({"/x"}) for m in of.times]):
         bag = open_bag(tmp_path / "a")
@@ -240,12 +240,12 @@ def test_rclpy_reads_our_bytes_and_writes_the_same() -> None:
     from std_msgs.msg import Float64
 
     values = np.arange(1.0, 8.0)[None]
-    ours = encode(STAMP[1:2], values, POSE_STAMPED)[0]
+    ours = encode(STAMP[1:2], values)[0]
     pose = serialization.deserialize_message(ours, PoseStamped)
     assert (pose.header.stamp.sec, pose.header.stamp.nanosec) == divmod(int(STAMP[1]), 10**9)
     assert (pose.header.frame_id, pose.pose.position.y, pose.pose.orientation.w) == ("world", 2.0, 7.0)
-    wrench = encode(STAMP[1:2], values[:, :6], WRENCH_STAMPED)[0]
-    scalar = encode(STAMP[1:2], values[:, :1], Layout(False, 1))[0]
+    wrench = encode(STAMP[1:2], values[:, :6])[0]
+    scalar = encode(STAMP[1:2], values[:, :1], header=False)[0]
     for data, kind in ((ours, PoseStamped), (wrench, WrenchStamped), (scalar, Float64)):
         theirs = serialization.serialize_message(serialization.deserialize_message(data, kind))
         padding = slice(22, 28) if kind is not Float64 else slice(0, 0)  # left uninitialised by Fast CDR

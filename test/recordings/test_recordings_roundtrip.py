@@ -14,9 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, encode
 from push_predictor.recordings.bag.message_types import POSE
-from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.bag.messages import Messages, encode
 from push_predictor.recordings.fields.sources import POSE_TARGET, Columns, FieldReader, definitions_of
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
@@ -130,7 +129,7 @@ def decoded(messages: list[bytes]) -> Columns:
 def test_columns_read_back_from_cdr_with_any_frame_id(stamp: np.ndarray, frame: str, data: st.DataObject) -> None:
     frame = frame.replace("\0", "")
     values = data.draw(columns(len(stamp), 7, st.floats()))
-    found = decoded(encode(stamp, values, POSE_STAMPED, frame))
+    found = decoded(encode(stamp, values, frame_id=frame))
     np.testing.assert_array_equal(found.values, values)
     np.testing.assert_array_equal(found.stamp, stamp)
     assert found.valid.all()
@@ -147,7 +146,7 @@ def test_decoder_accepts_any_bytes(messages: list[bytes]) -> None:
 def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_order() -> None:
     stamp, values = np.arange(6, dtype=np.int64) * 10**9 + 5, np.arange(42.0).reshape(6, 7)
     frames = ["", "w", "world", "a_long_frame_name", "world", "w"]
-    messages = [encode(stamp[i : i + 1], values[i : i + 1], POSE_STAMPED, frames[i])[0] for i in range(6)]
+    messages = [encode(stamp[i : i + 1], values[i : i + 1], frame_id=frames[i])[0] for i in range(6)]
     messages[2] = big_endian(messages[2], len("world") + 1)
     messages[4] = messages[4][:-9]
     found = decoded(messages)
@@ -158,7 +157,7 @@ def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_order()
 
 def big_endian(message: bytes, frame_length: int) -> bytes:
     """The same message in the other byte order."""
-    start = POSE_STAMPED.start(frame_length)
+    start = len(message) - 7 * 8
     words = np.frombuffer(message[4:16], "<u4").astype(">u4").tobytes()
     numbers = np.frombuffer(message[start:], "<f8").astype(">f8").tobytes()
     return b"\0\0\0\0" + words + message[16:start] + numbers

@@ -17,8 +17,16 @@ from test_lab_topics import assert_same_windows, original, wrench
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, turned
-from push_predictor.recordings.fields.up_axis import UP_AXES, bodies_z_up, wrenches_z_up, z_up
+from push_predictor.recordings.fields.pose_rows import (
+    UP_AXES,
+    bodies_z_up,
+    composed,
+    inverted,
+    normalised,
+    turned,
+    wrenches_z_up,
+    z_up,
+)
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.topics import Topics, load_topics, save_topics, topics_path

@@ -1,7 +1,10 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every file of a bag gives: raw messages, single or many of one topic at a time, and notes on what is lost."""
+"""What every file of a bag gives: raw messages, single or many of one topic at a time, and notes on what is lost.
+
+Messages are CDR (XCDR1). `encode` makes them from numbers.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from push_predictor.types import IntArray
+from push_predictor.types import Array, IntArray
 
 PORTION = 20_000  # single messages that are gathered
+_PREFIX = 4  # bytes of encapsulation: 0, 1 little-endian, then two of options
+_STAMP, _FRAME = 4, 16
+_NUMBER = 8  # bytes, to which numbers are aligned, counted from the fourth byte of a message
+_NANO = 1_000_000_000
 
 
 class RawMessage(NamedTuple):
@@ -120,3 +127,30 @@ def gathered(messages: Iterable[RawMessage]) -> Iterator[Messages]:
         for (topic, kind), (times, contents) in parts.items():
             # Damaged files have times of more than 63 bits.
             yield Messages.of(topic, kind, np.array(times, np.uint64).astype(np.int64), contents)
+
+
+def encode(stamp: IntArray, values: Array, *, header: bool = True, frame_id: str = "world") -> list[bytes]:
+    """One little-endian message per row of values (n, k): a std_msgs/Header or none, then the numbers as float64.
+
+    stamp (n,) in ns is unused without a header. Raises ValueError for a stamp outside the range of
+    builtin_interfaces/Time.
+    """
+    text = frame_id.encode() + b"\0"
+    before = _FRAME + len(text) - _PREFIX if header else 0
+    start = _PREFIX + -(-before // _NUMBER) * _NUMBER
+    numbers = np.ascontiguousarray(values, "<f8").view(np.uint8)
+    block = np.zeros((len(values), start + numbers.shape[1]), np.uint8)
+    block[:, 1], block[:, start:] = 1, numbers
+    if header:
+        block[:, _STAMP:_FRAME] = np.frombuffer(_header_words(stamp, len(text)), np.uint8).reshape(-1, 12)
+        block[:, _FRAME : _FRAME + len(text)] = np.frombuffer(text, np.uint8)
+    data, size = block.tobytes(), block.shape[1]
+    return [data[i : i + size] for i in range(0, len(data), size)]
+
+
+def _header_words(stamp: IntArray, frame_length: int) -> bytes:
+    seconds, nanoseconds = np.divmod(np.asarray(stamp, np.int64), _NANO)
+    if np.any((seconds < -(2**31)) | (seconds >= 2**31)):
+        raise ValueError("a header stamp does not fit into 32-bit seconds")
+    words = np.stack([seconds, nanoseconds, np.full_like(seconds, frame_length)], axis=1)
+    return words.astype("<u4").tobytes()

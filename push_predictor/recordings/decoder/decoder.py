@@ -30,8 +30,8 @@ from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, 
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.decoder.wrench import WrenchInput
+from push_predictor.recordings.fields.pose_rows import bodies_z_up, z_up
 from push_predictor.recordings.fields.sources import SCALAR_TARGET, TF_TYPES, Source
-from push_predictor.recordings.fields.up_axis import bodies_z_up, z_up
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import Topics
