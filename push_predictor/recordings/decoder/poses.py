@@ -95,6 +95,7 @@ class PoseFrame:
     def __init__(self, source: Source, rules: Rules, tf: TransformBuffer) -> None:
         self.source, self._rules, self.tf = source, rules, tf
         self.received, self.rejected = 0, Counter[str]()
+        self.foreign = Counter[str]()  # tf has one type
         self._progress = tf.follow(source.frame)
         self._unconnected: TransformError | None = None
 
