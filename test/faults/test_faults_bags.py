@@ -97,10 +97,12 @@ def test_chunk_with_an_excessive_length_is_noted_and_uses_no_memory(bag: Path, l
 def test_chunk_that_states_too_much_content_is_skipped(bag: Path) -> None:
     data = bytearray(bag.read_bytes())
     chunk = chunks_of(data)[1]
+    whole = len(messages_and_notes(bag)[0])
     struct.pack_into("<Q", data, chunk + 25, 1 << 31)
     bag.write_bytes(data)
-    _, notes = messages_and_notes(bag)
+    found, notes = messages_and_notes(bag)
     assert any(f"at byte {chunk}: a chunk was skipped: a chunk of {1 << 31} bytes" in note for note in notes)
+    assert any(f"{len(found)} messages were found, the summary lists {whole}" in note for note in notes)
 
 
 @pytest.mark.parametrize("place", range(65_480, 65_560, 13))

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ import pytest
 pytest.importorskip("rosbags")
 from decoding import decoder_of, in_portions
 from decoding import put as hand
-from lab_bags import Lab, Message, robot_in_tf, short_recording
+from lab_bags import Lab, Message, short_recording
 
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder import transform_buffer
@@ -83,29 +82,6 @@ def test_several_portions_that_are_taken_at_once_stay_in_order() -> None:
     stamp, rows = tip.take()
     assert stamp.tolist() == every(4, 0, 1201).tolist()
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
-
-
-def test_two_frames_share_the_messages_and_the_world(tmp_path: Path) -> None:
-    buffer = TransformBuffer()
-    block, tip = (pose_frame("", name, buffer) for name in ("block", "tip"))
-    put(buffer, robot_in_tf(original(), "map").in_order())
-    assert [len(frame.take(last=True)[0]) for frame in (block, tip, block)] == [
-        len(original().slider),
-        len(original().pusher),
-        0,
-    ]
-    assert buffer.world == "map" and not block.problem
-    assert (tip.received, tip.rejected.total()) == (len(original().pusher), 0)
-
-
-def test_a_sample_waits_for_the_other_transforms() -> None:
-    lab, tip = cart(every(20, 0, 1101), every(4, 0, 1151)), pose_frame()
-    put(tip.tf, lab.in_order())
-    stamp, rows = tip.take()
-    assert stamp[-1] == START + 1100 * MILLISECOND, "the cart is known until then"
-    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
-    put(tip.tf, [m for m in cart(every(20, 1120, 1141), every(4, 0, 0)).in_order() if m[1] == "/tf"])
-    assert tip.take()[0].tolist() == every(4, 1104, 1141).tolist()
 
 
 def test_a_single_stamp_is_known_once_all_transforms_have_reached_it() -> None:
@@ -199,18 +175,6 @@ def test_the_last_static_transform_counts() -> None:
         put(tip.tf, [message])
         tip.recent(1)
     assert tip.take()[1][:, 0] == pytest.approx(5.0) and len(tip.tf.histories["cart"].edge.stamp) == 1
-
-
-def test_a_frame_that_was_static_may_move() -> None:
-    static, moving = Lab(), cart(every(20, 20, 101), every(4, 0, 101))
-    static.transform("/tf_static", "world", "cart", every(1, 0, 1), line(every(1, 0, 1)))
-    tip = pose_frame("world")
-    for messages in (static.in_order(), [message for message in moving.in_order() if message[1] == "/tf"]):
-        put(tip.tf, messages)
-        tip.recent(1)
-    stamp, rows = tip.take(last=True)
-    assert stamp.tolist() == every(4, 0, 101).tolist()
-    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-12)
 
 
 def test_a_decoder_keeps_the_transforms_of_some_seconds() -> None:

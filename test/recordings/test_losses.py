@@ -141,11 +141,13 @@ def test_a_damaged_part_is_a_loss_and_a_file_that_was_not_closed_is_none(split: 
     data = bytearray((split / "bag_1.mcap").read_bytes())
     (split / "bag_1.mcap").write_bytes(data[:-30])
     found = read_recording(split)
-    assert found.notes and not found.losses
+    assert any("end of the file is missing" in note for note in found.notes) and not found.losses
+    assert len(found.slider) == len(short_recording(4.0).slider) and found.rig is not None
     data[len(data) // 3] ^= 0xFF
     (split / "bag_1.mcap").write_bytes(data)
     found = read_recording(split)
     assert "a chunk was skipped" in found.losses[0] and set(found.losses) <= set(found.notes)
+    assert 0 < len(found.slider) < len(short_recording(4.0).slider)
 
 
 def test_a_wrench_of_a_foreign_type_is_a_loss(tmp_path: Path) -> None:

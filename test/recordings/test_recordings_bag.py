@@ -15,12 +15,11 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, Writer
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.messages import encode
-from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.write import write_recording
@@ -82,68 +81,6 @@ def test_several_files_are_read_in_the_order_of_the_bag(tmp_path: Path, listed: 
     np.testing.assert_array_equal(read_recording(tmp_path).slider.stamp, STAMP[:3])
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"compression": CompressionType.ZSTD, "chunk_size": 500},
-        {"compression": CompressionType.LZ4, "chunk_size": 500},
-        {"compression": CompressionType.NONE},
-        {"use_chunking": False, "use_statistics": False, "index_types": IndexType.NONE, "repeat_channels": False},
-        {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False},
-        {"use_statistics": False, "enable_crcs": False},
-    ],
-    ids=["zstd", "lz4", "none", "unchunked", "no index", "no statistics"],
-)
-def test_every_chunking_and_compression_of_mcap_is_accepted(
-    tmp_path: Path, recording: Recording, options: dict[str, object]
-) -> None:
-    """The rig is at the end of the file; it is found with and without an index."""
-    assert recording.rig is not None
-    record = ("push_rig", recording.rig.to_record())
-    path = write_mcap(tmp_path / "a.mcap", pose_topics(), metadata=record, **options)
-    assert open_bag(path).topics == {"/pusher/pose": POSE.name, "/slider/pose": POSE.name}
-    read = read_recording(path)
-    assert read.notes == ()
-    assert read.rig is not None and read.rig.to_record() == recording.rig.to_record()
-    np.testing.assert_array_equal(read.slider.x, POSES[:, 0])
-
-
-@pytest.mark.parametrize("compression", ["zstd", "none"])
-def test_data_before_a_cut_are_used_and_the_cut_is_noted(
-    recording: Recording, tmp_path: Path, compression: str
-) -> None:
-    write_recording(tmp_path / "whole.mcap", recording, compression=compression)
-    data = (tmp_path / "whole.mcap").read_bytes()
-    whole = [m.data for m in open_bag(tmp_path / "whole.mcap").messages()]
-    path = tmp_path / "cut.mcap"
-    counts = []
-    for share in (0.3, 0.6, 0.8, 0.95):
-        path.write_bytes(data[: int(len(data) * share)])
-        bag = open_bag(path)
-        kept = [m.data for m in bag.messages()]
-        assert kept == whole[: len(kept)]
-        assert any("cut.mcap at byte" in note for note in bag.notes) or kept == whole
-        counts.append(len(kept))
-    assert counts == sorted(counts)
-    assert counts[2] > 0
-
-
-@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
-def test_damaged_chunk_is_skipped_and_noted(tmp_path: Path, compression: CompressionType) -> None:
-    path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
-    offsets = chunk_offsets(path)
-    data = bytearray(path.read_bytes())
-    hit = slice(offsets[2] + 80, offsets[2] + 110)
-    data[hit] = bytes(byte ^ 0xA5 for byte in data[hit])
-    path.write_bytes(data)
-    read = read_recording(path)
-    assert 0 < len(read.slider) < N
-    assert set(read.slider.stamp.tolist()) < set(STAMP.tolist())
-    skipped, counted = read.notes
-    assert f"a.mcap at byte {offsets[2]}: a chunk was skipped" in skipped
-    assert f"messages were found, the summary lists {2 * N}" in counted
-
-
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
 )
@@ -161,15 +98,6 @@ def test_any_damage_gives_a_note_or_a_recording_error(hits: list[tuple[float, in
             return
         assert len(read.slider) <= N
         assert len(read.slider) == N or read.notes or len(hits) > 1  # the summary may be hit as well
-
-
-def chunk_offsets(path: Path) -> list[int]:
-    from mcap.reader import make_reader
-
-    with path.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    return [index.chunk_start_offset for index in summary.chunk_indexes]
 
 
 @pytest.mark.parametrize(
@@ -307,14 +235,3 @@ def test_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, te
     read = read_recording(tmp_path / "a")
     assert len(read.slider) == len(recording.slider)
     assert any("metadata.yaml: cannot be read" in note for note in read.notes)
-
-
-def test_missing_listed_file_is_noted(tmp_path: Path, recording: Recording) -> None:
-    write_recording(tmp_path / "a", recording)
-    text = (tmp_path / "a" / "metadata.yaml").read_text()
-    listed = "  relative_file_paths:\n  - a_0.mcap\n"
-    assert listed in text
-    (tmp_path / "a" / "metadata.yaml").write_text(text.replace(listed, listed + "  - a_1.mcap\n"))
-    assert any(
-        "a_1.mcap is listed in metadata.yaml but missing" in note for note in read_recording(tmp_path / "a").notes
-    )

@@ -224,16 +224,6 @@ def test_definitions_and_hashes_equal_those_of_ros(tmp_path: Path) -> None:
         assert ours.hash_rihs01(kind.name) == kind.type_hash
 
 
-def test_file_without_summary_is_read_completely_with_a_note(tmp_path: Path, recording: Recording) -> None:
-    write_recording(tmp_path / "whole.mcap", recording)
-    data = (tmp_path / "whole.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(data[:-30])
-    cut = read_recording(tmp_path / "cut.mcap")
-    assert len(cut.slider) == len(recording.slider) and cut.rig is not None
-    assert any("cut.mcap" in note and "end of the file is missing" in note for note in cut.notes)
-    assert read_recording(tmp_path / "whole.mcap").notes == ()
-
-
 def test_rclpy_reads_our_bytes_and_writes_the_same() -> None:
     serialization = pytest.importorskip("rclpy.serialization")
     from geometry_msgs.msg import PoseStamped, WrenchStamped

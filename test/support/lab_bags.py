@@ -79,11 +79,17 @@ class Lab:
             self.messages.append((stamp + LATENCY, topic, bytes(self.store.serialize_cdr(message, kind))))
 
     def pose(self, topic: str, kind: str, stream: PoseStream, at: str, header: str = "header", **more: object) -> None:
-        """Poses in the field `at` of a type."""
+        """Poses of a stream in the field `at` of a type."""
+        self.poses(topic, kind, stream.stamp, pose_rows(stream), at, header, **more)
+
+    def poses(
+        self, topic: str, kind: str, stamps: Any, rows: Any, at: str, header: str = "header", **more: object
+    ) -> None:
+        """Rows (n, 7) in the field `at` of a type."""
         names = ("translation", "rotation") if at.endswith("transform") else ("position", "orientation")
-        self.add(topic, kind, stream.stamp, (
+        self.add(topic, kind, stamps, (
             {**self.header(stamp, header), **more, **pose_values(row, at, names)}
-            for stamp, row in zip(stream.stamp.tolist(), pose_rows(stream), strict=True)
+            for stamp, row in zip(np.asarray(stamps).tolist(), rows, strict=True)
         ))  # fmt: skip
 
     def transform(self, topic: str, parent: str, child: str, stamps: Any, rows: Any) -> None:
@@ -148,7 +154,7 @@ def laboratory(recording: Recording) -> Lab:
     return lab
 
 
-def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
+def robot_in_tf(recording: Recording) -> Lab:
     """A block below a static camera, and a robot of two moving joints and a static tool."""
     lab, slider, pusher = Lab(), recording.slider, recording.pusher
     block, tip = pose_rows(slider), pose_rows(pusher)
@@ -162,8 +168,8 @@ def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
     everywhere = {name: np.repeat(row, n, axis=0) for name, row in rows.items()}
     in_arm = composed(inverted(composed(everywhere["base"], arm)), composed(tip, inverted(everywhere["tool"])))
     first = slider.stamp[:1]
-    lab.transform("/tf_static", world, "camera", first, camera)
-    lab.transform("/tf_static", f"/{world}", "/base", first, base)
+    lab.transform("/tf_static", "world", "camera", first, camera)
+    lab.transform("/tf_static", "/world", "/base", first, base)
     lab.transform("/tf_static", "wrist", "tip", first, tool)
     seen = composed(inverted(np.repeat(camera, len(slider), axis=0)), block)
     lab.transform("/tf", "camera", "block", slider.stamp, seen)
