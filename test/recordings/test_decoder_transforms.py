@@ -84,16 +84,6 @@ def test_several_portions_that_are_taken_at_once_stay_in_order() -> None:
     np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamp - START), atol=1e-9)
 
 
-def test_a_single_stamp_is_known_once_all_transforms_have_reached_it() -> None:
-    buffer, stamps = TransformBuffer(), every(10, 0, 200)
-    put(buffer, cart(every(20, 0, 101), every(4, 0, 151)).in_order())
-    known, rows = buffer.at("tip", "world", stamps, "wrench")
-    assert stamps[known].tolist() == every(10, 0, 101).tolist()
-    np.testing.assert_allclose(rows[:, 0], 2e-9 * (stamps[known] - START), atol=1e-12)
-    known, rows = buffer.at("tip", "world", stamps, "wrench", last=True)
-    assert known.all() and np.isnan(rows[stamps > START + 100 * MILLISECOND]).all()
-
-
 def test_samples_before_another_transform_began_or_in_its_dropout_are_counted() -> None:
     coarse = every(20, 200, 2000)
     coarse = coarse[(coarse < START + 800 * MILLISECOND) | (coarse > START + 1300 * MILLISECOND)]

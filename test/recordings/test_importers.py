@@ -19,8 +19,8 @@ from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.importers.mlab import first_touch, load_shares, read_log, triangle
-from push_predictor.recordings.importers.staging import Notes, sources_in
+from push_predictor.recordings.importers.mlab import first_touch, load_shares, triangle
+from push_predictor.recordings.importers.staging import sources_in
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table_file import read_table
@@ -319,14 +319,6 @@ def test_invalid_line_of_a_log_is_rejected_with_its_number(tmp_path: Path, line:
     with pytest.raises(ImportSourceError, match=words):
         import_source("mlab", [_write_log(tmp_path / "patch", lines)], tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_tables_of_a_log_have_the_numbers_of_their_lines(tmp_path: Path) -> None:
-    pose = "1 2 3 1 0 0 0"
-    path = _write_log(tmp_path, ["1", pose, pose, "2", "0.5 1e-3 -2", "0.6 1 2", "1", f"0.7 {pose}"])
-    (push,) = read_log(path, Notes())
-    np.testing.assert_array_equal(push.force, [[0.5, 1e-3, -2.0], [0.6, 1.0, 2.0]])
-    np.testing.assert_array_equal(push.robot, [[0.7, 1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]])
 
 
 def test_load_shares_of_three_points_balance_the_weight() -> None:

@@ -158,15 +158,6 @@ def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Pa
     np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
 
 
-def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:
-    stamp = STAMP.copy()
-    stamp[[4, 5]] = stamp[[5, 4]]
-    messages = encode(stamp, POSES)
-    topics = {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
-    path = write_mcap(tmp_path / "a.mcap", topics, STAMP + 7)
-    np.testing.assert_array_equal(read_recording(path).slider.stamp, stamp)
-
-
 def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
     value = np.linspace(20.0, 21.0, N)[:, None]
     other = STAMP - 10**9

@@ -69,15 +69,6 @@ def test_invalid_recording_is_not_written(tmp_path: Path, recording: Recording) 
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_messages_are_in_order_of_log_time_which_is_the_header_stamp(tmp_path: Path, recording: Recording) -> None:
-    write_recording(tmp_path / "a.mcap", recording)
-    messages = list(open_bag(tmp_path / "a.mcap").messages())
-    times = [m.log_time for m in messages]
-    assert times == sorted(times)
-    slider = [m for m in messages if m.topic == "/slider/pose"]
-    assert [m.log_time for m in slider] == recording.slider.stamp.tolist()
-
-
 def test_metadata_yaml_has_the_format_of_rosbag2_jazzy(tmp_path: Path, recording: Recording) -> None:
     """The keys are those that rosbag2_storage/yaml.hpp reads; custom_data must be text throughout."""
     write_recording(tmp_path / "a", recording)
@@ -197,11 +188,10 @@ def test_messages_that_cannot_be_decompressed_are_skipped_and_counted(tmp_path: 
         writer.add_topic("x", FLOAT64.name, FLOAT64.definition)
         for k, data in enumerate((b"\x28\xb5\x2f\xfd damaged", *encode(STAMP[:2], np.ones((2, 1)), header=False))):
             writer.write("x", k, data)
-    for read in (lambda bag: list(bag.messages()), lambda bag: [m for of in bag.portions({"/x"}) for m in of.times]):
-        bag = open_bag(tmp_path / "a")
-        assert len(read(bag)) == 2
-        (note,) = bag.notes.losses
-        assert re.fullmatch(r".*a_0\.mcap at byte \d+: 1 messages cannot be decompressed and were skipped", note)
+    bag = open_bag(tmp_path / "a")
+    assert len(list(bag.messages())) == 2
+    (note,) = bag.notes.losses
+    assert re.fullmatch(r".*a_0\.mcap at byte \d+: 1 messages cannot be decompressed and were skipped", note)
 
 
 def test_metadata_that_wrongly_state_a_compression_change_nothing(tmp_path: Path, recording: Recording) -> None:

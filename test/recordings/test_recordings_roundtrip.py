@@ -88,17 +88,6 @@ def test_any_recording_reads_back_unchanged(written: Recording, compression: str
     assert set(read.scalars) == set(written.scalars)
 
 
-@given(scalars())
-def test_scalar_without_header_has_log_time_as_stamp(scalar: ScalarStream) -> None:
-    nothing = PoseStream(scalar.stamp, *np.zeros((4, len(scalar))))
-    with tempfile.TemporaryDirectory() as folder:
-        write_recording(Path(folder) / "a.mcap", Recording("a", None, nothing, nothing, None, {"/s": scalar}))
-        read = read_recording(Path(folder) / "a.mcap").scalars["/s"]
-    order = np.argsort(scalar.stamp, kind="stable")
-    np.testing.assert_array_equal(read.stamp, scalar.stamp[order])
-    np.testing.assert_array_equal(read.value, scalar.value[order])
-
-
 @pytest.mark.parametrize("name", ["push", "push.mcap"])
 def test_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Path, name: str) -> None:
     for folder in ("first", "second"):

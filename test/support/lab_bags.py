@@ -259,7 +259,12 @@ def write_ros1(lab: Lab, path: Path) -> Path:
 
 
 def write_without_schema(lab: Lab, path: Path, *topics: str) -> Path:
-    """Write a file in which these topics have no schema, by the package `mcap`."""
+    """Write a file in which these topics have no schema."""
+    return write_schemas(lab, path, dict.fromkeys(topics))
+
+
+def write_schemas(lab: Lab, path: Path, schemas: Mapping[str, tuple[str, str] | None]) -> Path:
+    """Write a file in which some topics have another schema (encoding, text), or none, by the package `mcap`."""
     from mcap.writer import Writer
 
     with path.open("wb") as stream:
@@ -267,8 +272,9 @@ def write_without_schema(lab: Lab, path: Path, *topics: str) -> Path:
         writer.start(profile="ros2")
         channels = {}
         for topic, kind in lab.kinds.items():
-            schema = 0 if topic in topics else writer.register_schema(kind, "ros2msg", lab.definition(kind).encode())
-            channels[topic] = writer.register_channel(topic, "cdr", schema)
+            schema = schemas.get(topic, ("ros2msg", lab.definition(kind)))
+            number = 0 if schema is None else writer.register_schema(kind, schema[0], schema[1].encode())
+            channels[topic] = writer.register_channel(topic, "cdr", number)
         for stamp, topic, data in lab.in_order():
             writer.add_message(channels[topic], stamp, data, stamp)
         writer.finish()

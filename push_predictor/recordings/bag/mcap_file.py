@@ -69,6 +69,8 @@ class McapFile(BagFile):
     empty or not MCAP.
     """
 
+    storage = "mcap"
+
     def __init__(self, path: Path, name: str = "") -> None:
         super().__init__(path, name)
         self._channels: dict[int, Channel] = {}  # of two different descriptions the first

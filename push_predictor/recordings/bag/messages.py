@@ -61,8 +61,10 @@ class BagFile:
 
     topics: {topic: type, '' if its schema is missing}; schemas: {type: definition text}; qos: {topic: offered QoS as
     YAML text, '' if unknown}; metadata: {record name: {key: value}}; notes: damage found so far. name: of the file in
-    notes, by default its path.
+    notes, by default its path. storage: rosbag2's name of the format, '' if it cannot read it.
     """
+
+    storage = ""
 
     def __init__(self, path: Path, name: str = "") -> None:
         self.path, self.name = path, name or str(path)

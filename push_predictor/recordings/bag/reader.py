@@ -15,7 +15,7 @@ from push_predictor.recordings.bag.compression import ENDING, start_of, unpack_f
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
 from push_predictor.recordings.bag.mcap_file import MAGIC as MCAP
 from push_predictor.recordings.bag.mcap_file import McapFile
-from push_predictor.recordings.bag.messages import BagFile, Messages, Notes, RawMessage, gathered
+from push_predictor.recordings.bag.messages import BagFile, Notes, RawMessage
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
     BagMetadata,
@@ -58,8 +58,7 @@ class Bag:
     @property
     def storage(self) -> str:
         """rosbag2's name of the format: mcap or sqlite3; empty for files that rosbag2 cannot read."""
-        kinds = ((McapFile, "mcap"), (SqliteFile, "sqlite3"))
-        return next((name for kind, name in kinds if isinstance(self.files[0], kind)), "")
+        return self.files[0].storage
 
     @property
     def topics(self) -> dict[str, str]:
@@ -113,10 +112,6 @@ class Bag:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
         for file in self.files:
             yield from file.messages(topics)
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics, those of a topic and type in file order; damage becomes a note."""
-        return gathered(self.messages(topics))
 
 
 def open_bag(path: Path) -> Bag:

@@ -27,6 +27,8 @@ _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, 
 class SqliteFile(BagFile):
     """See BagFile. Raises RecordingError for a file that is not a bag of rosbag2."""
 
+    storage = "sqlite3"
+
     def __init__(self, path: Path, name: str = "") -> None:
         super().__init__(path, name)
         self._channels: dict[int, tuple[str, str]] = {}
