@@ -19,7 +19,7 @@ from contextlib import suppress
 from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, Final, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import BinaryIO, Final, NamedTuple, TypeAlias
 
 import lz4.frame
 import zstandard
@@ -58,8 +58,6 @@ _KINDS = frozenset(Opcode)
 _COMPRESSIONS = (b"", b"zstd", b"lz4")
 _LARGE: Final = 1 << 16  # bytes; read at once, or searched; a longer record with a doubtful length is not read
 _PIECE: Final = 1 << 15
-
-Record = TypeVar("Record", covariant=True)
 
 
 class McapFile(BagFile):
@@ -341,10 +339,6 @@ def _checked_size(path: Path, name: str) -> int:
 # --- records ---
 
 
-class _Readable(Protocol[Record]):
-    def read(self, stream: ReadDataStream, /) -> Record: ...
-
-
 class _Content(BytesIO):
     """A record's content; a string or number that is longer than its record is an error, not a short read."""
 
@@ -355,8 +349,8 @@ class _Content(BytesIO):
         return data
 
 
-def _parsed(kind: _Readable[Record], content: _Bytes) -> Record:
-    """One record's content as the mcap package's class. Raises one of _UNREADABLE."""
+def _parsed(kind: type[McapRecord], content: _Bytes) -> McapRecord:
+    """One record's content as this class of the mcap package. Raises one of _UNREADABLE."""
     return kind.read(ReadDataStream(_Content(content)))
 
 
@@ -464,30 +458,14 @@ def _unpacked(head: _ChunkHead, data: bytes) -> _Bytes:
     elif head.compression == b"zstd" and not cut and zstandard.frame_content_size(data) == head.size:
         found = zstandard.ZstdDecompressor().decompress(data)  # libzstd's stream takes a window of twice a chunk
     else:
-        found = bytearray()
-        for piece in _zstd_pieces(data) if head.compression == b"zstd" else _lz4_pieces(data):
-            found += piece
-            if len(found) > head.size:
-                break
+        found, zstd = bytearray(), zstandard.ZstdDecompressor()
+        is_zstd = head.compression == b"zstd"
+        reader = zstd.stream_reader(data, read_across_frames=True) if is_zstd else lz4.frame.LZ4FrameFile(BytesIO(data))
+        with suppress(EOFError):  # of lz4, at a cut
+            while len(found) <= head.size and (piece := reader.read(_PIECE)):
+                found += piece
     if len(found) != head.size and not cut:
         raise ValueError(f"a chunk does not contain the {head.size} bytes that it claims")
     if head.crc and not cut and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
     return found
-
-
-def _zstd_pieces(data: bytes) -> Iterator[bytes]:
-    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
-    while piece := reader.read(_PIECE):
-        yield piece
-
-
-def _lz4_pieces(data: bytes) -> Iterator[bytes]:
-    """In pieces: incompressible data would take almost twice the memory."""
-    reader = lz4.frame.LZ4FrameDecompressor()
-    for begin in range(0, len(data), _PIECE):
-        if reader.eof:
-            return
-        yield reader.decompress(data[begin : begin + _PIECE], max_length=_PIECE)
-        while not (reader.needs_input or reader.eof):
-            yield reader.decompress(b"", max_length=_PIECE)
