@@ -158,6 +158,9 @@ class Columns:
     frames: tuple[str, ...]
     absent: BoolArray
 
+    def __len__(self) -> int:
+        return len(self.stamp)
+
     @property
     def named(self) -> frozenset[str]:
         """The frames of readable messages."""
