@@ -37,8 +37,7 @@ from push_predictor.nodes.replay_controls import ReplayControls
 from push_predictor.nodes.replay_topics import ReplayTopics, check_filter, is_played, listed
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
-from push_predictor.recordings.bag.messages import RawMessage
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes, RawMessage
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.sources import TF
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record

@@ -12,10 +12,9 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import POSE
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes, gathered
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder, name_of
-from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
 from push_predictor.recordings.decoder.rules import (
     NO_ELEMENT,
     NO_ORIENTATION,
@@ -25,6 +24,7 @@ from push_predictor.recordings.decoder.rules import (
     UNREADABLE,
 )
 from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
+from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
 from push_predictor.recordings.fields.transforms import WORLD
@@ -73,7 +73,7 @@ def _read(bag: Bag, rig: Rig | None, chosen: Topics) -> Recording:
     decoder = StreamDecoder(chosen)
     if rig is not None:
         decoder.begin(rig)
-    for messages in bag.portions(_declared(bag, chosen, decoder, notes)):
+    for messages in gathered(bag.messages(_declared(bag, chosen, decoder, notes))):
         decoder.put(messages)
     samples = decoder.take(last=True)
     _note_poses(bag, decoder, notes)
@@ -82,8 +82,8 @@ def _read(bag: Bag, rig: Rig | None, chosen: Topics) -> Recording:
         _note_rejected(notes, _spelling(bag, name), each.rejected, each.foreign)
     for name, stream in (("slider", samples.slider), ("pusher", samples.pusher)):
         if not len(stream):
-            label, pose = _label(bag, decoder.poses[name]), decoder.poses[name]
-            names = pose.messages.names if isinstance(pose, PoseTopic) else []
+            own = decoder.of(name)
+            label, names = _label(bag, own.source), own.names if isinstance(own, TopicInput) else []
             there = f". The elements are named {', '.join(map(repr, names))}" if names else ""
             raise RecordingError(f"{bag.path}: topic {label} has no usable sample ({'; '.join(notes)}){there}")
     scalars = {_spelling(bag, name): stream for name, stream in samples.scalars.items() if len(stream)}
@@ -173,9 +173,8 @@ def _spelling(bag: Bag, name: str) -> str:
     return bag.spelled(topic) + dot + field
 
 
-def _label(bag: Bag, pose: PoseTopic | PoseFrame) -> str:
-    """The name of a pose's source in notes."""
-    source = pose.source if isinstance(pose, PoseFrame) else pose.messages.source
+def _label(bag: Bag, source: Source) -> str:
+    """The name of a source in notes."""
     return bag.spelled(source.topic) + source.text[len(source.topic) :]
 
 
@@ -189,24 +188,21 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
         if buffer.unreadable:
             _note_rejected(notes, bag.spelled(buffer_topic), {UNREADABLE: buffer.unreadable}, {})
     for name in POSES:
-        pose = decoder.poses[name]
-        label = _label(bag, pose)
-        if isinstance(pose, PoseFrame):
-            if pose.lacks_world and decoder.topics.world:
-                raise _option_error(bag, "world_frame", world, pose.problem)
-            if pose.problem:
-                raise pose.source.error(bag.path, pose.problem)
-            _note_rejected(notes, label, pose.rejected, {})
-            continue
-        _check_read(bag, label, pose)
-        if pose.problem:
+        own, problem = decoder.of(name), decoder.problem(name)
+        label, turned, frames = _label(bag, own.source), "", frozenset[str]()
+        if isinstance(own, TopicInput):
+            _check_read(bag, label, own)
             turned = f"; the frame of the poses is turned into world_frame {world!r} (option --world-frame)"
-            raise pose.messages.source.error(bag.path, pose.problem + turned)
-        _note_rejected(notes, label, pose.messages.rejected, pose.messages.foreign)
-        if frames := set() if decoder.topics.world else pose.messages.named - {world}:
+            frames = frozenset() if decoder.topics.world else own.named - {world}
+        elif own.lacks_world and decoder.topics.world:
+            raise _option_error(bag, "world_frame", world, problem)
+        if problem:
+            raise own.source.error(bag.path, problem + turned)
+        _note_rejected(notes, label, own.rejected, own.foreign)
+        if frames:
             notes.add(f"{label}: frame_id {', '.join(map(repr, sorted(frames)))} is treated as {world!r}")
     if decoder.headless:
-        label = _label(bag, decoder.poses["pusher"])
+        label = _label(bag, decoder.of("pusher").source)
         notes.add(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
     one, other = ({frame.strip("/") for frame in decoder.of(name).named} - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
@@ -214,8 +210,7 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
         notes.add(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
 
 
-def _check_read(bag: Bag, label: str, pose: PoseTopic) -> None:
-    messages = pose.messages
+def _check_read(bag: Bag, label: str, messages: TopicInput) -> None:
     if messages.foreign and not messages.received:
         kind = next(iter(messages.foreign))
         raise RecordingError(f"{bag.path}: topic {label} is of type {kind!r}, {messages.kind} is accepted")
@@ -254,7 +249,7 @@ def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: Notes)
 
 def _turned(bag: Bag, wrench: WrenchInput, label: str, decoder: StreamDecoder) -> list[str]:
     """Notes on a wrench whose axes are turned. Raises RecordingError if they cannot be."""
-    topics, tip = decoder.topics, _label(bag, decoder.poses["pusher"])
+    topics, tip = decoder.topics, _label(bag, decoder.of("pusher").source)
     found = [f"the axes of the wrench are turned with the tip ({tip})"]
     if wrench.frame:
         if not any(kind in TF_TYPES for kind in bag.topics.values()):

@@ -13,7 +13,7 @@ from typing import Any
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.fields.up_axis import UP_AXES, Z_UP
+from push_predictor.recordings.fields.pose_rows import UP_AXES, Z_UP
 
 ENDING = ".recording.yaml"
 STREAMS = ("slider", "pusher", "wrench")

@@ -15,8 +15,7 @@ from itertools import islice
 import numpy as np
 
 from push_predictor.recordings.bag.message_types import STANDARD, type_at
-from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Messages, Notes
 from push_predictor.recordings.bag.reader import Bag
 from push_predictor.recordings.decoder.sources import STATIC, STREAMS, sources_of
 from push_predictor.recordings.fields.columns import Block, whole_block

@@ -13,8 +13,8 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, SCALAR_LAYOUT, WRENCH_STAMPED, encode
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
+from push_predictor.recordings.bag.messages import encode
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.rig import RECORD_NAME
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
@@ -65,17 +65,17 @@ def _pose(name: str, stream: PoseStream) -> _Encoded:
     roll, upright = quaternion_of_yaw(np.zeros(len(stream)) if stream.tilt is None else stream.tilt)
     x, y = w * roll + 0.0, z * roll + 0.0  # without negative zeros: bags of equal recordings have equal bytes
     values = np.stack([stream.x, stream.y, stream.z, x, y, z * upright, w * upright], axis=1)
-    return _Encoded(name, POSE, _arrival(stream.stamp), encode(stream.stamp, values, POSE_STAMPED))
+    return _Encoded(name, POSE, _arrival(stream.stamp), encode(stream.stamp, values))
 
 
 def _wrench(name: str, stream: WrenchStream) -> _Encoded:
     none = np.zeros(len(stream))
     values = np.stack([stream.fx, stream.fy, none, none, none, stream.torque], axis=1)
-    return _Encoded(name, WRENCH, _arrival(stream.stamp), encode(stream.stamp, values, WRENCH_STAMPED))
+    return _Encoded(name, WRENCH, _arrival(stream.stamp), encode(stream.stamp, values))
 
 
 def _scalar(name: str, stream: ScalarStream) -> _Encoded:
-    messages = encode(stream.stamp, stream.value[:, None], SCALAR_LAYOUT)
+    messages = encode(stream.stamp, stream.value[:, None], header=False)
     return _Encoded(name, FLOAT64, stream.stamp, messages)
 
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tracemalloc
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from random import Random
 
@@ -59,6 +60,24 @@ def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
     return [m.data for m in opened.messages()], opened.notes
 
 
+def write_messages(path: Path, topic: str, messages: Iterable[bytes], **options: object) -> int:
+    """Write messages of one topic, a nanosecond apart; returns the offset of the end of the data without chunks."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2")
+        channel = writer.register_channel(topic, "cdr", writer.register_schema(POSE, "ros2msg", b""))
+        for step, data in enumerate(messages):
+            writer.add_message(channel, START + step, data, START + step)
+        end = stream.tell()
+        writer.finish()
+    return end
+
+
+def poses(count: int) -> list[bytes]:
+    """Messages of a slider that moves along x."""
+    return [stamped(START + step, [step, 0, 0, 0, 0, 0, 1]) for step in range(count)]
+
+
 @pytest.mark.slow
 def test_damaged_copies_are_read_as_far_as_they_are_intact(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
@@ -97,10 +116,12 @@ def test_chunk_with_an_excessive_length_is_noted_and_uses_no_memory(bag: Path, l
 def test_chunk_that_states_too_much_content_is_skipped(bag: Path) -> None:
     data = bytearray(bag.read_bytes())
     chunk = chunks_of(data)[1]
+    whole = len(messages_and_notes(bag)[0])
     struct.pack_into("<Q", data, chunk + 25, 1 << 31)
     bag.write_bytes(data)
-    _, notes = messages_and_notes(bag)
+    found, notes = messages_and_notes(bag)
     assert any(f"at byte {chunk}: a chunk was skipped: a chunk of {1 << 31} bytes" in note for note in notes)
+    assert any(f"{len(found)} messages were found, the summary lists {whole}" in note for note in notes)
 
 
 @pytest.mark.parametrize("place", range(65_480, 65_560, 13))
@@ -169,13 +190,8 @@ def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:
     path, chunk, rng = tmp_path / "noise.mcap", 1 << 23, Random(0)
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=chunk, compression=compression)
-        writer.start(profile="ros2")
-        channel = writer.register_channel("/noise", "cdr", writer.register_schema(POSE, "ros2msg", b""))
-        for step in range(6000):
-            writer.add_message(channel, START + step, rng.randbytes(noise) + bytes(4000 - noise), 0)
-        writer.finish()
+    messages = (rng.randbytes(noise) + bytes(4000 - noise) for _ in range(6000))
+    write_messages(path, "/noise", messages, chunk_size=chunk, compression=compression)
     grown = subprocess.run([sys.executable, "-c", HELD, bag, path], check=True, cwd=REPOSITORY, capture_output=True)
     print(int(grown.stdout) / chunk)
     assert int(grown.stdout) < 2.1 * chunk  # what the whole process grew by at most; noise of a megabyte
@@ -183,32 +199,19 @@ def test_reading_uses_the_memory_of_at_most_two_chunks(
 
 def test_messages_of_a_truncated_chunk_are_used(bag: Path) -> None:
     """zstd decompresses in blocks of 128 kB: of a chunk with several, those before the cut are used."""
-    messages = [("/camera", "std_msgs/msg/String", START + i, os.urandom(500)) for i in range(2000)]
-    with bag.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=2_000_000)
-        writer.start(profile="ros2")
-        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-        channel = writer.register_channel("/camera", "cdr", schema)
-        for _, _, time, content in messages:
-            writer.add_message(channel, time, content, time)
-        writer.finish()
+    messages = [os.urandom(500) for _ in range(2000)]
+    write_messages(bag, "/camera", messages, compression=CompressionType.ZSTD, chunk_size=2_000_000)
     bag.write_bytes(bag.read_bytes()[:700_000])
     found, notes = messages_and_notes(bag)
     assert 1000 < len(found) < 1400
-    assert found == [m[3] for m in messages[: len(found)]]
+    assert found == messages[: len(found)]
     assert any("damaged or cut off" in note for note in notes)
     assert not any("a record cannot be read" in note for note in notes)
 
 
 def test_chunk_with_missing_bytes_is_not_treated_as_truncated(bag: Path) -> None:
     """So many that it extends beyond the end of the file: what follows the gap is not a message."""
-    with bag.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.NONE)
-        writer.start(profile="ros2")
-        channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
-        for step in range(400):
-            writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
-        writer.finish()
+    write_messages(bag, "/slider/pose", poses(400), compression=CompressionType.NONE)
     whole, _ = messages_and_notes(bag)
     data = bag.read_bytes()
     bag.write_bytes(data[:10_000] + data[30_011:])
@@ -217,22 +220,9 @@ def test_chunk_with_missing_bytes_is_not_treated_as_truncated(bag: Path) -> None
     assert any("damaged or cut off" in note for note in notes)
 
 
-def hundred_poses(path: Path, **options: object) -> int:
-    """Write a bag, by default without chunks; returns the offset of the end of its data then."""
-    with path.open("wb") as stream:
-        writer = Writer(stream, **{"use_chunking": False, **options})
-        writer.start(profile="ros2")
-        channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
-        for step in range(100):
-            writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
-        end = stream.tell()
-        writer.finish()
-    return end
-
-
 def test_zeros_at_the_end_lose_no_message_before_them(bag: Path) -> None:
     """Also without chunks: the last message is complete, although no record follows it."""
-    end = hundred_poses(bag)
+    end = write_messages(bag, "/slider/pose", poses(100), use_chunking=False)
     data = bag.read_bytes()
     bag.write_bytes(data[:end] + bytes(5000))
     found, notes = messages_and_notes(bag)
@@ -241,7 +231,7 @@ def test_zeros_at_the_end_lose_no_message_before_them(bag: Path) -> None:
 
 
 def test_a_message_shorter_than_its_own_header_is_noted_and_those_before_it_are_used(bag: Path) -> None:
-    hundred_poses(bag, use_chunking=True, compression=CompressionType.NONE, enable_crcs=False)
+    write_messages(bag, "/slider/pose", poses(100), compression=CompressionType.NONE, enable_crcs=False)
     whole, _ = messages_and_notes(bag)
     data = bytearray(bag.read_bytes())
     struct.pack_into("<Q", data, data.index(whole[40]) - 30, 10)  # the length, before the 22 bytes of the header
@@ -304,7 +294,7 @@ def test_wrong_metadata_index_is_noted_and_the_record_is_found(bag: Path, lie: i
 
 def test_checksum_of_the_data_is_verified_if_present(tmp_path: Path) -> None:
     path = tmp_path / "sum.mcap"
-    end = hundred_poses(path, enable_data_crcs=True)
+    end = write_messages(path, "/slider/pose", poses(100), use_chunking=False, enable_data_crcs=True)
     assert messages_and_notes(path)[1] == []
     data = bytearray(path.read_bytes())
     data[end - 20] ^= 1

@@ -250,15 +250,6 @@ def test_rectangle_has_half_turn_symmetry_and_an_off_centre_square_none():
     assert Outline(square(0.09).vertices + 0.01).rotational_symmetry == 1
 
 
-@pytest.mark.parametrize("name", ["rect1", "ellip3", "hex"])
-def test_symmetric_outline_repeats_after_a_fraction_of_the_perimeter(name):
-    outline = OUTLINES[name]
-    turn = np.array(2.0 * np.pi / outline.rotational_symmetry)
-    later = (GRID + 1.0 / outline.rotational_symmetry) % 1.0
-    assert outline.point(later) == pytest.approx(rotate(outline.point(GRID), turn), abs=1e-9)
-    assert outline.inward_normal(later) == pytest.approx(rotate(outline.inward_normal(GRID), turn), abs=1e-6)
-
-
 @pytest.mark.parametrize("name", SHAPES)
 def test_origin_of_the_shapes_is_their_centroid(name):
     assert shape_outline(name).centroid == pytest.approx([0.0, 0.0], abs=1e-15)

@@ -29,8 +29,11 @@ BAGS = ("robot_push_many", "robot_push_many_6_sd", "robot_push_steelblock")
 RUNS = [f"{block}_block_metal_{run}" for block in ("Al", "St") for run in (1, 2, 3, 4)]
 
 
+Imported = tuple[ImportReport, dict[str, Recording]]
+
+
 @pytest.fixture(scope="module")
-def mcube(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[ImportReport, dict[str, Recording]]:
+def mcube(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Imported:
     out = tmp_path_factory.mktemp("mcube")
     report = import_source("mcube", [measured_data / "mcube_preliminary"], out)
     return report, {path.name: read_recording(path) for path in report.written}
@@ -62,24 +65,17 @@ class Contact:
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_in_contact_the_tip_lies_on_the_outline(mcube: tuple[ImportReport, dict[str, Recording]], run: str) -> None:
+def test_in_contact_the_tip_is_on_the_outline_and_the_force_points_out_of_the_slider(mcube: Imported, run: str) -> None:
     contact = Contact(mcube[1][run])
     assert len(contact.gap) > 60
     assert abs(np.median(contact.gap)) < 0.3e-3
     assert np.std(contact.gap) < 1.0e-3
-
-
-@pytest.mark.parametrize("run", RUNS)
-def test_the_force_on_the_pusher_points_out_of_the_slider(
-    mcube: tuple[ImportReport, dict[str, Recording]], run: str
-) -> None:
-    contact = Contact(mcube[1][run])
     along = np.sum(contact.force * contact.normal, axis=1) / np.linalg.norm(contact.force, axis=1)
     assert np.median(along) > np.cos(np.radians(15.0)), "within friction of the contact normal"
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_every_run_yields_one_push_of_many_windows(mcube: tuple[ImportReport, dict[str, Recording]], run: str) -> None:
+def test_every_run_yields_one_push_of_many_windows(mcube: Imported, run: str) -> None:
     recording = mcube[1][run]
     assert recording.rig is not None
     windows = find_windows(recording, recording.rig)
@@ -118,9 +114,7 @@ def test_the_clock_offset_is_that_of_the_delay_test_without_repeated_rows(measur
 
 
 @pytest.mark.parametrize(("block", "prefix"), [(ALUMINIUM, "Al"), (STEEL, "St")])
-def test_side_and_frames_are_what_a_fit_to_the_contact_gives(
-    mcube: tuple[ImportReport, dict[str, Recording]], block: object, prefix: str
-) -> None:
+def test_side_and_frames_are_what_a_fit_to_the_contact_gives(mcube: Imported, block: object, prefix: str) -> None:
     """Fitted: half side and shifts of the two frames; for steel the recorded frames were kept, so the side alone."""
     contacts = [Contact(recording) for run, recording in mcube[1].items() if run.startswith(prefix)]
     half = STEEL.half_side if block is STEEL else ALUMINIUM.half_side
@@ -141,7 +135,7 @@ def _facing(body: Array, half: float) -> Array:
     return body[np.abs(body[:, 1 - across]) < half - 0.008, across]
 
 
-def test_the_report_states_what_was_done(mcube: tuple[ImportReport, dict[str, Recording]]) -> None:
+def test_the_report_states_what_was_done(mcube: Imported) -> None:
     report, recordings = mcube
     assert sorted(recordings) == RUNS and report.pushes == 8
     assert sum("the tip stream stops" in line for line in report.dropped) == 4
@@ -153,9 +147,7 @@ def test_the_report_states_what_was_done(mcube: tuple[ImportReport, dict[str, Re
 # --- ROS 1 bags ---------------------------------------------------------------------------------------------------
 
 
-def test_the_bag_of_aluminium_run_1_equals_its_text_files(
-    measured_data: Path, mcube: tuple[ImportReport, dict[str, Recording]], tmp_path: Path
-) -> None:
+def test_the_bag_of_aluminium_run_1_equals_its_text_files(measured_data: Path, mcube: Imported, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
     alone = tmp_path / "elsewhere.bag"  # the folder's name no longer tells the block, the day does
     shutil.copyfile(measured_data / "mcube_preliminary" / "Al_block" / "Test_metal_1.bag", alone)
@@ -170,7 +162,7 @@ def test_the_bag_of_aluminium_run_1_equals_its_text_files(
 
 
 @pytest.fixture(scope="module")
-def bags(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[ImportReport, dict[str, Recording]]:
+def bags(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Imported:
     """Three bags of mlab, by name: reading all six takes three seconds."""
     pytest.importorskip("rosbags")
     sources = [measured_data / "mlab" / "bags" / f"{name}.bag" for name in BAGS]
@@ -178,9 +170,7 @@ def bags(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return report, {path.name: read_recording(path) for path in report.written}
 
 
-def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(
-    bags: tuple[ImportReport, dict[str, Recording]],
-) -> None:
+def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(bags: Imported) -> None:
     report, recordings = bags
     assert report.recordings == len(recordings) == 3
     assert sum("header stamps lead the bag's clock by 36" in line for line in report.repaired) == 3
@@ -193,9 +183,7 @@ def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(
 
 
 @pytest.mark.parametrize("name", BAGS[:2])
-def test_in_the_mlab_bags_the_force_on_the_pusher_opposes_its_motion(
-    bags: tuple[ImportReport, dict[str, Recording]], name: str
-) -> None:
+def test_in_the_mlab_bags_the_force_on_the_pusher_opposes_its_motion(bags: Imported, name: str) -> None:
     recording = bags[1][name]
     assert recording.wrench is not None
     grid = np.arange(recording.pusher.stamp[0], recording.pusher.stamp[-1], 100_000_000)

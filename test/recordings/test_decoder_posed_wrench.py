@@ -42,30 +42,6 @@ def put(turned: PosedWrench, stamp: IntArray, values: Array, at: IntArray, tip: 
     return found.stamp, at_tip(found.values, found.sensor, found.tip)
 
 
-def test_a_wrench_waits_for_the_tip() -> None:
-    turned = PosedWrench()
-    stamp, _ = put(turned, STAMPS, measured(STAMPS), *NO_TIP)
-    assert len(stamp) == 0
-    stamp, _ = put(turned, *NO_WRENCH, TIP[:50], poses(TIP[:50]))
-    assert np.array_equal(stamp, STAMPS[TIP[49] >= STAMPS])
-    stamp, _ = put(turned, *NO_WRENCH, TIP[50:], poses(TIP[50:]))
-    assert np.array_equal(stamp, STAMPS[TIP[49] < STAMPS]) and turned.without_pose == 0
-
-
-def test_a_wrench_of_the_same_time_as_the_last_pose_waits_no_longer() -> None:
-    stamp, _ = put(PosedWrench(), TIP, measured(TIP), TIP, poses(TIP))
-    assert np.array_equal(stamp, TIP)
-
-
-def test_a_wrench_before_the_tip_or_in_a_dropout_of_it_has_no_pose() -> None:
-    turned = PosedWrench()
-    tip = np.concatenate([TIP[10:30], TIP[60:]])
-    stamp, values = put(turned, STAMPS, measured(STAMPS), tip, poses(tip))
-    outside = (TIP[10] > STAMPS) | ((TIP[29] < STAMPS) & (TIP[60] > STAMPS))
-    assert np.array_equal(stamp, STAMPS[~outside]) and turned.without_pose == outside.sum()
-    np.testing.assert_allclose(values, world(stamp), atol=1e-9)
-
-
 def test_a_clock_that_is_set_back_begins_again() -> None:
     turned = PosedWrench()
     put(turned, STAMPS, measured(STAMPS), TIP[:-10] + 3_600_000 * MS, poses(TIP[:-10]))

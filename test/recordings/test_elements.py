@@ -18,7 +18,7 @@ from lab_bags import LATENCY, Lab, assign, pose_rows, pose_values, short_recordi
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import parse_definitions, steps_of, type_at
-from push_predictor.recordings.fields.pose_rows import normalised, pose_rows_of, turned
+from push_predictor.recordings.fields.pose_rows import UP_AXES, normalised, pose_rows_of, turned
 from push_predictor.recordings.fields.sources import (
     POSE_TARGET,
     SCALAR_TARGET,
@@ -27,7 +27,6 @@ from push_predictor.recordings.fields.sources import (
     field_to_read,
     fields_in,
 )
-from push_predictor.recordings.fields.up_axis import UP_AXES
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.topics import Topics

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
-from lab_bags import Lab, short_recording
-from mcap.writer import Writer
+from lab_bags import Lab, short_recording, write_schemas
 
-from push_predictor.recordings.bag.idl import msg_of_idl
-from push_predictor.recordings.bag.message_types import Field, parse_definitions
+from push_predictor.recordings.bag.message_types import Field, msg_of_idl, parse_definitions
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.topics import Topics
 
@@ -85,17 +83,7 @@ def test_a_laboratorys_own_type_in_idl_is_read(tmp_path: Path) -> None:
     lab.pose("/slider/pose", "geometry_msgs/msg/PoseStamped", whole.slider, "pose")
     extra = {"volts": np.array([1.5, 2.5], np.float32), "notes": ["a", "longer"]}
     lab.pose("/tip", "lab_msgs/msg/Tip", whole.pusher, "odom.pose.pose", "odom.pose.header", **extra)
-    path = tmp_path / "a.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start(profile="ros2")
-        own = writer.register_schema("lab_msgs/msg/Tip", "ros2idl", TIP.encode())
-        kind = "geometry_msgs/msg/PoseStamped"
-        schemas = {"/slider/pose": writer.register_schema(kind, "ros2msg", lab.definition(kind).encode()), "/tip": own}
-        channels = {topic: writer.register_channel(topic, "cdr", schema) for topic, schema in schemas.items()}
-        for stamp, topic, data in lab.in_order():
-            writer.add_message(channels[topic], stamp, data, stamp)
-        writer.finish()
+    path = write_schemas(lab, tmp_path / "a.mcap", {"/tip": ("ros2idl", TIP)})
     found = read_recording(path, topics=Topics(pusher="/tip.odom.pose.pose", covariates=("/tip.volts[1]",)))
     assert found.pusher.x.tolist() == whole.pusher.x.tolist()
     assert set(found.scalars["/tip.volts[1]"].value.tolist()) == {2.5}

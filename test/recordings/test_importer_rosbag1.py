@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lab_bags import assign, zeros
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers import import_source
@@ -53,32 +54,17 @@ def _write_bag(path: Path, topics: dict[str, tuple[str, str | None, list[dict[st
 
 def _filled(store: Any, kind: str, values: dict[str, object]) -> Any:
     """A message of zeros with some values set; 'body' (x, y, qx, qy, qz, qw) is a pose in a list."""
-    message = _zeros(store, kind)
+    message = zeros(store, kind)
     for place, value in values.items():
-        *path, last = place.split(".")
-        target = message
-        for step in path:
-            target = getattr(target, step)
         if place == "body":
-            pose = _zeros(store, "geometry_msgs/msg/Pose")
-            pose.position.x, pose.position.y, *rest = value
-            pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = rest
+            pose = zeros(store, "geometry_msgs/msg/Pose")
+            paths = ("position.x", "position.y", *(f"orientation.{axis}" for axis in "xyzw"))
+            for path, number in zip(paths, value, strict=True):  # type: ignore[call-overload]
+                assign(pose, path, number)
             message.body_poses.append(pose)
         elif place != "t":
-            setattr(target, last, value)
+            assign(message, place, value)
     return message
-
-
-def _zeros(store: Any, kind: str) -> Any:
-    fields = {}
-    for name, (node, detail) in store.fielddefs[kind][1]:
-        if node.name == "NAME":
-            fields[name] = _zeros(store, detail)
-        elif node.name == "BASE":
-            fields[name] = "" if detail[0] == "string" else 0.0 if detail[0].startswith("float") else 0
-        else:
-            fields[name] = []
-    return store.types[kind](**fields)
 
 
 def _stamp(seconds: float, lead: float = 0.0) -> dict[str, object]:

@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
 from decoding import input_of
-from lab_bags import LATENCY, Lab, pose_rows, robot_in_tf, short_recording
+from lab_bags import Lab, pose_rows, robot_in_tf, short_recording
 
 from push_predictor.cli import main
-from push_predictor.errors import RecordingError
+from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.decoder import StreamDecoder
-from push_predictor.recordings.fields.pose_rows import composed, interpolated, inverted, normalised
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.fields.sources import POSE_TARGET, TF_TYPES, FieldReader, definitions_of
 from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_tree
 from push_predictor.recordings.read import read_recording
@@ -78,69 +78,36 @@ def copied(lab: Lab) -> Lab:
     return other
 
 
-def vicon_and_ur(kind: str = TRANSFORM, at: str = "transform") -> Lab:
-    return copied(made_vicon_and_ur(kind, at))
+def vicon_and_ur() -> Lab:
+    return copied(made_vicon_and_ur())
 
 
 @cache
-def made_vicon_and_ur(kind: str, at: str) -> Lab:
+def made_vicon_and_ur() -> Lab:
     lab = Lab(frame="vicon_world")
-    lab.pose(VICON, kind, original().slider, at)
-    lab.pose(UR, kind, original().pusher, at)
+    lab.pose(VICON, TRANSFORM, original().slider, "transform")
+    lab.pose(UR, TRANSFORM, original().pusher, "transform")
     lab.wrench("/netft", wrench(), "geometry_msgs/msg/WrenchStamped", "wrench")
     return lab
 
 
 NAMES = Topics(VICON, UR, "/netft")
-EVERY = Topics("/tf:a", covariates=("/b.c[1]",), world="map", wrench_frame="/tf:tip", wrench_bias="none")
+OTHERS = {"world": "map", "wrench_frame": "/tf:tip", "wrench_bias": "none", "stamp": "log", "up": "slider=-z"}
+EVERY = Topics("/tf:a", covariates=("/b.c[1]",), **OTHERS)
+AXES = "x, y, z, -x, -y or -z, of some streams"
 ABSENT = r"no such topic; the bag contains .*/ur5/tool0_pose \(geometry_msgs/msg/TransformStamped\)"
-
-
-@pytest.mark.parametrize(
-    ("kind", "at"),
-    [(TRANSFORM, "transform"), ("nav_msgs/msg/Odometry", "pose.pose")],
-)
-def test_poses_of_each_type_give_the_same_windows(tmp_path: Path, kind: str, at: str) -> None:
-    found = read_recording(vicon_and_ur(kind, at).mcap(tmp_path / "lab", original().rig), topics=NAMES)
-    assert_same_windows(found)
-    assert found.slider.stamp.tolist() == original().slider.stamp.tolist()
-    assert any("'vicon_world' is treated as 'world'" in note for note in found.notes)
-
-
-def test_fields_of_a_laboratorys_own_type_give_the_same_windows(tmp_path: Path) -> None:
-    lab = Lab(TIP)
-    lab.pose("/slider", "geometry_msgs/msg/PoseStamped", original().slider, "pose")
-    volts = {"volts": np.array([1.5, 2.5], np.float32), "notes": ["a", "longer"]}
-    lab.pose("/tip", "lab_msgs/msg/Tip", original().pusher, "odom.pose.pose", "odom.pose.header", **volts)
-    topics = Topics("slider", "/tip.odom.pose.pose", covariates=("/tip.volts[1]",))
-    found = read_recording(lab.mcap(tmp_path / "lab.mcap", original().rig), topics=topics)
-    volts_found = found.scalars.pop("/tip.volts[1]")
-    assert set(volts_found.value.tolist()) == {2.5}
-    # No header surrounds the number, so its time is the log time.
-    assert volts_found.stamp.tolist() == sorted((original().pusher.stamp + LATENCY).tolist())
-    for name in ("stamp", "x", "y", "z"):  # the nearest header counts, not the log time
-        assert getattr(found.pusher, name).tolist() == getattr(original().pusher, name).tolist()
 
 
 # --- frames ----------------------------------------------------------------------------------------------------------
 
 
-def tf_lab(world: str = "world") -> Lab:
-    return copied(made_tf_lab(world))
+def tf_lab() -> Lab:
+    return copied(made_tf_lab())
 
 
 @cache
-def made_tf_lab(world: str) -> Lab:
-    return robot_in_tf(original(), world)
-
-
-@pytest.mark.parametrize("world", ["world", "map"])
-def test_frames_of_tf_give_the_same_windows(tmp_path: Path, world: str) -> None:
-    lab = tf_lab(world)
-    lab.wrench("/netft", wrench(), "geometry_msgs/msg/WrenchStamped", "wrench")
-    path = lab.mcap(tmp_path / "lab", original().rig)
-    found = read_recording(path, topics=Topics("/tf:block", "/tf:tip", "/netft"))
-    assert_same_windows(found)
+def made_tf_lab() -> Lab:
+    return robot_in_tf(original())
 
 
 def test_poses_are_given_in_the_chosen_frame(tmp_path: Path) -> None:
@@ -211,16 +178,6 @@ def test_composition_through_a_random_tree_is_that_of_matrices(
     np.testing.assert_allclose(matrix(rows_found[0]), np.linalg.inv(matrices[other]) @ matrices[one], atol=1e-9)
 
 
-@given(st.floats(-3.0, 3.0), st.floats(0.0, 1.0), st.booleans())
-def test_interpolation_turns_evenly_the_shorter_way_round(angle: float, share: float, flipped: bool) -> None:
-    first = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
-    second = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]])
-    second[:, 3:] *= -1.0 if flipped else 1.0
-    found = interpolated(first, second, np.array([share]))[0]
-    assert found[0] == pytest.approx(share)
-    assert 2.0 * np.arctan2(found[5], found[6]) == pytest.approx(share * angle, abs=1e-5)
-
-
 def matrix(row: np.ndarray) -> np.ndarray:
     from push_predictor.geometry.spatial import SpatialPose
 
@@ -254,16 +211,6 @@ def test_an_error_names_option_value_and_what_the_bag_contains(tmp_path: Path, t
         read_recording(lab.mcap(tmp_path / "lab"), topics=topics)
 
 
-def test_damaged_messages_are_discarded_with_a_note(tmp_path: Path) -> None:
-    lab = vicon_and_ur()
-    damaged = [place for place, (_, topic, _) in enumerate(lab.messages) if topic == UR][5:8]
-    for place, data in zip(damaged, (b"", b"\0\1\0\0\xff\xff", b"\0\1\0\0" + b"\xff" * 40), strict=True):
-        lab.messages[place] = (*lab.messages[place][:2], data)
-    found = read_recording(lab.mcap(tmp_path / "lab"), topics=NAMES)
-    assert len(found.pusher) == len(original().pusher) - 3
-    assert any(f"{UR}: 3 messages are not readable CDR; discarded" == note for note in found.notes)
-
-
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_message_and_no_exception(data: bytes) -> None:
     for message in (data, b"\0\1\0\0" + data):
@@ -286,7 +233,9 @@ def test_saved_topics_are_read_and_given_ones_win(tmp_path: Path) -> None:
     assert save_topics(path, replace(NAMES, pusher="/wrong")) == tmp_path / "lab.recording.yaml"
     with pytest.raises(RecordingError, match="pusher_topic '/wrong'"):
         read_recording(path)
-    assert_same_windows(read_recording(path, topics=Topics(pusher=UR)))
+    found = read_recording(path, topics=Topics(pusher=UR))
+    assert_same_windows(found)
+    assert any("'vicon_world' is treated as 'world'" in note for note in found.notes)
 
 
 def test_a_recorded_wrench_can_be_left_out(tmp_path: Path) -> None:
@@ -320,6 +269,24 @@ def test_a_wrong_file_names_key_value_and_what_is_accepted(tmp_path: Path, text:
         load_topics(tmp_path / "lab.mcap")
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "accepted"),
+    [
+        ("wrench_bias", "zero", "free_motion or none"),
+        ("stamp", "sent", "header or log"),
+        *(("up", up, AXES) for up in ("q", "y,q", "tip=y", "slider=", "slider=y=z", "==")),
+    ],
+)
+def test_another_value_is_refused_with_those_that_are_accepted(
+    tmp_path: Path, key: str, value: str, accepted: str
+) -> None:
+    with pytest.raises(RequestError, match=f"{key}: .* is not accepted, give {accepted}"):
+        Topics(**{key: value})  # type: ignore[arg-type]
+    topics_path(tmp_path / "a.mcap").write_text(f"{key}: '{value}'\n")
+    with pytest.raises(RecordingError, match=rf"a\.recording\.yaml: {key} is '{value}', give {accepted}"):
+        load_topics(tmp_path / "a.mcap")
+
+
 def test_commands_take_topics_and_save_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(vicon_and_ur().mcap(tmp_path / "lab", original().rig))
     names = ["--slider-topic", VICON, "--pusher-topic", UR, "--wrench-topic", "/netft"]
@@ -330,8 +297,8 @@ def test_commands_take_topics_and_save_them(tmp_path: Path, capsys: pytest.Captu
     assert main(train) == 1
     assert main([*train, *names]) == 0
     assert not (tmp_path / "lab.recording.yaml").exists()
-    assert main(["info", path, *names, "--save-topics"]) == 0
-    assert load_topics(tmp_path / "lab") == NAMES
+    assert main(["info", path, *names, "--world-frame", "vicon_world", "--save-topics"]) == 0
+    assert load_topics(tmp_path / "lab") == replace(NAMES, world="vicon_world")
     for command in (["evaluate", model, path], ["validate", model, path], ["info", path]):
         assert main(command) == 0, capsys.readouterr().err
         assert main([*command, "--slider-topic", "/x"]) == 1

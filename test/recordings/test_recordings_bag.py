@@ -15,12 +15,11 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, Writer
 
 from push_predictor.errors import RecordingError, RigError
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
-from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.bag.messages import encode
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.write import write_recording
@@ -32,7 +31,7 @@ Content = dict[str, tuple[MessageType, list[bytes]]]
 
 
 def pose_topics() -> Content:
-    messages = encode(STAMP, POSES, POSE_STAMPED)
+    messages = encode(STAMP, POSES)
     return {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
 
 
@@ -82,68 +81,6 @@ def test_several_files_are_read_in_the_order_of_the_bag(tmp_path: Path, listed: 
     np.testing.assert_array_equal(read_recording(tmp_path).slider.stamp, STAMP[:3])
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"compression": CompressionType.ZSTD, "chunk_size": 500},
-        {"compression": CompressionType.LZ4, "chunk_size": 500},
-        {"compression": CompressionType.NONE},
-        {"use_chunking": False, "use_statistics": False, "index_types": IndexType.NONE, "repeat_channels": False},
-        {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False},
-        {"use_statistics": False, "enable_crcs": False},
-    ],
-    ids=["zstd", "lz4", "none", "unchunked", "no index", "no statistics"],
-)
-def test_every_chunking_and_compression_of_mcap_is_accepted(
-    tmp_path: Path, recording: Recording, options: dict[str, object]
-) -> None:
-    """The rig is at the end of the file; it is found with and without an index."""
-    assert recording.rig is not None
-    record = ("push_rig", recording.rig.to_record())
-    path = write_mcap(tmp_path / "a.mcap", pose_topics(), metadata=record, **options)
-    assert open_bag(path).topics == {"/pusher/pose": POSE.name, "/slider/pose": POSE.name}
-    read = read_recording(path)
-    assert read.notes == ()
-    assert read.rig is not None and read.rig.to_record() == recording.rig.to_record()
-    np.testing.assert_array_equal(read.slider.x, POSES[:, 0])
-
-
-@pytest.mark.parametrize("compression", ["zstd", "none"])
-def test_data_before_a_cut_are_used_and_the_cut_is_noted(
-    recording: Recording, tmp_path: Path, compression: str
-) -> None:
-    write_recording(tmp_path / "whole.mcap", recording, compression=compression)
-    data = (tmp_path / "whole.mcap").read_bytes()
-    whole = [m.data for m in open_bag(tmp_path / "whole.mcap").messages()]
-    path = tmp_path / "cut.mcap"
-    counts = []
-    for share in (0.3, 0.6, 0.8, 0.95):
-        path.write_bytes(data[: int(len(data) * share)])
-        bag = open_bag(path)
-        kept = [m.data for m in bag.messages()]
-        assert kept == whole[: len(kept)]
-        assert any("cut.mcap at byte" in note for note in bag.notes) or kept == whole
-        counts.append(len(kept))
-    assert counts == sorted(counts)
-    assert counts[2] > 0
-
-
-@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
-def test_damaged_chunk_is_skipped_and_noted(tmp_path: Path, compression: CompressionType) -> None:
-    path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
-    offsets = chunk_offsets(path)
-    data = bytearray(path.read_bytes())
-    hit = slice(offsets[2] + 80, offsets[2] + 110)
-    data[hit] = bytes(byte ^ 0xA5 for byte in data[hit])
-    path.write_bytes(data)
-    read = read_recording(path)
-    assert 0 < len(read.slider) < N
-    assert set(read.slider.stamp.tolist()) < set(STAMP.tolist())
-    skipped, counted = read.notes
-    assert f"a.mcap at byte {offsets[2]}: a chunk was skipped" in skipped
-    assert f"messages were found, the summary lists {2 * N}" in counted
-
-
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
 )
@@ -161,15 +98,6 @@ def test_any_damage_gives_a_note_or_a_recording_error(hits: list[tuple[float, in
             return
         assert len(read.slider) <= N
         assert len(read.slider) == N or read.notes or len(hits) > 1  # the summary may be hit as well
-
-
-def chunk_offsets(path: Path) -> list[int]:
-    from mcap.reader import make_reader
-
-    with path.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    return [index.chunk_start_offset for index in summary.chunk_indexes]
 
 
 @pytest.mark.parametrize(
@@ -198,7 +126,7 @@ def test_folder_without_recordings_and_missing_path_are_errors(tmp_path: Path) -
 
 def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
     poses = pose_topics()
-    wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6], WRENCH_STAMPED))}
+    wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6]))}
     with pytest.raises(RecordingError, match="topic /slider/pose is of type 'geometry_msgs/msg/WrenchStamped'"):
         read_recording(write_mcap(tmp_path / "wrong.mcap", wrong))
     with pytest.raises(RecordingError, match="/pose is encoded as 'json', cdr is accepted"):
@@ -210,7 +138,7 @@ def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_p
 def test_unusable_samples_are_discarded_and_counted(tmp_path: Path) -> None:
     values = POSES.copy()
     values[3, 0], values[5, 1], values[7, 3:] = np.nan, np.inf, 0.0
-    messages = encode(STAMP, values, POSE_STAMPED)
+    messages = encode(STAMP, values)
     messages[9] = messages[9][:40]
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/slider/pose": (POSE, messages)})
     read = read_recording(path)
@@ -225,31 +153,22 @@ def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Pa
     heading = np.linspace(-3.1, 3.1, N)
     values = POSES.copy()
     values[:, 5], values[:, 6] = -1.7 * np.sin(heading / 2.0), -1.7 * np.cos(heading / 2.0)
-    turned = {"/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    turned = {"/slider/pose": (POSE, encode(STAMP, values))}
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **turned})
     np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
-
-
-def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:
-    stamp = STAMP.copy()
-    stamp[[4, 5]] = stamp[[5, 4]]
-    messages = encode(stamp, POSES, POSE_STAMPED)
-    topics = {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
-    path = write_mcap(tmp_path / "a.mcap", topics, STAMP + 7)
-    np.testing.assert_array_equal(read_recording(path).slider.stamp, stamp)
 
 
 def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
     value = np.linspace(20.0, 21.0, N)[:, None]
     other = STAMP - 10**9
-    with_variance = encode(other, np.column_stack([value, 0.0 * value]), Layout(header=True, count=2), "sensor")
+    with_variance = encode(other, np.column_stack([value, 0.0 * value]), frame_id="sensor")
 
     def kind(name: str) -> MessageType:
         return MessageType(name, "", "")
 
     topics: Content = {
-        "/float64": (FLOAT64, encode(STAMP, value, Layout(False, 1))),
-        "/float32": (kind("std_msgs/msg/Float32"), encode(STAMP, value, Layout(False, 1, 4))),
+        "/float64": (FLOAT64, encode(STAMP, value, header=False)),
+        "/float32": (kind("std_msgs/msg/Float32"), [b"\0\1\0\0" + number.tobytes() for number in value.astype("<f4")]),
         "/temperature": (kind("sensor_msgs/msg/Temperature"), with_variance),
         "/humidity": (kind("sensor_msgs/msg/RelativeHumidity"), with_variance),
         "/pressure": (kind("sensor_msgs/msg/FluidPressure"), with_variance),
@@ -307,14 +226,3 @@ def test_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, te
     read = read_recording(tmp_path / "a")
     assert len(read.slider) == len(recording.slider)
     assert any("metadata.yaml: cannot be read" in note for note in read.notes)
-
-
-def test_missing_listed_file_is_noted(tmp_path: Path, recording: Recording) -> None:
-    write_recording(tmp_path / "a", recording)
-    text = (tmp_path / "a" / "metadata.yaml").read_text()
-    listed = "  relative_file_paths:\n  - a_0.mcap\n"
-    assert listed in text
-    (tmp_path / "a" / "metadata.yaml").write_text(text.replace(listed, listed + "  - a_1.mcap\n"))
-    assert any(
-        "a_1.mcap is listed in metadata.yaml but missing" in note for note in read_recording(tmp_path / "a").notes
-    )

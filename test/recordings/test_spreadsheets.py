@@ -46,9 +46,7 @@ WAYS: dict[str, Callable[[str], bytes]] = {
     "mark and CRLF": lambda text: ("\ufeff" + comma(text)).replace("\n", "\r\n").encode(),
     "UTF-16 with tabs": lambda text: comma(text).replace(";", "\t").replace("\n", "\r\n").encode("utf-16"),
     "capitals": lambda text: as_bytes(text.partition("\n")[0].title() + "\n" + text.partition("\n")[2]),
-    "quoted": lambda text: as_bytes(
-        "\n".join(",".join(f'"{c}"' for c in row.split(";")) for row in comma(text).split("\n"))
-    ),
+    "quoted": lambda text: as_bytes(quoted(comma(text))),
     "empty columns and rows": lambda text: as_bytes(comma(text).replace("\n", ";;\n") + ";;;\n\n"),
     "sep=": lambda text: as_bytes("sep=;\n" + comma(text)),
     "numpy": lambda text: as_bytes("# " + text),

@@ -54,16 +54,6 @@ def test_a_laboratory_without_any_schema_reads_as_with_them(tmp_path: Path) -> N
     assert not found.losses
 
 
-@pytest.mark.parametrize("kind", [POSE.name, ODOMETRY, "geometry_msgs/msg/PoseWithCovarianceStamped"])
-def test_each_type_of_poses_is_told(kind: str) -> None:
-    lab = Lab()
-    made = zeros(lab.store, kind)
-    pose = made.pose if kind == POSE.name else made.pose.pose
-    pose.orientation.w = 1.0
-    data = bytes(lab.store.serialize_cdr(made, kind))
-    assert told_type([data] * 3, KINDS) == kind
-
-
 @pytest.mark.parametrize(
     ("data", "fits"),
     [

@@ -14,14 +14,23 @@ pytest.importorskip("rosbags")
 from decoding import decoded, decoder_of, in_portions
 from lab_bags import LATENCY, Lab, pose_rows, short_recording
 from test_lab_topics import assert_same_windows, original, wrench
+from turning_sensor import add_tip, add_wrench
 
-from push_predictor.errors import RecordingError, RequestError
+from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, turned
-from push_predictor.recordings.fields.up_axis import UP_AXES, bodies_z_up, wrenches_z_up, z_up
+from push_predictor.recordings.fields.pose_rows import (
+    UP_AXES,
+    bodies_z_up,
+    composed,
+    inverted,
+    normalised,
+    turned,
+    wrenches_z_up,
+    z_up,
+)
 from push_predictor.recordings.read import read_recording
-from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.topics import Topics, load_topics, save_topics, topics_path
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.topics import Topics
 
 POSE, WRENCH = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
 VECTORS = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
@@ -76,25 +85,15 @@ def lab_with(up: str, bodies: bool, streams: tuple[str, ...]) -> Lab:
     lab, whole = Lab(), original()
     for name, stream in (("slider", whole.slider), ("pusher", whole.pusher)):
         rows = as_seen(pose_rows(stream), up if name in streams else "z", bodies)
-        add_poses(lab, f"/{name}/pose", stream, rows)
+        add_tip(lab, f"/{name}/pose", stream.stamp, rows)
     assert whole.wrench is not None
     n = len(whole.wrench)
     along_z = np.column_stack([whole.wrench.fx, whole.wrench.fy, np.zeros((n, 3)), whole.wrench.torque])
     back = np.tile(turn_of(up)[:, 3:] * [-1, -1, -1, 1], (n, 1))
     both = [turned(back, part) for part in (along_z[:, :3], along_z[:, 3:])] if "wrench" in streams else None
     values = along_z if both is None else np.hstack(both)
-    names = [f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz"]
-    rows_of = zip(whole.wrench.stamp.tolist(), values.tolist(), strict=True)
-    lab.add("/pusher/wrench", WRENCH, whole.wrench.stamp, (
-        {**lab.header(stamp), **dict(zip(names, row, strict=True))} for stamp, row in rows_of
-    ))  # fmt: skip
+    add_wrench(lab, "/pusher/wrench", whole.wrench.stamp, values, "world")
     return lab
-
-
-def add_poses(lab: Lab, topic: str, stream: PoseStream, rows: np.ndarray) -> None:
-    names = [*(f"pose.position.{a}" for a in "xyz"), *(f"pose.orientation.{a}" for a in "xyzw")]
-    of = zip(stream.stamp.tolist(), rows.tolist(), strict=True)
-    lab.add(topic, POSE, stream.stamp, ({**lab.header(t), **dict(zip(names, row, strict=True))} for t, row in of))
 
 
 @pytest.mark.parametrize(
@@ -151,22 +150,6 @@ def test_a_sensor_known_to_tf_is_turned_with_the_world(tmp_path: Path, up: str) 
     assert plain is not None and turned_world is not None and np.ptp(plain.fx) > 0.1
     for name in ("fx", "fy", "torque"):
         np.testing.assert_allclose(getattr(turned_world, name), getattr(plain, name), atol=1e-9)
-
-
-@pytest.mark.parametrize("up", ["q", "y,q", "tip=y", "slider=", "slider=y=z", "=="])
-def test_another_axis_or_stream_is_refused_with_those_that_are_accepted(tmp_path: Path, up: str) -> None:
-    with pytest.raises(RequestError, match=r"up: .* is not accepted, give x, y, z, -x, -y or -z, of some streams"):
-        Topics(up=up)
-    topics_path(tmp_path / "a.mcap").write_text(f"up: '{up}'\n")
-    with pytest.raises(RecordingError, match=r"a.recording.yaml: up is .*, give x, y, z"):
-        load_topics(tmp_path / "a.mcap")
-
-
-def test_up_and_stamp_are_saved_with_the_topics(tmp_path: Path) -> None:
-    for topics in (Topics(up="y", stamp="log"), Topics(up="slider=-z")):
-        save_topics(tmp_path / "a.mcap", topics)
-        assert load_topics(tmp_path / "a.mcap") == topics
-    assert Topics(up="y").over(Topics(up="slider=z", stamp="log")) == Topics(up="y", stamp="log")
 
 
 # --- stamps -----------------------------------------------------------------------------------------------------------
@@ -236,8 +219,3 @@ def test_live_samples_have_the_time_of_receipt_not_that_of_sending() -> None:
     found = decoder.take(last=True)
     assert found.slider.stamp.tolist() == (sent["/slider/pose"] + later).tolist()
     assert found.pusher.stamp.tolist() == (sent["/tf"] + later).tolist()
-
-
-def test_another_stamp_is_refused() -> None:
-    with pytest.raises(RequestError, match="stamp: 'sent' is not accepted, give header or log"):
-        Topics(stamp="sent")

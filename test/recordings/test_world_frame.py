@@ -13,21 +13,20 @@ import pytest
 
 pytest.importorskip("rosbags")
 from decoding import decoded, decoder_of, in_portions, put
-from lab_bags import Lab, pose_rows, pose_values
+from lab_bags import Lab, pose_rows
 from test_lab_topics import assert_same_windows, original
 from turning_sensor import add_tip, add_wrench, in_sensor_axes, wrench_rows
 
-from push_predictor.cli import main
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.decoder.rules import NO_TRANSFORM
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.topics import Topics, load_topics
+from push_predictor.recordings.topics import Topics
 
 VICON = normalised(np.array([[0.4, -0.2, 0.1, 0.1, 0.05, 0.6, 0.8]]))  # in the frame `table`
 NAMES = Topics("/slider", "/tip", world="table")
-ODOMETRY = "nav_msgs/msg/Odometry"
+ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 
 
 def seen_from(frame: np.ndarray, stream: PoseStream) -> np.ndarray:
@@ -36,18 +35,11 @@ def seen_from(frame: np.ndarray, stream: PoseStream) -> np.ndarray:
     return composed(inverted(frames), pose_rows(stream))
 
 
-def add_poses(lab: Lab, topic: str, stream: PoseStream, rows: np.ndarray, frame: str, kind: str = ODOMETRY) -> None:
-    at = "pose.pose" if kind == ODOMETRY else "pose"
-    lab.add(topic, kind, stream.stamp, (
-        {**lab.header(stamp), "header.frame_id": frame, **pose_values(row, at, ("position", "orientation"))}
-        for stamp, row in zip(stream.stamp.tolist(), rows, strict=True)
-    ))  # fmt: skip
-
-
 def two_frames() -> Lab:
     """A slider seen by a tracker at VICON, and a tip in the frame of the table; tf connects both."""
     lab = Lab(frame="table")
-    add_poses(lab, "/slider", original().slider, seen_from(VICON, original().slider), "/vicon")
+    seen = seen_from(VICON, original().slider)
+    lab.poses("/slider", ODOMETRY, original().slider.stamp, seen, "pose.pose", **{"header.frame_id": "/vicon"})
     lab.pose("/tip", "geometry_msgs/msg/PoseStamped", original().pusher, "pose")
     lab.transform("/tf_static", "table", "vicon", original().slider.stamp[:1], VICON)
     return lab
@@ -139,21 +131,6 @@ def test_without_the_option_different_frames_are_noted(tmp_path: Path) -> None:
     assert not np.allclose(found.slider.x, original().slider.x)
 
 
-def test_a_moving_frame_has_no_pose_in_its_dropout(tmp_path: Path) -> None:
-    lab, slider = Lab(frame="table"), original().slider
-    angle = 1e-9 * (slider.stamp - slider.stamp[0])
-    none = np.zeros(len(slider))
-    cart = np.column_stack([angle, none, none, none, none, np.sin(angle / 2), np.cos(angle / 2)])
-    kept = np.abs(np.arange(len(slider)) - 400) > 30
-    lab.transform("/tf", "table", "cart", slider.stamp[kept], cart[kept])
-    add_poses(lab, "/slider", slider, seen_from(cart, slider), "cart", "geometry_msgs/msg/PoseStamped")
-    lab.pose("/tip", "geometry_msgs/msg/PoseStamped", original().pusher, "pose")
-    found = read_recording(lab.mcap(tmp_path / "lab"), topics=NAMES)
-    assert "/slider: 61 samples outside the time, or in a dropout, of a transform; discarded" in found.notes
-    assert found.slider.stamp.tolist() == slider.stamp[kept].tolist()
-    np.testing.assert_allclose(found.slider.x, slider.x[kept], atol=1e-9)
-
-
 def test_a_tip_without_orientation_is_turned_and_stays_without(tmp_path: Path) -> None:
     lab, pusher = two_frames(), original().pusher
     lab.messages = [message for message in lab.messages if message[1] != "/tip"]
@@ -207,17 +184,6 @@ def test_without_tf_another_frame_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(RecordingError, match=expected):
         read_recording(path, topics=NAMES)
-
-
-def test_the_world_is_an_option_and_is_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(two_frames().mcap(tmp_path / "lab", original().rig))
-    names = ["--slider-topic", "/slider", "--pusher-topic", "/tip"]
-    assert main(["info", path, *names, "--world-frame", "table", "--save-topics"]) == 0
-    assert load_topics(tmp_path / "lab") == NAMES
-    assert "world_frame: table" in (tmp_path / "lab.recording.yaml").read_text()
-    assert main(["check", path]) == 0
-    assert main(["info", path, "--world-frame", "desk"]) == 1
-    assert "world_frame 'desk' (option --world-frame)" in capsys.readouterr().err
 
 
 def test_poses_in_another_frame_go_on_after_a_replay_began_again() -> None:

@@ -17,7 +17,6 @@ from test_lab_topics import assert_same_windows, original, tf_lab, wrench
 from turning_sensor import (
     add_tip,
     add_wrench,
-    in_sensor_axes,
     measured_at_mount,
     measured_at_tip,
     sensor_tf,
@@ -114,15 +113,6 @@ def test_a_frame_is_turned_into_the_frame_of_the_poses(tmp_path: Path) -> None:
     lab.transform("/tf_static", "earth", "bench", original().pusher.stamp[:1], QUARTER)
     found = read_recording(lab.mcap(tmp_path / "lab", original().rig), topics=replace(NAMES, wrench_frame="ft"))
     assert_same_wrench(found)
-
-
-def test_a_static_frame_of_tf_turns_the_wrench(tmp_path: Path) -> None:
-    n = len(wrench())
-    table = np.repeat(QUARTER, n, axis=0)
-    tip = tip_rows(original().pusher, wrench().stamp)
-    lab = lab_of_tip(in_sensor_axes(about_points(wrench_rows(wrench()), tip[:, :3], table[:, :3]), table))
-    lab.transform("/tf_static", "world", "table", wrench().stamp[:1], QUARTER)
-    assert_same_wrench(read_recording(lab.mcap(tmp_path / "lab"), topics=replace(NAMES, wrench_frame="table")))
 
 
 def test_wrenches_without_a_pose_of_the_tip_are_discarded_with_a_note(tmp_path: Path) -> None:

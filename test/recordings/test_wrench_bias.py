@@ -19,7 +19,7 @@ from test_lab_topics import assert_same_windows, original, wrench
 from turning_sensor import add_tip, add_wrench, in_sensor_axes, tip_rows
 
 from push_predictor.cli import main
-from push_predictor.errors import RecordingError, RequestError
+from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.fields.wrench_bias import BiasError, estimate_bias, gravity_direction
 from push_predictor.recordings.read import read_recording
@@ -210,13 +210,6 @@ def test_a_turning_sensor_with_bias_and_weight_gives_the_windows_of_the_original
     assert raw.wrench is not None and np.hypot(raw.wrench.fx, raw.wrench.fy)[free()].max() > 0.5
 
 
-def test_a_constant_bias_along_the_worlds_axes_is_subtracted(tmp_path: Path) -> None:
-    path = lab_with_bias(frames=False).mcap(tmp_path / "lab", original().rig)
-    found = read_recording(path, topics=replace(NAMES, wrench_frame=""))
-    assert_unbiased(found, atol=0.005)
-    assert found.wrench_bias is not None and found.wrench_bias.weight is None
-
-
 def test_a_planar_sensor_without_the_other_numbers_has_its_bias_subtracted(tmp_path: Path) -> None:
     lab = Lab()
     lab.pose("/slider", "geometry_msgs/msg/PoseStamped", original().slider, "pose")
@@ -261,11 +254,3 @@ def test_the_estimate_is_in_the_description(tmp_path: Path, capsys: pytest.Captu
     assert 0.0 < described["weight_sd"] < 0.02 and described["axes"] == "of the sensor"
     assert main(["info", path, "--wrench-bias", "none", "--json", "-"]) == 0
     assert "wrench_bias" not in json.loads(capsys.readouterr().out)
-
-
-def test_another_bias_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RequestError, match="wrench_bias: 'zero' is not accepted, give free_motion or none"):
-        Topics(wrench_bias="zero")
-    (tmp_path / "lab.recording.yaml").write_text("wrench_bias: zero\n")
-    with pytest.raises(RecordingError, match=r"lab\.recording\.yaml: wrench_bias is 'zero', give free_motion or none"):
-        load_topics(tmp_path / "lab.mcap")

@@ -79,11 +79,17 @@ class Lab:
             self.messages.append((stamp + LATENCY, topic, bytes(self.store.serialize_cdr(message, kind))))
 
     def pose(self, topic: str, kind: str, stream: PoseStream, at: str, header: str = "header", **more: object) -> None:
-        """Poses in the field `at` of a type."""
+        """Poses of a stream in the field `at` of a type."""
+        self.poses(topic, kind, stream.stamp, pose_rows(stream), at, header, **more)
+
+    def poses(
+        self, topic: str, kind: str, stamps: Any, rows: Any, at: str, header: str = "header", **more: object
+    ) -> None:
+        """Rows (n, 7) in the field `at` of a type."""
         names = ("translation", "rotation") if at.endswith("transform") else ("position", "orientation")
-        self.add(topic, kind, stream.stamp, (
+        self.add(topic, kind, stamps, (
             {**self.header(stamp, header), **more, **pose_values(row, at, names)}
-            for stamp, row in zip(stream.stamp.tolist(), pose_rows(stream), strict=True)
+            for stamp, row in zip(np.asarray(stamps).tolist(), rows, strict=True)
         ))  # fmt: skip
 
     def transform(self, topic: str, parent: str, child: str, stamps: Any, rows: Any) -> None:
@@ -148,7 +154,7 @@ def laboratory(recording: Recording) -> Lab:
     return lab
 
 
-def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
+def robot_in_tf(recording: Recording) -> Lab:
     """A block below a static camera, and a robot of two moving joints and a static tool."""
     lab, slider, pusher = Lab(), recording.slider, recording.pusher
     block, tip = pose_rows(slider), pose_rows(pusher)
@@ -162,8 +168,8 @@ def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
     everywhere = {name: np.repeat(row, n, axis=0) for name, row in rows.items()}
     in_arm = composed(inverted(composed(everywhere["base"], arm)), composed(tip, inverted(everywhere["tool"])))
     first = slider.stamp[:1]
-    lab.transform("/tf_static", world, "camera", first, camera)
-    lab.transform("/tf_static", f"/{world}", "/base", first, base)
+    lab.transform("/tf_static", "world", "camera", first, camera)
+    lab.transform("/tf_static", "/world", "/base", first, base)
     lab.transform("/tf_static", "wrist", "tip", first, tool)
     seen = composed(inverted(np.repeat(camera, len(slider), axis=0)), block)
     lab.transform("/tf", "camera", "block", slider.stamp, seen)
@@ -253,7 +259,12 @@ def write_ros1(lab: Lab, path: Path) -> Path:
 
 
 def write_without_schema(lab: Lab, path: Path, *topics: str) -> Path:
-    """Write a file in which these topics have no schema, by the package `mcap`."""
+    """Write a file in which these topics have no schema."""
+    return write_schemas(lab, path, dict.fromkeys(topics))
+
+
+def write_schemas(lab: Lab, path: Path, schemas: Mapping[str, tuple[str, str] | None]) -> Path:
+    """Write a file in which some topics have another schema (encoding, text), or none, by the package `mcap`."""
     from mcap.writer import Writer
 
     with path.open("wb") as stream:
@@ -261,8 +272,9 @@ def write_without_schema(lab: Lab, path: Path, *topics: str) -> Path:
         writer.start(profile="ros2")
         channels = {}
         for topic, kind in lab.kinds.items():
-            schema = 0 if topic in topics else writer.register_schema(kind, "ros2msg", lab.definition(kind).encode())
-            channels[topic] = writer.register_channel(topic, "cdr", schema)
+            schema = schemas.get(topic, ("ros2msg", lab.definition(kind)))
+            number = 0 if schema is None else writer.register_schema(kind, schema[0], schema[1].encode())
+            channels[topic] = writer.register_channel(topic, "cdr", number)
         for stamp, topic, data in lab.in_order():
             writer.add_message(channels[topic], stamp, data, stamp)
         writer.finish()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from lab_bags import Lab, pose_values
+from lab_bags import Lab
 
 from push_predictor.recordings.fields.pose_rows import about_points, composed, in_world_axes, inverted, normalised
 from push_predictor.recordings.streams import PoseStream, WrenchStream
@@ -46,10 +46,7 @@ def wrench_rows(wrench: WrenchStream) -> Array:
 
 def add_tip(lab: Lab, topic: str, stamp: IntArray, rows: Array) -> None:
     """Poses of a tip as PoseStamped."""
-    pairs = zip(stamp.tolist(), rows, strict=True)
-    lab.add(topic, "geometry_msgs/msg/PoseStamped", stamp, (
-        {**lab.header(at), **pose_values(row, "pose", ("position", "orientation"))} for at, row in pairs
-    ))  # fmt: skip
+    lab.poses(topic, "geometry_msgs/msg/PoseStamped", stamp, rows, "pose")
 
 
 def add_wrench(lab: Lab, topic: str, stamp: IntArray, values: Array, frame: str) -> None:

@@ -18,10 +18,11 @@ from push_predictor.nodes.qos import DEEPEST, message_class
 from push_predictor.online.stream_health import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.decoder.poses import PoseFrame
 from push_predictor.recordings.decoder.sources import STATIC
 from push_predictor.recordings.decoder.topic_input import RECENT, TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
-from push_predictor.recordings.fields.sources import TF_TYPES, Source
+from push_predictor.recordings.fields.sources import TF_TYPES
 from push_predictor.types import IntArray
 
 SILENT = 5.0  # s without a sample that are reported
@@ -160,9 +161,10 @@ def _no_tf(kind: str) -> str:
 class FrameStream:
     """What is known of the poses of a frame. name: of the source, after remapping."""
 
-    def __init__(self, node: Node, source: Source, topics: TransformTopics) -> None:
-        self.name = node.resolve_topic_name(source.topic) + source.text[len(source.topic) :]
-        self._source, self._topics = source, topics
+    def __init__(self, node: Node, pose: PoseFrame, topics: TransformTopics) -> None:
+        topic = pose.source.topic
+        self.name = node.resolve_topic_name(topic) + pose.source.text[len(topic) :]
+        self._pose, self._topics = pose, topics
 
     @property
     def lost(self) -> int:
@@ -171,14 +173,13 @@ class FrameStream:
 
     def report(self, stream: str) -> TopicReport:
         """What is known of the frame now."""
-        transforms, frame = self._topics.buffer, self._source.frame
         return TopicReport(
             stream=stream,
             topic=self.name,
             kind=TF_TYPE,
             reliability=reliability_text(self._topics.moving.reliability),
-            frames=(transforms.world,) if transforms.world else (),
-            figures=stamp_figures(transforms.recent(frame, RECENT), None),
+            frames=tuple(self._pose.named),
+            figures=stamp_figures(self._pose.recent(RECENT), None),
             problem=self._problem(),
             refused=bool(self._topics.refusal),
         )
@@ -186,9 +187,8 @@ class FrameStream:
     def _problem(self) -> str:
         if self._topics.problem:
             return self._topics.problem
-        buffer, frame = self._topics.buffer, self._source.frame
-        if problem := buffer.problem(frame):
-            advice = "; set world_frame" if buffer.lacks_world(frame) else ""
+        if problem := self._pose.problem:
+            advice = "; set world_frame" if self._pose.lacks_world else ""
             return f"{problem[0].upper()}{problem[1:]}{advice}."
         return silence(self._topics.moving)
 

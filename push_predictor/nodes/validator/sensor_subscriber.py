@@ -47,7 +47,7 @@ class SensorSubscriber:
         self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
         self._tf = {name: TransformTopics(node, f"/{name}", buffer) for name, buffer in decoder.tf.items()}
         self._streams: dict[str, Stream] = {
-            name: FrameStream(node, pose.source, self._tf[key_of(pose.source.topic)])
+            name: FrameStream(node, pose, self._tf[key_of(pose.source.topic)])
             if isinstance(pose, PoseFrame)
             else TopicStream(node, pose.messages)
             for name, pose in decoder.poses.items()

@@ -3,5 +3,5 @@
 
 """MCAP files and rosbag2 folders as raw messages; damaged files are read as far as possible.
 
-Import `reader`, `writer`, `metadata`, `cdr` and `definitions`; the `mcap_*` modules are the layers below `reader`.
+Import `reader`, `writer`, `metadata`, `messages` and `message_types`.
 """

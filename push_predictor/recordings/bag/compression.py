@@ -11,7 +11,7 @@ from pathlib import Path
 import zstandard
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 
 ENDING = ".zstd"
 FRAME = b"\x28\xb5\x2f\xfd"  # the first bytes of a zstd frame
@@ -52,15 +52,12 @@ def unpack_file(file: Path, folder: Path, notes: Notes) -> Path:
 
 
 def as_cdr(data: bytes | bytearray) -> bytes:
-    """A recorded message, decompressed if it is a zstd frame: CDR never begins as one. Raises zstandard.ZstdError."""
-    return unpack_message(data) if data[: len(FRAME)] == FRAME else bytes(data)
+    """A recorded message, decompressed if it is a zstd frame: CDR never begins as one.
 
-
-def unpack_message(data: bytes | bytearray) -> bytes:
-    """The message in a zstd frame.
-
-    Raises zstandard.ZstdError for another frame or a message that is too large.
+    Raises zstandard.ZstdError for a damaged frame or a message that is too large.
     """
+    if data[: len(FRAME)] != FRAME:
+        return bytes(data)
     size = zstandard.frame_content_size(data)
     if not 0 <= size <= LARGEST_MESSAGE:
         raise zstandard.ZstdError(f"a message without a size, or larger than {LARGEST_MESSAGE} bytes")

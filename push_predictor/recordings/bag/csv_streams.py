@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal, InvalidOperation
 from heapq import merge
 from pathlib import Path
@@ -14,10 +14,8 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, STAMPED_SCALAR_LAYOUT, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
-from push_predictor.recordings.bag.messages import RawMessage
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import BagFile, Notes, RawMessage, encode
 from push_predictor.recordings.bag.spreadsheet import ERRORS, Column, cells_of, column_of
 from push_predictor.types import Array, IntArray
 
@@ -38,8 +36,8 @@ PARQUET = (
 _LATEST = 2**31 * 10**9  # ns; a header has 32 bits of seconds
 
 
-class CsvStreams:
-    """The streams in slider.csv, pusher.csv, wrench.csv and further files; the attributes are those of McapFile.
+class CsvStreams(BagFile):
+    """The streams in slider.csv, pusher.csv, wrench.csv and further files.
 
     Each may be a Parquet file with the same columns instead. time is in s; x, y, z in m; heading in rad; force in N,
     torque in N m. Each further column of another file is a scalar named /FILE/COLUMN. Raises RecordingError that names
@@ -47,25 +45,17 @@ class CsvStreams:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder
-        self.notes = Notes()
-        self.schemas: dict[str, str] = {}
-        self.qos: dict[str, str] = {}
-        self.metadata: dict[str, Mapping[str, str]] = {}
+        super().__init__(folder)
         self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
         for file in _files(folder):
             if file.suffix.lower() == ".csv" or file.stem.lower() in STREAMS or _parquet_is_read():
                 self._streams |= _streams(file, self.notes)
             else:
                 self.notes.add(f"{file.name} is ignored; {PARQUET}")
-
-    @property
-    def topics(self) -> dict[str, str]:
-        """{topic: type}."""
-        return {topic: kind for topic, (kind, _, _) in self._streams.items()}
+        self.topics = {topic: kind for topic, (kind, _, _) in self._streams.items()}
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """CDR messages in order of time, of all topics or of the given ones; those of a topic in its file's order."""
+        """See BagFile; in order of time, those of a topic in its file's order."""
         wanted = [topic for topic in self._streams if topics is None or topic in topics]
         return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
 
@@ -102,8 +92,7 @@ def _streams(file: Path, notes: Notes) -> dict[str, tuple[str, IntArray, list[by
             raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
         stamp, values = _numbers(file, header, rows, columns[0].factor)
         scalars = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
-        layout = STAMPED_SCALAR_LAYOUT
-        return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in scalars.items()}
+        return {name: (SCALAR, stamp, encode(stamp, column[:, None])) for name, column in scalars.items()}
     topic, accepted = STREAMS[stream]
     by_name = {column.name: place for place, column in enumerate(columns)}
     names = next((names for names in accepted if {*names} == {*by_name} and len(names) == len(columns)), None)
@@ -115,8 +104,8 @@ def _streams(file: Path, notes: Notes) -> dict[str, tuple[str, IntArray, list[by
     factors = [columns[place].factor for place in order]
     in_order = [(line, [row[place] for place in order]) for line, row in rows]
     stamp, values = _numbers(file, [header[place] for place in order], in_order, factors[0])
-    kind, layout, spatial = _as_message(names, values * np.array(factors[1:], np.float64))
-    return {topic: (kind, stamp, encode(stamp, spatial, layout))}
+    kind, spatial = _as_message(names, values * np.array(factors[1:], np.float64))
+    return {topic: (kind, stamp, encode(stamp, spatial))}
 
 
 def _columns(file: Path, header: Sequence[str]) -> list[Column]:
@@ -132,15 +121,15 @@ def _note_units(file: Path, columns: Sequence[Column], notes: Notes) -> None:
         notes.add(f"{file.name}: {', '.join(converted)} is converted to SI units")
 
 
-def _as_message(header: Sequence[str], values: Array) -> tuple[str, Layout, Array]:
-    """(message type, layout, numbers (n, 6 or 7)) of a stream's columns without the time."""
+def _as_message(header: Sequence[str], values: Array) -> tuple[str, Array]:
+    """(message type, its numbers (n, 6 or 7)) of a stream's columns without the time."""
     none = np.zeros(len(values))
     if header == HEADING:
         z, w = quaternion_of_yaw(values[:, 3])
-        return POSE.name, POSE_STAMPED, np.column_stack([values[:, :3], none, none, z, w])
+        values = np.column_stack([values[:, :3], none, none, z, w])
     if header == PLANAR:
-        return WRENCH.name, WRENCH_STAMPED, np.column_stack([values[:, :2], none, none, none, values[:, 2]])
-    return (POSE.name, POSE_STAMPED, values) if header == QUATERNION else (WRENCH.name, WRENCH_STAMPED, values)
+        values = np.column_stack([values[:, :2], none, none, none, values[:, 2]])
+    return (POSE if header in (QUATERNION, HEADING) else WRENCH).name, values
 
 
 def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Message types and their definitions: `ros2msg` text of standard and installed types, and the fields in such text."""
+"""Message types and their definitions: `ros2msg` text of standard and installed types or of IDL, the fields in it."""
 
 from __future__ import annotations
 
@@ -227,3 +227,57 @@ WRENCH = _standard(
     "geometry_msgs/msg/WrenchStamped", "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"
 )
 FLOAT64 = _standard("std_msgs/msg/Float64", "705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a")
+
+
+# --- IDL (schema encoding `ros2idl`), which rosbag2 records where a type has no .msg ----------------------------------
+
+_IDL_SECTION = re.compile(r"^=+\s*\nIDL: *(\S+) *$", re.MULTILINE)
+_IDL_NOT_READ = re.compile(
+    r"//[^\n]*|/\*.*?\*/|#[^\n]*|@\w+\s*(?:\((?:[^()\"]|\"(?:\\.|[^\"\\])*\")*\))?", re.DOTALL
+)  # comments, includes and annotations
+_IDL_TYPEDEF = re.compile(r"typedef\s+([^;]+?)\s+(\w+)((?:\[\d+\])?)\s*;")
+_IDL_STRUCT = re.compile(r"struct\s+(\w+)\s*\{(.*?)\}", re.DOTALL)
+_IDL_MEMBER = re.compile(r"\s*(.+?)\s+(\w+)\s*((?:\[\d+\])?)\s*$", re.DOTALL)
+_IDL_SEQUENCE = re.compile(r"sequence\s*<\s*(.+?)\s*(?:,\s*\d+\s*)?>")
+_IDL_NUMBERS = {
+    "double": "float64",
+    "float": "float32",
+    "boolean": "bool",
+    "octet": "byte",
+    "short": "int16",
+    "unsigned short": "uint16",
+    "long": "int32",
+    "unsigned long": "uint32",
+    "long long": "int64",
+    "unsigned long long": "uint64",
+}
+
+
+def msg_of_idl(text: str) -> str:
+    """The `ros2msg` text of IDL text, whose first section is the type itself; '' if there is no section."""
+    _, *parts = _IDL_SECTION.split(text)
+    found = [(name, _idl_fields(name, part)) for name, part in zip(parts[::2], parts[1::2], strict=True)]
+    return f"{_RULE}\n".join(fields if k == 0 else f"MSG: {name}\n{fields}" for k, (name, fields) in enumerate(found))
+
+
+def _idl_fields(type_name: str, text: str) -> str:
+    """One line for each member of the struct of a type, '' without it."""
+    plain = _IDL_NOT_READ.sub(" ", text)
+    aliases = {alias: (_idl_type(kind), length) for kind, alias, length in _IDL_TYPEDEF.findall(plain)}
+    members = next((body for name, body in _IDL_STRUCT.findall(plain) if name == type_name.rpartition("/")[2]), "")
+    lines = []
+    for member in filter(None, map(_IDL_MEMBER.match, members.split(";"))):
+        kind, name, length = member.groups()
+        kind, own = aliases.get(kind, (_idl_type(kind), ""))
+        lines.append(f"{kind}{own or length} {name}\n")
+    return "".join(lines)
+
+
+def _idl_type(text: str) -> str:
+    """The type of `ros2msg`, of a sequence with brackets."""
+    if sequence := _IDL_SEQUENCE.fullmatch(text.strip()):
+        return f"{_idl_type(sequence[1])}[]"
+    name = " ".join(text.split())
+    if re.fullmatch(r"w?string(\s*<\s*\d+\s*>)?", name):
+        return name.partition("<")[0].strip()
+    return _IDL_NUMBERS.get(name, name.replace("::msg::", "/").replace("::", "/"))

@@ -6,14 +6,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
 
 METADATA_FILE = "metadata.yaml"
@@ -32,9 +32,9 @@ class BagMetadata:
     notes: Notes = field(default_factory=Notes)
 
 
-@dataclass(frozen=True)
+@dataclass
 class TopicInfo:
-    """A topic of metadata.yaml.
+    """A topic of metadata.yaml. count: of its messages.
 
     durability: 'volatile' or 'transient_local'; reliability: 'reliable' or 'best_effort'.
     """
@@ -94,7 +94,7 @@ def _parsed(text: str) -> Any:
 
 
 def bag_metadata_text(
-    file: str, start: int, duration: int, topics: list[TopicInfo], records: Mapping[str, Mapping[str, str]]
+    file: str, start: int, duration: int, topics: Collection[TopicInfo], records: Mapping[str, Mapping[str, str]]
 ) -> str:
     """metadata.yaml for one file; start and duration in ns.
 

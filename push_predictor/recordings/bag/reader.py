@@ -13,16 +13,15 @@ from pathlib import Path
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import ENDING, start_of, unpack_file
 from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
+from push_predictor.recordings.bag.mcap_file import MAGIC as MCAP
 from push_predictor.recordings.bag.mcap_file import McapFile
-from push_predictor.recordings.bag.mcap_records import MAGIC as MCAP
-from push_predictor.recordings.bag.messages import Messages, RawMessage, gathered
+from push_predictor.recordings.bag.messages import BagFile, Notes, RawMessage
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
     BagMetadata,
     embedded_records,
     read_bag_metadata,
 )
-from push_predictor.recordings.bag.notes import Notes
 from push_predictor.recordings.bag.ros1_file import MAGIC as ROS1
 from push_predictor.recordings.bag.ros1_file import Ros1File
 from push_predictor.recordings.bag.sqlite_file import MAGIC as SQLITE
@@ -30,7 +29,6 @@ from push_predictor.recordings.bag.sqlite_file import SqliteFile
 
 __all__ = ["Bag", "RawMessage", "open_bag"]
 
-BagFile = McapFile | SqliteFile | Ros1File | CsvStreams
 ENDINGS = (".mcap", ".db3", ".bag")
 MOST_GAPS = 20  # missing files that are named
 
@@ -60,8 +58,7 @@ class Bag:
     @property
     def storage(self) -> str:
         """rosbag2's name of the format: mcap or sqlite3; empty for files that rosbag2 cannot read."""
-        kinds = ((McapFile, "mcap"), (SqliteFile, "sqlite3"))
-        return next((name for kind, name in kinds if isinstance(self.files[0], kind)), "")
+        return self.files[0].storage
 
     @property
     def topics(self) -> dict[str, str]:
@@ -115,14 +112,6 @@ class Bag:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
         for file in self.files:
             yield from file.messages(topics)
-
-    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
-        """The messages of the given topics, those of a topic and type in file order; damage becomes a note."""
-        for file in self.files:
-            if isinstance(file, McapFile):
-                yield from file.portions(topics)
-            else:
-                yield from gathered(file.messages(topics))
 
 
 def open_bag(path: Path) -> Bag:

@@ -7,31 +7,27 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.messages import RawMessage
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import BagFile, RawMessage
 
 MAGIC = b"#ROSBAG"
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
 _CAPITAL_PACKAGE = re.compile(r"\b([A-Z]\w*)/")  # allowed in ROS 1, not in ROS 2, which rosbags follows
 
 
-class Ros1File:
-    """The topics and messages of one file, with the types and the CDR of ROS 2; the attributes are those of McapFile.
+class Ros1File(BagFile):
+    """See BagFile; with the types and the CDR of ROS 2.
 
     Raises RecordingError without the package rosbags, and for a file that is not a readable ROS 1 bag.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.notes = Notes()
-        self.qos: dict[str, str] = {}
-        self.metadata: dict[str, Mapping[str, str]] = {}
+        super().__init__(path)
         with _opened(path) as reader:
             from rosbags.typesys import Stores, get_typestore
 
@@ -41,7 +37,7 @@ class Ros1File:
             self.schemas = {kind: self._definition(kind) for kind in self.topics.values()}
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """CDR messages in the order of the bag, of all topics or of the given ones; damage becomes a note."""
+        """See BagFile."""
         from rosbags.rosbag1 import ReaderError
         from rosbags.serde import SerdeError
 
@@ -81,9 +77,6 @@ class Ros1File:
 
     def _definition(self, kind: str) -> str:
         return str(self._store.generate_msgdef(kind, ros_version=2)[0]) if kind in self._store.types else ""
-
-    def _lost(self, what: str) -> None:
-        self.notes.add(f"{self.path}: {what}", lost=True)
 
 
 @contextmanager

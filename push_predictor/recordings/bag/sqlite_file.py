@@ -13,43 +13,35 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
+import zstandard
+
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import as_cdr
-from push_predictor.recordings.bag.mcap_records import UNREADABLE
-from push_predictor.recordings.bag.messages import RawMessage
-from push_predictor.recordings.bag.notes import Notes
+from push_predictor.recordings.bag.messages import BagFile, RawMessage
 
 MAGIC = b"SQLite format 3\0"
 _DAMAGE = (sqlite3.Error, UnicodeDecodeError)  # the latter: of names in a damaged schema
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
 
 
-class SqliteFile:
-    """The topics, metadata records and messages of one file; the attributes are those of McapFile.
+class SqliteFile(BagFile):
+    """See BagFile. Raises RecordingError for a file that is not a bag of rosbag2."""
 
-    Raises RecordingError for a file that is not a bag of rosbag2.
-    """
+    storage = "sqlite3"
 
-    def __init__(self, path: Path, *, name: str = "") -> None:
-        self.path, self._name = path, name or str(path)
-        self.notes = Notes()
+    def __init__(self, path: Path, name: str = "") -> None:
+        super().__init__(path, name)
         self._channels: dict[int, tuple[str, str]] = {}
-        self.qos: dict[str, str] = {}
         try:
             with closing(self._opened()) as database:
                 self._read_topics(database)
                 self.schemas = self._read_definitions(database)
                 self.metadata = self._read_metadata(database)
         except (*_DAMAGE, OSError) as error:
-            raise RecordingError(f"{self._name}: is not a readable sqlite3 bag of rosbag2 ({error})") from None
-
-    @property
-    def topics(self) -> dict[str, str]:
-        """{topic: type}."""
-        return dict(self._channels.values())
+            raise RecordingError(f"{self.name}: is not a readable sqlite3 bag of rosbag2 ({error})") from None
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """CDR messages in order of time, of all topics or of the given ones; damage becomes a note."""
+        """See BagFile; in order of time."""
         wanted = {number: of for number, of in self._channels.items() if topics is None or of[0] in topics}
         read = undone = 0
         try:
@@ -63,7 +55,7 @@ class SqliteFile:
                         continue
                     try:
                         message = as_cdr(data)
-                    except UNREADABLE:
+                    except zstandard.ZstdError:
                         undone += 1
                     else:
                         yield RawMessage(*wanted[number], time, message)
@@ -92,7 +84,7 @@ class SqliteFile:
                 self._lost(f"{topic} is encoded as {encoding!r}, cdr is accepted; its messages were skipped")
                 continue
             self._channels[number] = (topic, kind)
-            self.qos[topic] = offered or ""
+            self.topics[topic], self.qos[topic] = kind, offered or ""
 
     def _read_definitions(self, database: sqlite3.Connection) -> dict[str, str]:
         """{type: ros2msg text}; rosbag2 records them since ROS 2 Iron."""
@@ -107,9 +99,6 @@ class SqliteFile:
             return {}
         found = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
         return {"rosbag2": {"serialized_metadata": found[0]}} if found else {}
-
-    def _lost(self, what: str) -> None:
-        self.notes.add(f"{self._name}: {what}", lost=True)
 
 
 def _has(database: sqlite3.Connection, table: str) -> bool:

@@ -9,7 +9,6 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -53,7 +52,6 @@ class BagWriter:
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._records: dict[str, Mapping[str, str]] = {}
-        self._counts: dict[str, int] = {}
         self._first, self._last = LARGEST_STAMP, 0
 
     def __enter__(self) -> BagWriter:
@@ -104,7 +102,6 @@ class BagWriter:
                 self._schemas[type] = self._writer.register_schema(type, "ros2msg", schema_text.encode())
             self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
         self._topics[topic.name] = topic
-        self._counts[topic.name] = 0
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
         """Write an MCAP Metadata record, also to the metadata.yaml of a folder."""
@@ -125,7 +122,7 @@ class BagWriter:
             self._writer.add_message(self._channels[name], stamp, data, stamp)
         except OSError as error:
             raise self._unwritten(error) from None
-        self._counts[name] += 1
+        self._topics[name].count += 1
         self._first, self._last = min(self._first, stamp), max(self._last, stamp)
 
     def flush(self) -> None:
@@ -168,9 +165,8 @@ class BagWriter:
             replace_folder(self.path, self._unfinished)
 
     def _metadata_text(self) -> str:
-        topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
         start = min(self._first, self._last)
-        return bag_metadata_text(self._file_name, start, self._last - start, topics, self._records)
+        return bag_metadata_text(self._file_name, start, self._last - start, self._topics.values(), self._records)
 
 
 def absolute(topic: str) -> str:

@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
-
-import numpy as np
 
 from push_predictor.recordings.fields.wrench_bias import BiasError, WrenchBias, estimate_bias, with_planar_numbers
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, joined, set_back
+from push_predictor.recordings.streams import PoseStream, joined, set_back, taken
 from push_predictor.recordings.windows.clock_session import free_motion
 from push_predictor.types import Array, IntArray
 
@@ -20,7 +18,8 @@ LATER, REFINED = 1.1, 2.0  # factors in their number to the next attempt: withou
 MOST = 50_000  # wrenches that are kept; an estimate from as many is final
 
 
-class Wrenches(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Wrenches:
     """Stamps (n,) ns and wrenches (n, 6) along the axes of a sensor, with its poses and the tip's (n, 7) in the world.
 
     sensor and tip are None where the axes are the world's.
@@ -45,9 +44,10 @@ class BiasSoFar:
     """
 
     def __init__(self) -> None:
-        self._begin(None)
+        self.begin(None)
 
-    def _begin(self, rig: Rig | None) -> None:
+    def begin(self, rig: Rig | None) -> None:
+        """Begin anew with a rig, by whose outline free motion is found."""
         self.estimate: WrenchBias | None = None
         self.problem = ""
         self._rig = rig
@@ -58,10 +58,6 @@ class BiasSoFar:
         self._portions: list[_Portion] = []
         self._count = self._seen = 0  # wrenches in the portions, and with those that are no longer kept
         self._next = FIRST  # how many have been seen at the next attempt
-
-    def begin(self, rig: Rig) -> None:
-        """Begin anew with a rig, by whose outline free motion is found."""
-        self._begin(rig)
 
     @property
     def waits(self) -> bool:
@@ -83,12 +79,12 @@ class BiasSoFar:
         ):
             self._attempt(self._rig)
         if self.estimate is None:
-            return _joined([wrench], 0)
-        ready = wrench if known_before else _joined([portion.wrench for portion in self._portions])
+            return taken(wrench, slice(0))
+        ready = wrench if known_before else joined([portion.wrench for portion in self._portions])
         if self._final:
             self._portions = []
         values = with_planar_numbers(ready.values) if ready.sensor is None else ready.values
-        return ready._replace(values=self.estimate.subtracted_from(values, ready.sensor))
+        return replace(ready, values=self.estimate.subtracted_from(values, ready.sensor))
 
     def _keep(self, portion: _Portion) -> None:
         before = next((each.slider for each in reversed(self._portions) if len(each.slider)), None)
@@ -103,7 +99,7 @@ class BiasSoFar:
             self._count -= len(self._portions.pop(0).wrench.stamp)
 
     def _attempt(self, rig: Rig) -> None:
-        wrench = _joined([portion.wrench for portion in self._portions])
+        wrench = joined([portion.wrench for portion in self._portions])
         slider = joined([portion.slider for portion in self._portions])
         pusher = joined([portion.pusher for portion in self._portions])
         values = with_planar_numbers(wrench.values) if wrench.sensor is None else wrench.values
@@ -114,15 +110,3 @@ class BiasSoFar:
             self.problem = str(error)
         later = min(round(self._seen * LATER), self._seen + MOST // 10)
         self._next = (later if self.estimate is None else round(self._seen * REFINED)) + 1
-
-
-def _joined(parts: Sequence[Wrenches], count: int | None = None) -> Wrenches:
-    """The parts as one, of which the first `count` samples."""
-
-    def column(values: Sequence[Array | None]) -> Array | None:
-        known = [each for each in values if each is not None]
-        return np.concatenate(known)[:count] if known else None
-
-    stamp = np.concatenate([part.stamp for part in parts])[:count]
-    values = np.concatenate([part.values for part in parts])[:count]
-    return Wrenches(stamp, values, column([part.sensor for part in parts]), column([part.tip for part in parts]))

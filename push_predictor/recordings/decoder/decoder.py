@@ -30,8 +30,8 @@ from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, 
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.decoder.wrench import WrenchInput
+from push_predictor.recordings.fields.pose_rows import bodies_z_up, z_up
 from push_predictor.recordings.fields.sources import SCALAR_TARGET, TF_TYPES, Source
-from push_predictor.recordings.fields.up_axis import bodies_z_up, z_up
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import Topics
@@ -67,7 +67,7 @@ class StreamDecoder:
         named = sources_of(topics)
         sources = {name: source for name, source in named if name != COVARIATE}
         self.tf = _buffers(topics, sources, expected)
-        first = next(iter(self.tf.values()), TransformBuffer([]))
+        first = next(iter(self.tf.values()), TransformBuffer())
         self.poses: dict[str, PoseTopic | PoseFrame] = {
             name: PoseFrame(source, rules, self.tf[key_of(source.topic)])
             if (source := sources[name]).frame
@@ -177,10 +177,7 @@ def _buffers(topics: Topics, sources: Mapping[str, Source], expected: str) -> di
     names = [*dict.fromkeys(key_of(source.topic) for source in frames)]
     if not names and (topics.world or topics.wrench_tf_frame):
         names = [key_of(TF)]
-    return {
-        name: TransformBuffer([s.frame for s in frames if key_of(s.topic) == name], world, topics.from_log)
-        for name in names
-    }
+    return {name: TransformBuffer(world, topics.from_log) for name in names}
 
 
 def _scalar(each: TopicInput, span: tuple[int, int] | None) -> ScalarStream:

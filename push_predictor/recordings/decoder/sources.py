@@ -38,15 +38,19 @@ def topics_to_record(given: Topics, with_wrench: bool = True) -> tuple[RecordedT
     with_wrench: whether the wrench is expected.
     """
     found: dict[str, RecordedTopic] = {}
+
+    def add(topic: str, *uses: str, expected: bool = True, static: bool = False) -> None:
+        known = found.get(topic, RecordedTopic(topic, (), expected, static))
+        both = tuple(dict.fromkeys([*known.uses, *uses]))
+        found[topic] = replace(known, uses=both, expected=known.expected or expected)
+
     for name, source in sources_of(given):
-        expected = name != "wrench" or with_wrench
-        found[source.topic] = _with_use(found.get(source.topic), RecordedTopic(source.topic, (name,), expected))
+        add(source.topic, name, expected=name != "wrench" or with_wrench)
         if source.frame:
-            static = RecordedTopic(source.topic + STATIC, (name,), expected=False, static=True)
-            found[static.name] = _with_use(found.get(static.name), static)
+            add(source.topic + STATIC, name, expected=False, static=True)
     if given.world or given.wrench_tf_frame:  # by tf the poses or the wrench will be turned
-        for tf in (RecordedTopic(TF, ()), RecordedTopic(TF + STATIC, (), expected=False, static=True)):
-            found.setdefault(tf.name, tf)
+        add(TF)
+        add(TF + STATIC, expected=False, static=True)
     return tuple(found.values())
 
 
@@ -71,10 +75,3 @@ def resolved(given: Topics, resolve: Callable[[str], str]) -> Topics:
         names.setdefault(name, []).append(resolve(source.topic) + text[len(source.topic) :])
     streams = {name: names[name][0] for name in STREAMS}
     return replace(given, **streams, covariates=tuple(names.get(COVARIATE, ())))
-
-
-def _with_use(known: RecordedTopic | None, other: RecordedTopic) -> RecordedTopic:
-    if known is None:
-        return other
-    uses = tuple(dict.fromkeys([*known.uses, *other.uses]))
-    return replace(known, uses=uses, expected=known.expected or other.expected)

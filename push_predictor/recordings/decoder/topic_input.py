@@ -25,6 +25,7 @@ from push_predictor.recordings.fields.sources import (
 )
 from push_predictor.types import IntArray
 
+_Part: TypeAlias = tuple[Messages | Columns, IntArray | None]  # and when they arrived, of a live topic
 _Recent: TypeAlias = tuple[IntArray, IntArray, frozenset[str]]  # stamps, when they arrived, frames
 LIMIT = 200_000  # live messages that wait: over 13 minutes at 250 Hz
 RECENT = 250  # samples that are kept for the report about a live topic
@@ -46,9 +47,8 @@ class TopicInput:
         self.foreign: Counter[str] = Counter()
         self.named: frozenset[str] = frozenset()
         self._reader: FieldReader | None = None
-        self._count = self._undecoded = 0  # of the messages that wait: all, and those that are not decoded
-        self._waiting: list[tuple[Messages, IntArray | None]] = []
-        self._decoded: list[Columns] = []
+        self._waiting: list[_Part] = []
+        self._count = 0  # of the messages that wait
         self._recent: list[_Recent] = []
         self._lock = threading.Lock()
 
@@ -77,10 +77,10 @@ class TopicInput:
         field = self.check(kind, schemas, where)
         reader = FieldReader(self.target, kind, field, definitions_of(kind, schemas), self._from_log)
         with self._lock:  # messages of an earlier type cannot be read as those of the new one
-            old, self._undecoded = self._undecoded, 0
+            old = sum(len(part) for part, _ in self._waiting if isinstance(part, Messages))
+            self._waiting = [each for each in self._waiting if isinstance(each[0], Columns)]
             self.dropped, self._count = self.dropped + old, self._count - old
-            self._waiting, self._recent = [], []
-            self.kind, self._reader = kind, reader
+            self.kind, self._reader, self._recent = kind, reader, []
 
     def put(self, messages: Messages, arrived: IntArray | None = None) -> None:
         """Add messages. arrived (n,): when they were received, ns, of a live topic."""
@@ -93,19 +93,11 @@ class TopicInput:
             self.received += len(messages)
             self._count += len(messages)
             self._waiting.append((messages, arrived))
-            self._undecoded += len(messages)
-            while arrived is not None and self._undecoded > LIMIT:  # the oldest first
-                old = len(self._waiting.pop(0)[0])
-                self.dropped, self._count = self.dropped + old, self._count - old
-                self._undecoded -= old
+            self._drop_oldest()
 
     def take(self) -> Columns:
         """The columns of the messages since the last call."""
-        self._decode()
-        decoded, self._decoded = self._decoded, []
-        with self._lock:
-            self._count -= sum(len(columns.stamp) for columns in decoded)
-        return _joined(decoded, self.target.count)
+        return _joined([columns for columns, _ in self._decoded(taken=True)], self.target.count)
 
     def usable(self, rules: Rules) -> Columns:
         """Of `take` those that are readable, in the expected frame and break no rule; the others are rejected."""
@@ -117,40 +109,38 @@ class TopicInput:
 
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
         """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
-        self._decode()
+        decoded = self._decoded(taken=False)
+        with self._lock:
+            self._waiting[:0] = decoded
+            self._drop_oldest()
         stamp, arrived = (
             np.concatenate([np.empty(0, np.int64), *of]) for of in ([r[k] for r in self._recent] for k in (0, 1))
         )
         return stamp[-RECENT:], arrived[-RECENT:], frozenset[str]().union(*(frames for _, _, frames in self._recent))
 
-    def _decode(self) -> None:
+    def _drop_oldest(self) -> None:
+        """Of a live topic, beyond LIMIT."""
+        while self._count > LIMIT and self._waiting and self._waiting[0][1] is not None:
+            old = len(self._waiting.pop(0)[0])
+            self.dropped, self._count = self.dropped + old, self._count - old
+
+    def _decoded(self, taken: bool) -> list[tuple[Columns, IntArray | None]]:
+        """What waited, as columns; taken: it waits no longer."""
         with self._lock:
-            waiting, self._waiting, self._undecoded = self._waiting, [], 0
-            reader = self._reader
-        if reader is None:
-            return
-        for messages, arrived in waiting:
-            columns = reader.read(messages)
-            self.named |= columns.named
-            self._decoded.append(columns)
-            if arrived is not None:
-                self._recent.append((columns.stamp[columns.valid], arrived[columns.valid], columns.named))
-        if waiting and waiting[-1][1] is not None:
-            self._drop_oldest()
+            waiting, reader, self._waiting = self._waiting, self._reader, []
+            self._count = 0 if taken else self._count
+        found: list[tuple[Columns, IntArray | None]] = []
+        for part, arrived in waiting:
+            if isinstance(part, Messages):
+                assert reader is not None, "messages wait only once their type is declared"
+                part = reader.read(part)
+                self.named |= part.named
+                if arrived is not None:
+                    self._recent.append((part.stamp[part.valid], arrived[part.valid], part.named))
+            found.append((part, arrived))
         while self._recent and sum(len(stamp) for stamp, _, _ in self._recent[1:]) >= RECENT:
             self._recent.pop(0)
-
-    def _drop_oldest(self) -> None:
-        """Of what is decoded, beyond LIMIT."""
-        excess = sum(len(columns.stamp) for columns in self._decoded) - LIMIT
-        while excess > 0:
-            first = self._decoded.pop(0)
-            old = min(excess, len(first.stamp))
-            if old < len(first.stamp):
-                self._decoded.insert(0, first.rows(slice(old, None)))
-            excess -= old
-            with self._lock:
-                self.dropped, self._count = self.dropped + old, self._count - old
+        return found
 
 
 def _joined(parts: Sequence[Columns], count: int) -> Columns:

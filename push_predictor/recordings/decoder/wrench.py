@@ -23,10 +23,9 @@ from push_predictor.recordings.decoder.rules import (
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.dropouts import CLOCK_SET
-from push_predictor.recordings.fields.pose_rows import at_tip, normalised, poses_at
+from push_predictor.recordings.fields.pose_rows import Z_UP, at_tip, normalised, poses_at, wrenches_z_up, z_up
 from push_predictor.recordings.fields.sources import WRENCH_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
-from push_predictor.recordings.fields.up_axis import Z_UP, wrenches_z_up, z_up
 from push_predictor.recordings.fields.wrench_bias import LEAST_FREE, WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import WrenchStream

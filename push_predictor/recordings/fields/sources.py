@@ -26,9 +26,7 @@ from push_predictor.recordings.bag.message_types import (
     type_at,
 )
 from push_predictor.recordings.bag.messages import Messages
-from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader
-from push_predictor.recordings.fields.elements import names as element_names
-from push_predictor.recordings.fields.elements import places
+from push_predictor.recordings.fields.columns import NUMBERS, Block, BlockReader, element_names, places_of
 from push_predictor.recordings.fields.pose_rows import pose_rows_of
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -160,6 +158,9 @@ class Columns:
     frames: tuple[str, ...]
     absent: BoolArray
 
+    def __len__(self) -> int:
+        return len(self.stamp)
+
     @property
     def named(self) -> frozenset[str]:
         """The frames of readable messages."""
@@ -200,7 +201,7 @@ class FieldReader:
         valid, absent, frame = np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.int64)
         for block in self._blocks.blocks(messages):
             absent[block.rows] = True
-            for steps, which in places(block, self._fields[0]):
+            for steps, which in places_of(block, self._fields[0]):
                 part, rows = block.where(which), block.rows[which]
                 if (found := self._numbers(part, steps)) is None:
                     continue
