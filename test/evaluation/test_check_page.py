@@ -24,7 +24,7 @@ from push_predictor.evaluation.check_page import (
     with_minus,
     write_check_page,
 )
-from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
+from push_predictor.recordings.checks.check import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table_file import write_table

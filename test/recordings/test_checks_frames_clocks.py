@@ -18,9 +18,8 @@ from stream_faults import held
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.clocks.push_lags import push_lags
-from push_predictor.recordings.checks.clocks.stage import clock_stage
-from push_predictor.recordings.checks.evidence import Evidence
+from push_predictor.recordings.checks.clocks import clock_stage, push_lags
+from push_predictor.recordings.checks.finding import Evidence
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed

@@ -13,7 +13,8 @@ import pytest
 from mistakes import outline_scaled, stream_part
 from repository import REPOSITORY
 
-from push_predictor.recordings.checks.motion import ContactFit, contact_fit, motion_of
+from push_predictor.recordings.checks.coverage import ContactFit, contact_fit
+from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

@@ -22,7 +22,7 @@ from push_predictor.geometry.shapes import mirror_image, transformed
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
-from push_predictor.recordings.checks.geometry.outline_findings import half_size
+from push_predictor.recordings.checks.outline_findings import half_size
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

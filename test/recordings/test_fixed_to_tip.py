@@ -12,7 +12,7 @@ import pytest
 from mistakes import on_hand, stream_part
 from synthetic import RADIUS, Push, translating_push
 
-from push_predictor.recordings.checks.frames.stage import fixed_to_tip
+from push_predictor.recordings.checks.frames import fixed_to_tip
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import Recording

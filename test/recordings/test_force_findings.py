@@ -15,10 +15,8 @@ from mistakes import force_scaled, force_turned
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.check import check_recording, evidence_of
-from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.force.stage import wrench_findings
-from push_predictor.recordings.checks.force.timing import rate_finding
+from push_predictor.recordings.checks.finding import Evidence, Finding
+from push_predictor.recordings.checks.force import rate_finding, wrench_findings
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.streams import Recording, WrenchStream, taken
 from push_predictor.recordings.windows.finder import find_windows

@@ -18,7 +18,7 @@ from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.contact import SLOWEST
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.force_timing import FEWEST, UNSEEN, ForceTiming, force_delay
+from push_predictor.recordings.windows.force import FEWEST, UNSEEN, ForceTiming, force_delay
 
 NAME = "ellipse_plywood"  # 15 pushes
 MANY = "square_abs_repeats"  # 80 pushes

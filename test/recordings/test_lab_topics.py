@@ -222,7 +222,7 @@ def test_interpolation_turns_evenly_the_shorter_way_round(angle: float, share: f
 
 
 def matrix(row: np.ndarray) -> np.ndarray:
-    from push_predictor.geometry.spatial import SpatialPose
+    from push_predictor.geometry.frames import SpatialPose
 
     found = np.eye(4)
     found[:3, :3], found[:3, 3] = SpatialPose(row[:3], row[3:]).rotation, row[:3]

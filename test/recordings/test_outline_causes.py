@@ -22,10 +22,10 @@ from push_predictor.geometry.shapes import ellipse, near_symmetry, rectangle, sh
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.geometry.outline_findings import outline_findings
-from push_predictor.recordings.checks.geometry.outline_fit import fit_outline
-from push_predictor.recordings.checks.geometry.stage import contacts_of
+from push_predictor.recordings.checks.geometry import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
+from push_predictor.recordings.checks.outline_findings import outline_findings
+from push_predictor.recordings.checks.outline_fit import fit_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 

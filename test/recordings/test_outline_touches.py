@@ -12,9 +12,9 @@ import pytest
 from checked_bags import bag, rig_of
 
 from push_predictor.geometry.shapes import transformed
-from push_predictor.recordings.checks.geometry.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem
-from push_predictor.recordings.checks.geometry.stage import contacts_of
+from push_predictor.recordings.checks.geometry import contacts_of
 from push_predictor.recordings.checks.motion import motion_of
+from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem
 
 CORRECTION = np.array([0.1, 0.003, -0.002, 0.05, 0.01, 0.001, 0.02, 0.004, 0.003, 0.06, 0.01, 0.002, -0.003])
 STEP = 1e-6

@@ -22,9 +22,8 @@ from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.finder import ScalarTrack, WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.scalar_track import ScalarTrack
 from push_predictor.types import Array
 
 SECOND = 10**9

@@ -24,10 +24,10 @@ from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.recordings.windows.repairs import regular_stamps
-from push_predictor.recordings.windows.repairs.regular_stamps import (
+from push_predictor.recordings.windows.regular_stamps import (
     AROUND,
     DECIDING,
     MOST_WIDTH,

@@ -14,9 +14,8 @@ from stream_faults import at_rate, extrapolated, held, in_bursts, lost, rounded,
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import ellipse, square
-from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
-from push_predictor.recordings.checks.streams.flips import without_flips
-from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
+from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies, without_flips
+from push_predictor.recordings.checks.streams.poses import StreamFacts, pose_facts
 from push_predictor.recordings.checks.streams.stage import in_order, repeated_samples
 from push_predictor.recordings.checks.streams.stamps import (
     clocks_never_meet,

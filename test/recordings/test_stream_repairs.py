@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 
 from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.repairs.continued import ContinuedPoses, continued
-from push_predictor.recordings.windows.repairs.flips import HeadingFlips
-from push_predictor.recordings.windows.repairs.held import HeldPoses
-from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps, stamp_noise
-from push_predictor.recordings.windows.repairs.resolution import Resolution
-from push_predictor.recordings.windows.repairs.smoothing import SmoothedPoses
+from push_predictor.recordings.windows.flips import HeadingFlips
+from push_predictor.recordings.windows.regular_stamps import RegularStamps, stamp_noise
+from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses
 from push_predictor.recordings.windows.slow import SlowPoses
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, taken
 from push_predictor.recordings.windows.track import Track
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses, continued
 from push_predictor.types import Array, IntArray
 
 MS = 1_000_000

@@ -14,16 +14,13 @@ from stream_faults import at_rate, extrapolated, flipped, held, in_bursts, lost,
 
 from push_predictor.recordings.streams import PoseStream, Recording, joined
 from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.repairs.bursts import burst_period, missing_in_bursts
-from push_predictor.recordings.windows.repairs.chain import StreamRepairs
-from push_predictor.recordings.windows.repairs.continued import continued
-from push_predictor.recordings.windows.repairs.flips import HeadingFlips
-from push_predictor.recordings.windows.repairs.held import HeldPoses
-from push_predictor.recordings.windows.repairs.resolution import Resolution
-from push_predictor.recordings.windows.repairs.smoothing import SPEED_ERROR, fit_span
+from push_predictor.recordings.windows.regular_stamps import burst_period, missing_in_bursts
+from push_predictor.recordings.windows.resolution import SPEED_ERROR, Resolution, fit_span
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
-from push_predictor.recordings.windows.track import Track
+from push_predictor.recordings.windows.track import StreamRepairs, Track
+from push_predictor.recordings.windows.unmeasured import HeldPoses, continued
 from push_predictor.types import Array, IntArray
 
 NAME = "ellipse_plywood"

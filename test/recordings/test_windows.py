@@ -19,7 +19,7 @@ from push_predictor.recordings.streams import PoseStream, Recording, taken
 from push_predictor.recordings.windows.contact import ContactSamples
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.force_zero import TARE_SAMPLES
+from push_predictor.recordings.windows.force import TARE_SAMPLES
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 from push_predictor.recordings.windows.track import Track

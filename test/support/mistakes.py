@@ -14,7 +14,7 @@ from repository import REPOSITORY
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.recordings.checks.geometry.stage import swapped
+from push_predictor.recordings.checks.geometry import swapped
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The part of the domain that pushes cover: their number, sides, speeds, angles and the share of sliding contacts."""
+"""The part of the domain that pushes cover, by number, side, speed, angle and sliding; how contacts fit the outline."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.geometry.frames import to_body
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
+from push_predictor.recordings.checks.motion import Motion
+from push_predictor.recordings.dropouts import longest_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
@@ -25,6 +28,7 @@ FEWEST_STEPS = 20  # from one window of a push to the next
 MOST_SIDES = 12  # an outline with more vertices is divided into quarters
 MIDDLE = (5.0, 95.0)  # percentiles
 NAMED = 4  # sides
+OFF = 0.001  # m from the outline
 MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
@@ -207,3 +211,71 @@ def _without_need(finding: Finding, coverage: Coverage) -> str:
 
 def _contained(coverage: Coverage) -> str:
     return f"The data contain {coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
+
+
+# --- how the contacts lie on the outline ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ContactFit:
+    """The contacts of a recording against the outline of its rig, as given.
+
+    samples: in contact, judged by motion alone. inside, off: shares of them with the tip over OFF inside the outline,
+    or away from it. side: "side" or "quarter"; gaps: median gap (m, negative inside) on each, counter-clockwise from
+    the first vertex, None without a contact. contact_time, window_time: s in contact, and in windows; the latter None
+    where no windows were searched for.
+    """
+
+    samples: int
+    inside: float
+    off: float
+    side: str
+    gaps: tuple[float | None, ...]
+    contact_time: float
+    window_time: float | None
+
+    @property
+    def lost(self) -> float | None:
+        """Share of the time in contact that is in no window, None where no windows were searched for."""
+        if self.window_time is None:
+            return None
+        return max(0.0, 1.0 - self.window_time / self.contact_time)
+
+    def record(self) -> dict[str, object]:
+        """The entry in the JSON."""
+        return {
+            "samples": self.samples,
+            "inside_share": self.inside,
+            "off_share": self.off,
+            "gap_by_side": list(self.gaps),
+            "contact_time": self.contact_time,
+            "window_time": self.window_time,
+            "lost_share": self.lost,
+        }
+
+
+def contact_fit(motion: Motion | None, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
+    """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
+    if motion is None or not motion.contact.any():
+        return None
+    touch = motion.contact
+    nearest = rig.outline.project(to_body(motion.tip, motion.slider)[touch])
+    gap, (index, count, side) = nearest.distance - rig.pusher_radius, sides_of(rig.outline, nearest.contact)
+    gaps = [float(np.median(gap[index == k])) if np.any(index == k) else None for k in range(count)]
+    return ContactFit(
+        samples=int(np.sum(touch)),
+        inside=float(np.mean(gap < -OFF)),
+        off=float(np.mean(gap > OFF)),
+        side=side,
+        gaps=tuple(gaps),
+        contact_time=_contact_time(motion),
+        window_time=None if table is None else float(np.sum(table.duration)),
+    )
+
+
+def _contact_time(motion: Motion) -> float:
+    """Time (s) from samples in contact to the next ones, without dropouts."""
+    step = np.diff(motion.time)
+    period = float(np.median(step))
+    step = np.append(np.where(step > longest_interval(period), period, step), period)
+    return float(np.sum(step[motion.contact]))

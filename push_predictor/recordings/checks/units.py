@@ -1,26 +1,32 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lengths in millimetres, angles in degrees, times in milliseconds."""
+"""Lengths in millimetres, angles in degrees, times in milliseconds; orientations of another order or frame."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames.orientation import OUTRUN, STEEP, TRAVEL, every, tilt_of, turn_and_path
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 FASTEST = 2.0  # m/s of a pusher
 LARGEST = 2.0  # m: reach of a slider
 HIGHEST_RATE = 20e3  # Hz of samples
 LOWEST_RATE = 1.0  # Hz
-LONGEST = 30.0  # s of a table's row
 SPEED_SPAN = 0.1  # s between the poses whose speed is judged
 PUSHER_MM = "Give positions in metres: divide by 1000."
+STILL = 1e-5  # rad; a tracker's noise is larger
+STEEP = np.radians(45.0)  # a slider lies flat, while w read as x rolls it by pi minus its heading
+OVERTURNED = np.pi - STEEP  # from here on the z axis points down
+FROZEN = 0.2  # rad; w read as x leaves a heading of about twice the true tilt
+COVERED = 95.0  # percentile: few samples may be tracked wrongly
+TRAVEL = 0.02  # m of a slider that also turns
+OUTRUN = 5.0  # path lengths; a slider does not turn by more of its own reach
+TURN_SPAN = 0.05  # s between the poses whose turns are summed
 
 
 def stream_rates(recording: Recording) -> list[Finding]:
@@ -32,7 +38,7 @@ def stream_rates(recording: Recording) -> list[Finding]:
 
 def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
     """Findings about the units of lengths and angles of a recording's streams and rig."""
-    found = [_rig_length(rig)]
+    found = [rig_length(rig)]
     found += [
         _speed(name, stream)
         for name, stream in (("slider", recording.slider), ("pusher", recording.pusher))
@@ -43,33 +49,8 @@ def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
-def table_units(table: PushTable, rig: Rig | None = None) -> list[Finding]:
-    """Findings about the units of a table's columns."""
-    velocity, path = table.inputs[:, 0], table.inputs[:, 0] * table.duration
-    shift, turn = np.hypot(table.outcomes[:, 0], table.outcomes[:, 1]), np.abs(table.outcomes[:, 2])
-    found = [] if rig is None else [_rig_length(rig)]
-    if len(table):
-        found += [
-            _column("velocity", "mm/s", np.median(velocity), FASTEST, "m/s"),
-            _column("duration", "ms", np.median(table.duration), LONGEST, "s"),
-            _column("dtheta", "degrees", np.percentile(turn, 99.0), np.pi, "rad"),
-        ]
-        if not any(found):
-            ratio = float(np.median(shift / np.maximum(path, 1e-9)))
-            found.append(_column("dx and dy", "mm", ratio, OUTRUN, "path lengths of the tip"))
-    return [finding for finding in found if finding is not None]
-
-
-def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding | None:
-    if value <= most:
-        return None
-    sentence = f"{name} reaches {value:.4g} {of}, more than {most:.3g}: the unit is probably {unit}."
-    return Finding(
-        f"units_{name.split()[0]}", "refused", sentence, "Give m, rad and s.", {name: Value(float(value), of)}
-    )
-
-
-def _rig_length(rig: Rig) -> Finding | None:
+def rig_length(rig: Rig) -> Finding | None:
+    """A finding if the rig's lengths are in millimetres."""
     size = rig.outline.reach
     if max(size, rig.pusher_radius) < LARGEST:
         return None
@@ -124,3 +105,66 @@ def _weighted_median(values: Array, weights: Array) -> float:
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+# --- orientations: w first, not recorded, or of a tracked frame whose z axis is not up --------------------------------
+
+
+def orientation_finding(slider: PoseStream, rig: Rig) -> Finding | None:
+    """A finding if the orientations of a slider that moves have another order of components, or are missing.
+
+    The z axis of its tracked frame may point down or sideways, as long as its x axis shows the heading.
+    """
+    x, y = slider.x[np.isfinite(slider.x)], slider.y[np.isfinite(slider.y)]
+    if not (len(x) and len(y)) or np.hypot(np.ptp(x), np.ptp(y)) < TRAVEL:
+        return None
+    tilt, largest = tilt_of(slider), float(np.nanmax(np.abs(slider.heading)))
+    if tilt > STEEP:
+        return _tilted(slider, rig, tilt)
+    if largest > STILL:
+        return None
+    sentence = "The slider moves and its heading is exactly 0 throughout: its orientation is probably not recorded."
+    return Finding("heading_constant", "refused", sentence, "Record the orientation of the slider.")
+
+
+def tilt_of(slider: PoseStream) -> float:
+    """The tilt (rad) that few samples exceed. The median would be small for w first and headings near pi."""
+    return 0.0 if slider.tilt is None or not len(slider.tilt) else float(np.nanpercentile(slider.tilt, COVERED))
+
+
+def has_heading(slider: PoseStream) -> bool:
+    """Whether the z axis is near the vertical, up or down: with it level, the x axis may be vertical."""
+    return not STEEP < tilt_of(slider) < OVERTURNED
+
+
+def turn_and_path(slider: PoseStream) -> tuple[float, float]:
+    """How far the slider turns (rad) and moves (m) in all; a pushed one turns about as far, in terms of its size."""
+    usable = np.isfinite(slider.x + slider.y + slider.heading)
+    pose = np.column_stack([slider.x, slider.y, slider.heading])[usable]
+    step = np.diff(pose[every(slider, TURN_SPAN)], axis=0)
+    return float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
+
+
+def every(stream: PoseStream, span: float) -> slice:
+    """Samples about `span` s apart."""
+    step = np.diff(stream.stamp)
+    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
+    return slice(None, None, max(1, round(span / max(period, 1e-6))))
+
+
+def _tilted(slider: PoseStream, rig: Rig, tilt: float) -> Finding:
+    values, up = (
+        {"tilt": Value(tilt, "rad")},
+        f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical",
+    )
+    if float(np.nanpercentile(np.abs(slider.heading), COVERED)) < FROZEN:
+        sentence = f"{up} and its heading does not change: the quaternion's order is probably w, x, y, z."
+        return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.", values)
+    turn, path = turn_and_path(slider)
+    if turn * rig.outline.reach > OUTRUN * max(path, TRAVEL):
+        sentence = f"{up}, and its x axis too is near the vertical: its heading is unknown."
+        return Finding("slider_tilted", "refused", sentence, "Give a tracked frame whose z axis points up.", values)
+    where = "points down" if tilt > OVERTURNED else "is level"
+    sentence = f"{up}: it {where}. The heading is that of the x axis, seen from above."
+    advice = "Give the outline as seen from above, y to the left of x, or a tracked frame whose z axis points up."
+    return Finding("slider_tilted", "warning", sentence, advice, values)

@@ -14,9 +14,9 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
 from push_predictor.recordings.windows.cut import WindowCutter
+from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.repairs.flips import HeadingFlips
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, BoolArray, IntArray
 

@@ -16,8 +16,8 @@ from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
-from push_predictor.recordings.windows.parts import part_lines, part_means, part_rows
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.resolution import part_lines, part_means, part_rows
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
 

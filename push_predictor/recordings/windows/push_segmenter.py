@@ -11,8 +11,7 @@ from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import taken
 from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSamples
 from push_predictor.recordings.windows.cut import PushContext
-from push_predictor.recordings.windows.force_timing import ForceTiming
-from push_predictor.recordings.windows.force_zero import ForceZero
+from push_predictor.recordings.windows.force import ForceTiming, ForceZero
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
 from push_predictor.types import BoolArray
 

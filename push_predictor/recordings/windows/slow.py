@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import DROPOUT_PERIODS, NANOSECOND, SHORTEST_DROPOUT
-from push_predictor.recordings.windows.repairs.resolution import lengths
+from push_predictor.recordings.windows.resolution import lengths
 from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 

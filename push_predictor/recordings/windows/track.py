@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One stream while samples arrive: stamp order, dropouts, jumps, interpolation."""
+"""One stream while samples arrive: stamp order, repairs, dropouts, jumps, interpolation."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.chain import StreamRepairs
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
+from push_predictor.recordings.windows.regular_stamps import RegularStamps
+from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses, lengths
+from push_predictor.recordings.windows.slow import SlowPoses
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, StampOrder, with_values
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
 from push_predictor.types import Array, BoolArray, IntArray
 
 PERIOD_SAMPLES = 50  # intervals that determine the period: the first ones, so that later samples do not change it
@@ -136,3 +139,54 @@ class Track:
         if self._angle is not None:
             jump = jump | (np.abs(wrap_angle(step[:, self._angle])) > JUMP_ANGLE + JUMP_TURN_RATE * elapsed)
         return np.asarray(jump)
+
+
+# --- repairs of a stream in order: poses not measured, jitter of stamps, a coarse resolution, a low rate --------------
+
+
+class StreamRepairs:
+    """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
+
+    continued, held, smoothed, slow: None for a stream without a position. The result does not depend on the portions.
+    """
+
+    def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
+        """is_jump: of poses whose first two columns are a position, m; None for other streams.
+
+        angle: index of the column with a heading, rad, which is unwrapped; None without one.
+        """
+        self.regular = RegularStamps()
+        self.continued = None if is_jump is None else ContinuedPoses(angle)
+        self.held = None if is_jump is None else HeldPoses(angle)
+        self.smoothed = None if is_jump is None else SmoothedPoses(angle)
+        self.slow = None if is_jump is None else SlowPoses(is_jump, angle)
+        self._resolution = Resolution(2 if angle is None else 3)
+        self._angle = angle
+        self._heading: Array = np.empty(0)  # the last one, rad
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return self.regular.waiting + sum(
+            step.waiting for step in (self.continued, self.held, self.smoothed, self.slow) if step is not None
+        )
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        if self.continued is None or self.held is None or self.smoothed is None or self.slow is None:
+            return self.regular.take(new, final)
+        values = self._unwrapped(new.values)
+        # The repair of one must not hide the resolution from the next: they get it as a further column.
+        quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
+        new = with_values(new, np.column_stack([values, quantum]))
+        for step in (self.continued, self.held, self.regular, self.smoothed, self.slow):
+            new = step.take(new, final)
+        return with_values(new, new.values[:, :-1])
+
+    def _unwrapped(self, values: Array) -> Array:
+        if self._angle is None or not len(values):
+            return values
+        values = values.copy()
+        heading = np.unwrap(np.concatenate([self._heading, values[:, self._angle]]))
+        values[:, self._angle], self._heading = heading[len(self._heading) :], heading[-1:]
+        return values

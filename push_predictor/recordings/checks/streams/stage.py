@@ -13,13 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames.orientation import has_heading
-from push_predictor.recordings.checks.streams.facts import StreamFacts, pose_facts
-from push_predictor.recordings.checks.streams.flips import without_flips
-from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies
-from push_predictor.recordings.checks.streams.quality import UNSEEN, quality_findings
+from push_predictor.recordings.checks.finding import Evidence, Finding, Value
+from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies, without_flips
+from push_predictor.recordings.checks.streams.poses import UNSEEN, StreamFacts, pose_facts, quality_findings
 from push_predictor.recordings.checks.streams.stamps import (
     clocks_never_meet,
     regular_in_bursts,
@@ -27,12 +23,12 @@ from push_predictor.recordings.checks.streams.stamps import (
     stamps_of,
     unset_stamps,
 )
-from push_predictor.recordings.checks.units import stream_rates, stream_units
+from push_predictor.recordings.checks.units import has_heading, stream_rates, stream_units
 from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.streams import PoseStream, Recording, Stream, repeated, taken
-from push_predictor.recordings.windows.repairs.continued import continued
 from push_predictor.recordings.windows.stamp_order import StampOrder
 from push_predictor.recordings.windows.track import Track
+from push_predictor.recordings.windows.unmeasured import continued
 
 FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that has facts
@@ -61,7 +57,7 @@ def stream_stage(evidence: Evidence) -> Evidence:
     found += lost
     facts, sound = _facts(sound, headed)
     found += [*quality_findings(facts), *stamp_findings(stamps)]
-    return replace(evidence.found(found, sound), facts=facts)
+    return evidence.found(found, sound)
 
 
 def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:

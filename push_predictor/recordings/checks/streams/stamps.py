@@ -12,8 +12,14 @@ import numpy as np
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
 from push_predictor.recordings.streams import PoseStream, Recording
-from push_predictor.recordings.windows.repairs.bursts import LEAST_TOGETHER, TOGETHER, burst_period
-from push_predictor.recordings.windows.repairs.regular_stamps import DECIDING, RegularStamps, stamp_noise
+from push_predictor.recordings.windows.regular_stamps import (
+    DECIDING,
+    LEAST_TOGETHER,
+    TOGETHER,
+    RegularStamps,
+    burst_period,
+    stamp_noise,
+)
 from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.types import IntArray
 

@@ -1,10 +1,15 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
+
 """Regular stamps in place of noisy ones while samples arrive.
 
 A window interpolates single samples, so its outcome gets the error of their stamps. Where the first samples of a stream
 show jitter, each stamp is replaced by that of a line through the samples around it, over their numbers in a regular
 grid. Streams with less jitter, or without a grid, keep their stamps.
+
+Stamps of receipt may be in bursts, of a capture at a regular rate: some samples are held up and arrive together. Most
+arrive soon: their stamps lie on a line over their numbers, the others above it. A low percentile of the deviations
+around a sample finds the line, however long the others were held up.
 """
 
 from __future__ import annotations
@@ -15,14 +20,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.bursts import (
-    LEAST_TOGETHER,
-    TOGETHER,
-    WIDTH,
-    burst_period,
-    low_of,
-    missing_in_bursts,
-)
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -40,6 +37,12 @@ AROUND = 50  # samples before and after one that determine its stamp
 ROWS = 4096  # stamps that are fitted at once: each needs its neighbours' in memory, 1 kB a time
 BURST_PERIODS = 12.0  # in which samples may be held up: a longer interval is a gap
 KEPT = max(AROUND, 5 * MOST_WIDTH)  # samples that are kept before those that were not returned yet
+TOGETHER = 0.25  # of the period: intervals below it are of samples that arrive together
+LEAST_TOGETHER = 0.1  # of the intervals
+SOON = 0.2  # of the period: stamps of samples that were not held up are so near to the line
+LEAST_SOON = 0.5  # of the samples
+LOW = 30.0  # percentile of the deviations on the line: below the share of samples that were not held up
+WIDTH = 21  # samples on either side that show a missing one
 
 
 @dataclass(frozen=True)
@@ -262,3 +265,44 @@ def missing_before(stamp: IntArray, noise: StampNoise) -> IntArray:
     peak = (excess == largest) & (count > 0)
     found[2 * w : 2 * w + len(excess)] = np.where(peak, count, 0)
     return found
+
+
+# --- bursts -----------------------------------------------------------------------------------------------------------
+
+
+def burst_period(stamp: IntArray) -> float | None:
+    """The period (s) of a capture whose stamps (n,) ns are in bursts, None if they are not, or follow no line."""
+    n = len(stamp)
+    if n < 2 * WIDTH:
+        return None
+    half = n // 2
+    period = float(np.median(stamp[half:] - stamp[: n - half])) / half
+    if period <= 0.0 or np.mean(np.diff(stamp) < TOGETHER * period) < LEAST_TOGETHER:
+        return None
+    deviation = (stamp - stamp[0]) - period * np.arange(n)
+    soon = np.abs(deviation - np.percentile(deviation, LOW)) < SOON * period
+    return period * NANOSECOND if np.mean(soon) >= LEAST_SOON else None
+
+
+def missing_in_bursts(stamp: IntArray, period: float) -> IntArray:
+    """How many samples of the grid are missing before each of n samples; zero for the first and last WIDTH."""
+    n = len(stamp)
+    found = np.zeros(n, np.int64)
+    if n < 2 * WIDTH + 1:
+        return found
+    late = (stamp - stamp[0]) * NANOSECOND - period * np.arange(n)
+    low = np.percentile(sliding_window_view(late, WIDTH), LOW, axis=1)
+    step = low[WIDTH:] - low[:-WIDTH]  # at a place WIDTH later
+    largest = sliding_window_view(np.pad(step, WIDTH, constant_values=-np.inf), 2 * WIDTH + 1).max(axis=1)
+    count = np.rint(step / period).astype(np.int64)
+    peak = (step == largest) & (count > 0)
+    peak[1:] &= ~peak[:-1]
+    found[WIDTH : WIDTH + len(step)] = np.where(peak, count, 0)
+    return found
+
+
+def low_of(late: Array, inside: BoolArray) -> Array:
+    """The deviation (m,) of those that arrived soon, among the deviations (m, k) that are inside a run."""
+    late = np.sort(np.where(inside, late, np.inf), axis=1)
+    low = (0.01 * LOW * (inside.sum(axis=1) - 1)).astype(np.int64)
+    return np.asarray(late[np.arange(len(late)), low])

@@ -16,7 +16,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.geometry.outline_fit import (
+from push_predictor.recordings.checks.outline_fit import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,

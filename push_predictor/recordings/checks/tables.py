@@ -1,12 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The signs of a table's dy and dtheta, against what quasi-static mechanics decides for any pressure and friction.
+"""Check a push table: its units, and the signs of dy and dtheta.
 
-The force of a tip whose velocity is outside the friction cone lies between the normal and the velocity. The slider's
-centre follows the force: dy has the sign of minus the angle. The slider turns as the force turns it. Inside the cone it
-turns as two of three lines do, the cone's edges and the velocity (the voting theorem of Mason, 1986). Only rows in
-which all lines agree are judged.
+Quasi-static mechanics decides the signs for any pressure and friction. The force of a tip whose velocity is outside the
+friction cone lies between the normal and the velocity. The slider's centre follows the force: dy has the sign of minus
+the angle. The slider turns as the force turns it. Inside the cone it turns as two of three lines do, the cone's edges
+and the velocity (the voting theorem of Mason, 1986). Only rows in which all lines agree are judged.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.units import FASTEST, OUTRUN, rig_length
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
+LONGEST = 30.0  # s of a row
 CONE, NARROW = np.radians(25.0), np.radians(3.0)  # half angles of friction cones: coefficients of 0.47 and 0.05
 FEWEST = 10  # rows
 WRONG = -0.5  # agreement below which the sign is wrong; it is from -1 to 1, and near 1 in sound data
@@ -37,6 +39,37 @@ class Agreement(NamedTuple):
     def wrong(self) -> bool:
         """Whether the sign is wrong, in enough rows."""
         return self.rows >= FEWEST and self.share < WRONG
+
+
+def check_table(table: PushTable, rig: Rig | None = None) -> tuple[Finding, ...]:
+    """The probable mistakes of a push table, none if it is sound."""
+    return tuple(table_units(table, rig) or table_signs(table, rig))
+
+
+def table_units(table: PushTable, rig: Rig | None = None) -> list[Finding]:
+    """Findings about the units of a table's columns."""
+    velocity, path = table.inputs[:, 0], table.inputs[:, 0] * table.duration
+    shift, turn = np.hypot(table.outcomes[:, 0], table.outcomes[:, 1]), np.abs(table.outcomes[:, 2])
+    found = [] if rig is None else [rig_length(rig)]
+    if len(table):
+        found += [
+            _column("velocity", "mm/s", np.median(velocity), FASTEST, "m/s"),
+            _column("duration", "ms", np.median(table.duration), LONGEST, "s"),
+            _column("dtheta", "degrees", np.percentile(turn, 99.0), np.pi, "rad"),
+        ]
+        if not any(found):
+            ratio = float(np.median(shift / np.maximum(path, 1e-9)))
+            found.append(_column("dx and dy", "mm", ratio, OUTRUN, "path lengths of the tip"))
+    return [finding for finding in found if finding is not None]
+
+
+def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding | None:
+    if value <= most:
+        return None
+    sentence = f"{name} reaches {value:.4g} {of}, more than {most:.3g}: the unit is probably {unit}."
+    return Finding(
+        f"units_{name.split()[0]}", "refused", sentence, "Give m, rad and s.", {name: Value(float(value), of)}
+    )
 
 
 def table_signs(table: PushTable, rig: Rig | None = None) -> list[Finding]:

@@ -15,10 +15,9 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
-from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames.orientation import orientation_finding
-from push_predictor.recordings.checks.geometry.outline_findings import (
+from push_predictor.recordings.checks.finding import Evidence, Finding, Value
+from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
     LAG_ALLOWANCE,
     TIP_POSE,
@@ -27,7 +26,7 @@ from push_predictor.recordings.checks.geometry.outline_findings import (
     tip_offset,
     unchecked,
 )
-from push_predictor.recordings.checks.geometry.outline_fit import (
+from push_predictor.recordings.checks.outline_fit import (
     LAG,
     SIZE,
     TIE,
@@ -37,7 +36,7 @@ from push_predictor.recordings.checks.geometry.outline_fit import (
     Y,
     fit_outline,
 )
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
