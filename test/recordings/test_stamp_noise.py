@@ -55,7 +55,7 @@ def noisy(stamp: IntArray, sd: float, seed: int = 0) -> IntArray:
 
 
 def samples(stamp: IntArray) -> OrderedSamples:
-    return OrderedSamples(stamp, np.arange(len(stamp))[:, None] * 1.0, np.zeros(len(stamp), np.bool_), False)
+    return OrderedSamples(stamp, np.arange(len(stamp))[:, None] * 1.0, np.zeros(len(stamp), np.bool_))
 
 
 def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
@@ -64,7 +64,7 @@ def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
     whole = samples(stamp)
     for first in [*range(0, len(stamp), portion), len(stamp)]:
         rows = slice(first, first + portion)
-        part = OrderedSamples(whole.stamp[rows], whole.values[rows], whole.interrupted[rows], False)
+        part = OrderedSamples(whole.stamp[rows], whole.values[rows], whole.interrupted[rows])
         parts.append(taker.take(part, final=first == len(stamp)))
     assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values) and not taker.waiting
     return np.concatenate([part.stamp for part in parts])

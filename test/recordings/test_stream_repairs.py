@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.streams import PoseStream, taken
 from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.regular_stamps import RegularStamps, stamp_noise
 from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses
 from push_predictor.recordings.windows.slow import SlowPoses
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, taken
+from push_predictor.recordings.windows.stamp_order import OrderedSamples
 from push_predictor.recordings.windows.track import Track
 from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses, continued
 from push_predictor.types import Array, IntArray
@@ -26,7 +26,7 @@ def samples(x: Array, period: float = 10.0, quantum: float = 0.0) -> OrderedSamp
     """Samples of a body at places x (n,) m on a line, as the repairs get them; period in ms."""
     none = np.zeros(len(x))
     values = np.column_stack([x, none, none, none, none + quantum])
-    return OrderedSamples(times(len(x), period), values, np.zeros(len(x), np.bool_), False)
+    return OrderedSamples(times(len(x), period), values, np.zeros(len(x), np.bool_))
 
 
 def times(count: int, period: float = 10.0) -> IntArray:
@@ -160,9 +160,9 @@ def test_continued_poses_are_left_out_portion_by_portion(portion: int) -> None:
     step, found = ContinuedPoses(None), []
     for begin in range(0, 200, portion):
         now = slice(begin, begin + portion)
-        found.append(step.take(OrderedSamples(stream.stamp[now], rows[now], np.zeros(200, np.bool_)[now], False)))
+        found.append(step.take(OrderedSamples(stream.stamp[now], rows[now], np.zeros(200, np.bool_)[now])))
         assert step.waiting <= 31
-    found.append(step.take(OrderedSamples(stream.stamp[:0], rows[:0], np.zeros(0, np.bool_), False), final=True))
+    found.append(step.take(OrderedSamples(stream.stamp[:0], rows[:0], np.zeros(0, np.bool_)), final=True))
     wanted = ~continued(stream, angle=False)
     assert np.sum(~wanted) == 36 and step.waiting == 0
     assert np.array_equal(np.concatenate([each.stamp for each in found]), stream.stamp[wanted])
@@ -173,8 +173,7 @@ def test_a_line_of_over_two_seconds_is_a_motion_and_is_not_waited_for() -> None:
     rows = np.column_stack([stream.x, stream.y, np.zeros((400, 2))])
     step = ContinuedPoses(None)
     given = [
-        step.take(OrderedSamples(stream.stamp[k : k + 1], rows[k : k + 1], np.zeros(1, np.bool_), False))
-        for k in range(300)
+        step.take(OrderedSamples(stream.stamp[k : k + 1], rows[k : k + 1], np.zeros(1, np.bool_))) for k in range(300)
     ]
     assert step.waiting <= 1 and sum(len(each.stamp) for each in given) >= 299
     assert not continued(stream, angle=False).any()
@@ -259,9 +258,9 @@ def inside(found: OrderedSamples, begin: int, end: int) -> int:
 def test_poses_are_put_between_those_of_a_slow_stream_but_not_where_it_breaks() -> None:
     plain = samples(steps((40, 2.0)), SLOW)
     late = plain.stamp + np.where(np.arange(41) < 20, 0, 1000 * MS)
-    gap = OrderedSamples(late, plain.values, plain.interrupted, False)
+    gap = OrderedSamples(late, plain.values, plain.interrupted)
     jump = samples(steps((19, 2.0), (1, 200.0), (20, 2.0)), SLOW)
-    missing = OrderedSamples(plain.stamp, plain.values, np.arange(41) == 20, False)
+    missing = OrderedSamples(plain.stamp, plain.values, np.arange(41) == 20)
     for recorded in (gap, jump, missing):
         found = filled(recorded)
         assert inside(found, int(recorded.stamp[19]), int(recorded.stamp[20])) == 0
@@ -316,7 +315,7 @@ def test_poses_that_arrive_together_lie_on_the_line_of_those_that_arrived_soon()
     late = np.where(np.arange(606) % 6 < 3, 0, 1) * (19 - 20 * (np.arange(606) % 6 - 3)) * MS
     late[300:305] = (160 - 20 * np.arange(5)) * MS + np.arange(5)  # held up for eight periods
     stamp = np.maximum.accumulate(true + np.maximum(late, 0)) + np.arange(606)
-    recorded = OrderedSamples(stamp, np.zeros((606, 1)), np.zeros(606, np.bool_), False)
+    recorded = OrderedSamples(stamp, np.zeros((606, 1)), np.zeros(606, np.bool_))
     taker, whole = RegularStamps(), RegularStamps().take(recorded, final=True).stamp
     parts = [taker.take(taken(recorded, slice(k, k + 50)), final=k == 600) for k in range(0, 606, 50)]
     assert taker.noise is not None and taker.noise.bursts
@@ -331,7 +330,7 @@ def test_the_noise_of_stamps_is_that_of_the_last_block() -> None:
     rng = np.random.default_rng(0)
     stamp = times(300) + np.where(np.arange(300) < 101, 0, 300_000 * rng.standard_normal(300)).astype(np.int64)
     taker = RegularStamps()
-    taker.take(OrderedSamples(stamp, np.zeros((300, 1)), np.zeros(300, np.bool_), False), final=True)
+    taker.take(OrderedSamples(stamp, np.zeros((300, 1)), np.zeros(300, np.bool_)), final=True)
     assert taker.noise is not None and not taker.corrected
     assert taker.noise.jitter == pytest.approx(3e-4, rel=0.4)
 

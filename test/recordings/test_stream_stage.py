@@ -235,7 +235,7 @@ def test_a_body_at_rest_without_noise_keeps_its_poses() -> None:
     x = 0.05 * np.clip(time - 1.0, 0.0, 1.5)
     stamp = np.rint(1e9 * time).astype(np.int64)
     values = np.column_stack([x, 0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x])
-    taken = HeldPoses(3).take(OrderedSamples(stamp, values, np.zeros(400, np.bool_), False), final=True)
+    taken = HeldPoses(3).take(OrderedSamples(stamp, values, np.zeros(400, np.bool_)), final=True)
     assert np.array_equal(taken.stamp, stamp) and np.array_equal(taken.values, values)
 
 
@@ -261,7 +261,7 @@ def test_repairs_do_not_depend_on_the_portions(sound: Recording, windows: list[P
 
 
 def samples(stamp: IntArray, values: Array) -> OrderedSamples:
-    return OrderedSamples(stamp, values, np.zeros(len(stamp), np.bool_), False)
+    return OrderedSamples(stamp, values, np.zeros(len(stamp), np.bool_))
 
 
 # --- resolution, rate, noise ------------------------------------------------------------------------------------------

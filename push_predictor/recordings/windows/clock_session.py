@@ -100,10 +100,10 @@ class ClockSession:
         ordered = track.order.take(stamp, values, final)
         if self._origin is None and len(ordered.stamp):
             self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(track.repairs.take(ordered, final or ordered.clock_set), self._origin or 0)
-        if ordered.clock_set:
+        track.extend(track.repairs.take(ordered, final or track.order.clock_set), self._origin or 0)
+        if track.order.clock_set:
             self.clocks_set.add(name)
-        return ordered.clock_set
+        return track.order.clock_set
 
     def find(self, final: bool) -> list[PushWindow]:
         """Evaluate the samples that all streams have passed; returns the windows completed by them."""

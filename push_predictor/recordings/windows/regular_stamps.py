@@ -14,13 +14,14 @@ around a sample finds the line, however long the others were held up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
+from push_predictor.recordings.streams import joined, taken
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
 SHARE = 0.05  # of the period: less jitter stays, as a window hardly feels it
@@ -87,7 +88,7 @@ class RegularStamps:
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose stamps are known; with `final` all are."""
         if self._held is not None:
-            new, self._held = joined(self._held, new), None
+            new, self._held = joined([self._held, new]), None
         if self.noise is None and len(new.stamp) < DECIDING:
             if not final:
                 self._held = new
@@ -97,7 +98,7 @@ class RegularStamps:
         if self.noise is None or not self.corrected:
             return new
         regular = self._regular(taken(new, slice(count, None)), self.noise, final)
-        return joined(taken(new, slice(0, count)), regular)
+        return joined([taken(new, slice(0, count)), regular])
 
     def _undisturbed(self, stamp: IntArray) -> int:
         """How many of these samples come before jitter shows: that of the first block corrects this block as well."""
@@ -125,42 +126,36 @@ class RegularStamps:
             if number or self._segment is None:
                 if self._segment is not None:
                     found.append(self._segment.take(taken(new, rows[:0]), closed=True))
-                self._segment = _Segment(noise, taken(new, slice(0, 0)))
+                self._segment = _Segment(noise)
             found.append(self._segment.take(taken(new, rows)))
         if final and self._segment is not None:
             found.append(self._segment.take(taken(new, np.empty(0, np.int64)), closed=True))
             self._segment = None
         self._last = int(new.stamp[-1]) if len(new.stamp) else self._last
-        return joined(*found) if found else new
+        return joined(found) if found else new
 
 
-class _Segment:
+class _Segment(Portions):
     """An uninterrupted run of samples; number: of each in the grid, as far as it is known."""
 
-    def __init__(self, noise: StampNoise, nothing: OrderedSamples) -> None:
+    def __init__(self, noise: StampNoise) -> None:
+        super().__init__()
         self._noise, self._width = noise, WIDTH if noise.bursts else width(noise)
-        self._samples = nothing
         self._number = np.empty(0, np.int64)
-        self._returned = 0  # of the samples that are kept
         self._newest: int | None = None  # regular stamp (ns) that was returned last
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return len(self._samples.stamp) - self._returned
 
     def take(self, new: OrderedSamples, closed: bool = False) -> OrderedSamples:
         """Add samples and return those whose regular stamps are known."""
-        self._samples = joined(self._samples, new)
-        self._count(closed)
+        samples = self._with(new)
+        self._count(samples.stamp, closed)
         begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
-        found = taken(self._samples, slice(begin, end))
-        stamp = self._samples.stamp[: len(self._number)]
+        stamp = samples.stamp[: len(self._number)]
         parts = [self._line_at(stamp, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
         regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
-        self._returned = end
-        self._forget()
-        return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
+        count = max(end - KEPT, 0)
+        self._keep(samples, slice(count, None), end - count)
+        self._number = self._number[count:]
+        return replace(taken(samples, slice(begin, end)), stamp=regular)
 
     def _line_at(self, stamp: IntArray, begin: int, end: int) -> IntArray:
         """Stamps (end - begin,) in ns at these samples, of lines through the AROUND samples on either side of each."""
@@ -172,13 +167,12 @@ class _Segment:
         line = low_of(late - period * number, inside) if bursts else _lines_at(number, late, inside)
         return np.asarray(stamp[middle] + np.rint(line).astype(np.int64))
 
-    def _count(self, closed: bool) -> None:
+    def _count(self, stamp: IntArray, closed: bool) -> None:
         """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
         known = len(self._number)
-        end = max(len(self._samples.stamp) - (0 if closed else 3 * self._width), known)
+        end = max(len(stamp) - (0 if closed else 3 * self._width), known)
         if end == known:
             return
-        stamp = self._samples.stamp
         bursts = self._noise.bursts
         missing = missing_in_bursts(stamp, self._noise.period) if bursts else missing_before(stamp, self._noise)
         missing = missing[known:end]
@@ -192,12 +186,6 @@ class _Segment:
         found = (np.maximum.accumulate(np.concatenate([before, stamp]) - step) + step)[1:]
         self._newest = int(found[-1]) if len(found) else self._newest
         return found
-
-    def _forget(self) -> None:
-        """Drop the samples before those that the next ones need."""
-        count = max(self._returned - KEPT, 0)
-        self._samples, self._number = taken(self._samples, slice(count, None)), self._number[count:]
-        self._returned -= count
 
 
 def _lines_at(number: IntArray, late: IntArray, inside: BoolArray) -> Array:

@@ -10,10 +10,13 @@ has both. It spans as little as the resolution allows.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
+from push_predictor.recordings.streams import taken
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, IntArray
 
 LEVER = 0.05  # m: a turn moves the outline of a slider by this for each radian
@@ -79,7 +82,7 @@ def fit_span(quantum: Array | float, period: float) -> Array:
     return np.asarray((np.asarray(quantum) * np.sqrt(period) / SPEED_ERROR) ** (2.0 / 3.0))
 
 
-class SmoothedPoses:
+class SmoothedPoses(Portions):
     """Takes the samples of one stream in order and returns them with smoothed positions and headings.
 
     Samples of a fine resolution are returned at once and unchanged; others wait for the span of a line. resolution: of
@@ -88,22 +91,16 @@ class SmoothedPoses:
 
     def __init__(self, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        super().__init__()
         self._columns = [0, 1] if angle is None else [0, 1, angle]
         self.resolution = 0.0
         self._first: IntArray = np.empty(0, np.int64)  # stamps (ns) that determine the period
-        self._samples: OrderedSamples | None = None
         self._half = np.empty(0)  # s, of the lines at these samples
-        self._returned = 0  # of these samples
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
         self._first = np.concatenate([self._first, new.stamp])[: EVIDENCE + 1]
-        samples = new if self._samples is None else joined(self._samples, new)
+        samples = self._with(new)
         self._half = np.concatenate([self._half, self._halves(new.values)])
         stamp = samples.stamp
         complete = stamp + 2e9 * self._half < (stamp[-1] if len(stamp) else 0)
@@ -113,12 +110,13 @@ class SmoothedPoses:
         values = samples.values[rows]
         if (coarse := self._half[rows] > 0.0).any():
             values[np.flatnonzero(coarse)[:, None], self._columns] = self._lines(samples, rows[coarse])
-        found = with_values(taken(samples, rows), values)
+        found = replace(taken(samples, rows), values=values)
         begin = (
             int(np.searchsorted(stamp, (stamp[end] if end < len(stamp) else stamp[-1]) - 1e9 * LONGEST)) if end else 0
         )
         keep = slice(min(begin, end), None)
-        self._samples, self._half, self._returned = taken(samples, keep), self._half[keep], end - keep.start
+        self._keep(samples, keep, end - keep.start)
+        self._half = self._half[keep]
         return found
 
     def _halves(self, values: Array) -> Array:

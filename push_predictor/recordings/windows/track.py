@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
 from push_predictor.recordings.windows.regular_stamps import RegularStamps
 from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses, lengths
 from push_predictor.recordings.windows.slow import SlowPoses
-from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, StampOrder, with_values
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, StampOrder
 from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -178,10 +179,10 @@ class StreamRepairs:
         values = self._unwrapped(new.values)
         # The repair of one must not hide the resolution from the next: they get it as a further column.
         quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
-        new = with_values(new, np.column_stack([values, quantum]))
+        new = replace(new, values=np.column_stack([values, quantum]))
         for step in (self.continued, self.held, self.regular, self.smoothed, self.slow):
             new = step.take(new, final)
-        return with_values(new, new.values[:, :-1])
+        return replace(new, values=new.values[:, :-1])
 
     def _unwrapped(self, values: Array) -> Array:
         if self._angle is None or not len(values):

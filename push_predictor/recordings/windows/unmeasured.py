@@ -15,12 +15,14 @@ move on a line. So are poses between two measured ones.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.streams import PoseStream, taken
 from push_predictor.recordings.windows.resolution import LEVER, Resolution, changes, lengths
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken, with_values
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
 HARMLESS = 1e-4  # m: so small a change makes no outcome wrong
@@ -38,7 +40,7 @@ LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
 JUDGING = BEFORE + 2  # poses before a run, of which the last BEFORE have two before them
 
 
-class HeldPoses:
+class HeldPoses(Portions):
     """Takes the samples of one stream in order and returns them without stale ones.
 
     A repeat waits until the body has changed its pose twice, or for LONGEST_HOLD. The result does not depend on the
@@ -47,29 +49,23 @@ class HeldPoses:
 
     def __init__(self, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        super().__init__()  # keeps the first sample of the pose that waits
         self.stale = 0
         self.dropouts: list[float] = []
         self._angle = angle
-        self._samples: OrderedSamples | None = None  # those that wait, after the first sample of the same pose
-        self._returned = 0  # of these samples
-        self._before = np.empty(0, np.int64)  # stamps (ns) at which the poses before these began
+        self._before = np.empty(0, np.int64)  # stamps (ns) at which the poses before the kept ones began
         self._pose: Array | None = None  # the one before these
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        samples = new if self._samples is None else joined(self._samples, new)
+        samples = self._with(new)
         pose = lengths(samples.values, self._angle)
         begins = changes(pose)
         keep, values, decided = self._judge(samples, pose, begins, final)
         rows = np.arange(self._returned, decided)
-        found = taken(with_values(samples, values), rows[keep[rows]])
-        self._forget(with_values(samples, values), pose, begins, decided)
-        return found
+        samples = replace(samples, values=values)
+        self._forget(samples, pose, begins, decided)
+        return taken(samples, rows[keep[rows]])
 
     def _judge(
         self, samples: OrderedSamples, pose: Array, begins: IntArray, final: bool
@@ -140,14 +136,13 @@ class HeldPoses:
             self._pose = pose[begins[run - 1]]
         self._before = np.concatenate([self._before, samples.stamp[begins[:run]]])[-USUAL:]
         rows = np.unique([begin, decided - 1, *range(decided, len(pose))])
-        self._samples = taken(samples, rows)
-        self._returned = int(np.sum(rows < decided))
+        self._keep(samples, rows, int(np.sum(rows < decided)))
 
 
 # --- poses continued on a line ----------------------------------------------------------------------------------------
 
 
-class ContinuedPoses:
+class ContinuedPoses(Portions):
     """Takes the samples of one stream in order and returns them without continued ones.
 
     A sample waits for the next one, those on a line for its end. The result does not depend on the portions.
@@ -155,24 +150,18 @@ class ContinuedPoses:
 
     def __init__(self, angle: int | None) -> None:
         """Of a stream whose last column is the resolution, m; angle: index of one with an unwrapped heading, rad."""
+        super().__init__()
         self._angle = angle
-        self._samples: OrderedSamples | None = None  # those that judge, then those that wait
-        self._returned = 0  # of these samples
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        samples = new if self._samples is None else joined(self._samples, new)
+        samples = self._with(new)
         pose, first = lengths(samples.values, self._angle), self._returned
         lost, decided = _judged(samples.stamp, pose, samples.values[:, -1], first)
         decided = len(lost) if final else max(decided, first)
         rows = np.arange(first, decided)
         kept = max(decided - JUDGING, 0)
-        self._samples, self._returned = taken(samples, slice(kept, None)), decided - kept
+        self._keep(samples, slice(kept, None), decided - kept)
         return taken(samples, rows[~lost[rows]])
 
 

@@ -26,7 +26,7 @@ from push_predictor.recordings.windows.resolution import (
     fit_span,
     lengths,
 )
-from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, uninterrupted
 from push_predictor.recordings.windows.unmeasured import HeldPoses
 from push_predictor.types import Array
 
@@ -189,9 +189,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
     pose = lengths(values, column)
     quanta = Resolution(pose.shape[1]).take(pose)
     quantum = float(np.max(quanta[-1]))
-    samples = OrderedSamples(
-        stream.stamp, np.column_stack([values, np.max(quanta, axis=1)]), np.zeros(len(values), dtype=np.bool_), False
-    )
+    samples = uninterrupted(stream.stamp, np.column_stack([values, np.max(quanta, axis=1)]))
     held = HeldPoses(column)
     kept = held.take(samples, final=True)
     smoothed = SmoothedPoses(column).take(kept, final=True)

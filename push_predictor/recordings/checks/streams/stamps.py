@@ -20,7 +20,7 @@ from push_predictor.recordings.windows.regular_stamps import (
     burst_period,
     stamp_noise,
 )
-from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.recordings.windows.stamp_order import uninterrupted
 from push_predictor.types import IntArray
 
 SECOND = 1_000_000_000  # ns
@@ -106,8 +106,7 @@ def regular_in_bursts(stream: PoseStream) -> PoseStream:
     if not _in_bursts(stream.stamp):
         return stream
     rows = np.arange(len(stream), dtype=np.float64)[:, None]
-    samples = OrderedSamples(stream.stamp, rows, np.zeros(len(stream), dtype=np.bool_), False)
-    return replace(stream, stamp=RegularStamps().take(samples, final=True).stamp)
+    return replace(stream, stamp=RegularStamps().take(uninterrupted(stream.stamp, rows), final=True).stamp)
 
 
 def stamp_findings(stamps: Stamps) -> list[Finding]:
