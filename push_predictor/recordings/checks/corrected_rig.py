@@ -15,11 +15,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import mirror_image, transformed, transformed_points
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.geometry import MIRRORS
-from push_predictor.recordings.checks.outline_findings import (
-    LARGEST_SIZE_CHANGE,
-    LARGEST_TIP_CHANGE,
-    LENGTH_ALLOWANCE,
-)
+from push_predictor.recordings.checks.outline_findings import LARGEST_SIZE_CHANGE, LARGEST_TIP_CHANGE, LENGTH_ALLOWANCE
 from push_predictor.recordings.rig import Rig
 
 CORRECTED = ("outline_mirrored", "outline_turned", "outline_shifted", "outline_size", "tip_radius")

@@ -99,10 +99,7 @@ class Evidence:
         """With further findings; recording: accepted from here on, as before if None; synchronous: shown by them."""
         findings = (*self.findings, *(finding for finding in more if finding is not None))
         after = replace(
-            self,
-            findings=findings,
-            recording=recording or self.recording,
-            synchronous=self.synchronous or synchronous,
+            self, findings=findings, recording=recording or self.recording, synchronous=self.synchronous or synchronous
         )
         if after.recording is self.recording and "motion" in self.__dict__:
             after.__dict__["motion"] = self.motion  # of the same samples: it need not be found again

@@ -26,16 +26,7 @@ from push_predictor.recordings.checks.outline_findings import (
     tip_offset,
     unchecked,
 )
-from push_predictor.recordings.checks.outline_fit import (
-    LAG,
-    SIZE,
-    TIE,
-    Contacts,
-    OutlineFit,
-    X,
-    Y,
-    fit_outline,
-)
+from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
 from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

@@ -116,18 +116,12 @@ class ClockSession:
         last = int(np.searchsorted(slider.time, until, side="right"))
         if last <= first:
             return []
-        samples = contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last)
+        wrench = self.tracks["wrench"] if len(self.tracks["wrench"]) else None
+        samples = contact_samples(self._rig, slider, self.tracks["pusher"], wrench, first, last)
         found = self._cutter.cut(self.tracks, self._segmenter.take(samples), self._origin or 0, self._first)
-        self._count_dropouts(float(slider.time[last - 1]))
         self.evaluated = int(slider.stamp[last - 1])
-        self._forget(float(slider.time[last - 1]))
+        self._count_and_forget(float(slider.time[last - 1]))
         return found
-
-    def _count_dropouts(self, until: float) -> None:
-        for name, track in self.tracks.items():
-            count = track.dropouts(self._counted_until, until)
-            self._dropouts.update({f"{name} dropouts": count, "dropouts": count})
-        self._counted_until = until
 
     def _horizon(self, final: bool) -> float | None:
         """The time (s) up to which all streams are known, None until their periods are known."""
@@ -140,15 +134,16 @@ class ClockSession:
         newest, reached = (which(track.time[-1] for track in present) for which in (max, min))
         return float(max(reached, newest - LONGEST_LAG) - REACH)
 
-    def _wrench(self) -> Track | None:
-        return self.tracks["wrench"] if len(self.tracks["wrench"]) else None
-
-    def _forget(self, evaluated: float) -> None:
+    def _count_and_forget(self, evaluated: float) -> None:
+        """Count the dropouts up to a time (s), and forget the samples that no further window needs."""
         start, needed = self._segmenter.start, evaluated
         if start is not None and self._origin is not None:
-            needed = min(evaluated, (start - self._origin) * 1e-9)
-        for track in self.tracks.values():
+            needed = min(evaluated, (start - self._origin) * NANOSECOND)
+        for name, track in self.tracks.items():
+            count = track.dropouts(self._counted_until, evaluated)
+            self._dropouts.update({f"{name} dropouts": count, "dropouts": count})
             track.forget_before(needed - HISTORY)
+        self._counted_until = evaluated
 
 
 def free_motion(rig: Rig, slider: PoseStream, pusher: PoseStream, stamp: IntArray) -> BoolArray:

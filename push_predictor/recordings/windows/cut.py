@@ -149,14 +149,9 @@ def pusher_motion(pusher: Track, begin: Array, end: Array) -> tuple[Array, Array
     position[few] = pusher.at(begin[few])[:, :2]
     velocity[few] = (pusher.at(end[few])[:, :2] - position[few]) / (end - begin)[few, None]
     if not few.all():
-        position[~few], velocity[~few] = _lines(pusher, begin[~few], first[~few], last[~few])
-    return position, velocity
-
-
-def _lines(pusher: Track, begin: Array, first: IntArray, last: IntArray) -> tuple[Array, Array]:
-    """Positions and velocities (n, 2) at times (n,) of lines through the samples from each first to each last."""
-    count, rows = last - first, part_rows(first, last)
-    position, velocity, _ = part_lines(pusher.time[rows] - np.repeat(begin, count), pusher.values[rows, :2], count)
+        count, rows = (last - first)[~few], part_rows(first[~few], last[~few])
+        time = pusher.time[rows] - np.repeat(begin[~few], count)
+        position[~few], velocity[~few], _ = part_lines(time, pusher.values[rows, :2], count)
     return position, velocity
 
 

@@ -31,8 +31,8 @@ def touches_nothing(samples: ContactSamples, options: WindowOptions) -> BoolArra
 class PushSegmenter:
     """Takes contact samples in order and returns the windows that are complete: start and end in ns, and the push.
 
-    counts: resets and samples inside the outline. push: the current push, None between pushes. samples, touching: how
-    many samples there were, and how many of them in contact.
+    counts: resets and samples inside the outline. push: the current push, None between pushes. start: that (ns) of the
+    incomplete window, None without one. samples, touching: how many samples there were, and how many in contact.
     """
 
     def __init__(self, options: WindowOptions) -> None:
@@ -44,7 +44,7 @@ class PushSegmenter:
         self.samples = self.touching = 0
         self.timing = ForceTiming()
         self._zero = ForceZero()
-        self._start: int | None = None  # of the incomplete window
+        self.start: int | None = None
         self._last_good = -np.inf
         self._last_time: float | None = None
         self._idle = 0.0
@@ -53,11 +53,6 @@ class PushSegmenter:
         self._inside = False
         self._first_touch: int | None = None
         self._last_contact: int | None = None
-
-    @property
-    def start(self) -> int | None:
-        """Start (ns) of the incomplete window, None without one."""
-        return self._start
 
     def take(self, samples: ContactSamples) -> list[tuple[int, int, PushContext]]:
         """Add a portion of samples and return the windows that end at or before the last of them."""
@@ -156,7 +151,7 @@ class PushSegmenter:
         ):
             self._idle += step
             if stop:
-                self._start = None
+                self.start = None
                 if ends[k]:
                     self._end_push()
             if ask:
@@ -169,13 +164,13 @@ class PushSegmenter:
                 if self.push is None or self._idle > self.options.push_pause:
                     self._begin_push(stamp, self._zero.at(k).mean)
                 self._idle, self._last_good, self._last_contact = 0.0, at, stamp
-                if self._start is None and at_speed:
-                    self._start = stamp
-                if self._start is not None and self._start + self._length <= stamp:
+                if self.start is None and at_speed:
+                    self.start = stamp
+                if self.start is not None and self.start + self._length <= stamp:
                     done += self._complete(stamp)
             else:
                 if at - self._last_good > self.options.bounce:
-                    self._start = None
+                    self.start = None
                 if not touches and self._idle > self.options.push_pause:
                     self._first_touch = None
         return done
@@ -183,9 +178,9 @@ class PushSegmenter:
     def _complete(self, stamp: int) -> list[tuple[int, int, PushContext]]:
         """The windows of the push that end at or before a stamp (ns)."""
         done = []
-        while self.push is not None and self._start is not None and self._start + self._length <= stamp:
-            done.append((self._start, self._start + self._length, self.push))
-            self._start += self._stride
+        while self.push is not None and self.start is not None and self.start + self._length <= stamp:
+            done.append((self.start, self.start + self._length, self.push))
+            self.start += self._stride
         return done
 
     def _begin_push(self, stamp: int, tare: tuple[float, float] | None) -> None:
@@ -195,10 +190,10 @@ class PushSegmenter:
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
         self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), tare)
         self._pushes += 1
-        self._start = None
+        self.start = None
 
     def _end_push(self) -> None:
-        self.push, self._start, self._first_touch = None, None, None
+        self.push, self.start, self._first_touch = None, None, None
 
 
 def _push_id(stamp: int) -> str:

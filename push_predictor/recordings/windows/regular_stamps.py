@@ -59,7 +59,7 @@ class StampNoise:
     bursts: bool = False
 
 
-class RegularStamps:
+class RegularStamps(Portions):
     """Takes the samples of one stream in order and returns them, with regular stamps where they have jitter.
 
     noise: of the last DECIDING samples before the correction began, or of the last block of them; None until it is
@@ -68,8 +68,8 @@ class RegularStamps:
     """
 
     def __init__(self) -> None:
+        super().__init__()  # keeps those that wait for the first decision
         self.noise: StampNoise | None = None
-        self._held: OrderedSamples | None = None  # samples that wait for the first decision
         self._block = np.empty(0, np.int64)  # stamps since the last decision
         self._segment: _Segment | None = None
         self._last: int | None = None  # stamp (ns) before the next, as it came
@@ -77,8 +77,7 @@ class RegularStamps:
     @property
     def waiting(self) -> int:
         """How many samples wait."""
-        held = 0 if self._held is None else len(self._held.stamp)
-        return held + (0 if self._segment is None else self._segment.waiting)
+        return super().waiting + (0 if self._segment is None else self._segment.waiting)
 
     @property
     def corrected(self) -> bool:
@@ -87,11 +86,10 @@ class RegularStamps:
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose stamps are known; with `final` all are."""
-        if self._held is not None:
-            new, self._held = joined([self._held, new]), None
-        if self.noise is None and len(new.stamp) < DECIDING:
+        new, self._samples = self._with(new), None
+        if self.noise is None and len(new) < DECIDING:
             if not final:
-                self._held = new
+                self._keep(new, slice(None), 0)
                 return taken(new, slice(0, 0))
             self.noise = stamp_noise(new.stamp)
         count = 0 if self.corrected else self._undisturbed(new.stamp)
@@ -121,18 +119,17 @@ class RegularStamps:
         gap = np.diff(np.concatenate([before, new.stamp])) * NANOSECOND
         longest = BURST_PERIODS * noise.period if noise.bursts else longest_interval(noise.period)
         begins = np.flatnonzero((gap > longest) | new.interrupted)
-        found = []
-        for number, rows in enumerate(np.split(np.arange(len(new.stamp)), begins)):
-            if number or self._segment is None:
-                if self._segment is not None:
-                    found.append(self._segment.take(taken(new, rows[:0]), closed=True))
-                self._segment = _Segment(noise)
-            found.append(self._segment.take(taken(new, rows)))
-        if final and self._segment is not None:
-            found.append(self._segment.take(taken(new, np.empty(0, np.int64)), closed=True))
-            self._segment = None
-        self._last = int(new.stamp[-1]) if len(new.stamp) else self._last
-        return joined(found) if found else new
+        found, segment = list[OrderedSamples](), self._segment or _Segment(noise)
+        for number, rows in enumerate(np.split(np.arange(len(new)), begins)):
+            if number:
+                found.append(segment.take(taken(new, rows[:0]), final=True))
+                segment = _Segment(noise)
+            found.append(segment.take(taken(new, rows)))
+        if final:
+            found.append(segment.take(taken(new, slice(0, 0)), final=True))
+        self._segment = None if final else segment
+        self._last = int(new.stamp[-1]) if len(new) else self._last
+        return joined(found)
 
 
 class _Segment(Portions):
@@ -144,11 +141,11 @@ class _Segment(Portions):
         self._number = np.empty(0, np.int64)
         self._newest: int | None = None  # regular stamp (ns) that was returned last
 
-    def take(self, new: OrderedSamples, closed: bool = False) -> OrderedSamples:
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose regular stamps are known."""
         samples = self._with(new)
-        self._count(samples.stamp, closed)
-        begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
+        self._count(samples.stamp, final)
+        begin, end = self._returned, max(len(self._number) - (0 if final else AROUND), self._returned)
         stamp = samples.stamp[: len(self._number)]
         parts = [self._line_at(stamp, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
         regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
@@ -167,17 +164,14 @@ class _Segment(Portions):
         line = low_of(late - period * number, inside) if bursts else _lines_at(number, late, inside)
         return np.asarray(stamp[middle] + np.rint(line).astype(np.int64))
 
-    def _count(self, stamp: IntArray, closed: bool) -> None:
-        """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
-        known = len(self._number)
-        end = max(len(stamp) - (0 if closed else 3 * self._width), known)
-        if end == known:
-            return
-        bursts = self._noise.bursts
-        missing = missing_in_bursts(stamp, self._noise.period) if bursts else missing_before(stamp, self._noise)
-        missing = missing[known:end]
-        last = int(self._number[-1]) if known else -1
-        self._number = np.concatenate([self._number, last + np.cumsum(missing + 1)])
+    def _count(self, stamp: IntArray, final: bool) -> None:
+        """Number the samples, those of the last three widths only if the run has ended: more may be missing there."""
+        known, noise = len(self._number), self._noise
+        end = len(stamp) - (0 if final else 3 * self._width)
+        if end > known:
+            missing = missing_in_bursts(stamp, noise.period) if noise.bursts else missing_before(stamp, noise)
+            last = int(self._number[-1]) if known else -1
+            self._number = np.concatenate([self._number, last + np.cumsum(missing[known:end] + 1)])
 
     def _increasing(self, stamp: IntArray) -> IntArray:
         """The stamps, each at least a nanosecond after the one before."""

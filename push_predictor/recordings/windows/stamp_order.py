@@ -62,6 +62,10 @@ class Portions:
         """How many samples wait."""
         return 0 if self._samples is None else len(self._samples) - self._returned
 
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        raise NotImplementedError
+
     def _with(self, new: OrderedSamples) -> OrderedSamples:
         """The kept samples and further ones."""
         return new if self._samples is None else joined([self._samples, new])

@@ -26,16 +26,7 @@ FAULTS = {
     "outran": f"windows rejected because the slider moved farther than the tip. {_CHECK}",
 }
 # A sound system has none of these. Resets, repeated stamps and short dropouts are normal.
-WARNED = (
-    "late",
-    "ahead",
-    "not_finite",
-    "jumps",
-    "clock_set_back",
-    "inside",
-    "left_behind",
-    "outran",
-)
+WARNED = ("late", "ahead", "not_finite", "jumps", "clock_set_back", "inside", "left_behind", "outran")
 CLOCK_TOLERANCE = 0.25  # s; larger clock offsets between two streams are reported
 
 

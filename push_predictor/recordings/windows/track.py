@@ -15,7 +15,7 @@ from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
 from push_predictor.recordings.windows.regular_stamps import RegularStamps
 from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses, lengths
 from push_predictor.recordings.windows.slow import SlowPoses
-from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, StampOrder
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, Portions, StampOrder
 from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -80,14 +80,12 @@ class Track:
 
     def at(self, time: Array) -> Array:
         """Values (m, width) at times (m,), linear between samples and constant beyond them."""
-        around = self._around(float(time.min()), float(time.max())) if len(time) else slice(None)
+        around = slice(None)
+        if len(time):  # few of a day's samples: from the last at or before the times to the first at or after them
+            begin = int(np.searchsorted(self.time, time.min(), side="right")) - 1
+            around = slice(max(begin, 0), int(np.searchsorted(self.time, time.max())) + 1)
         known = self.time[around]
         return np.column_stack([np.interp(time, known, column) for column in self.values[around].T])
-
-    def _around(self, first: float, last: float) -> slice:
-        """The samples from the last at or before `first` to the first at or after `last`: few of a day's."""
-        begin = int(np.searchsorted(self.time, first, side="right")) - 1
-        return slice(max(begin, 0), int(np.searchsorted(self.time, last)) + 1)
 
     def period_known(self, final: bool) -> bool:
         """Whether the period is known, so that dropouts can be detected.
@@ -106,7 +104,7 @@ class Track:
     @property
     def resolution(self) -> float:
         """The step (m) in which positions were written, 0 if it is fine."""
-        return 0.0 if self.repairs.smoothed is None else self.repairs.smoothed.resolution
+        return self.repairs.smoothed.resolution
 
     def breaks_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
         """For intervals (start, end] (m,): does a break overlap each, and does one extend beyond its end?
@@ -148,7 +146,8 @@ class Track:
 class StreamRepairs:
     """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
 
-    continued, held, smoothed, slow: None for a stream without a position. The result does not depend on the portions.
+    regular, smoothed: the steps that replace stamps, and poses of a coarse resolution. The result does not depend on
+    the portions.
     """
 
     def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
@@ -157,10 +156,11 @@ class StreamRepairs:
         angle: index of the column with a heading, rad, which is unwrapped; None without one.
         """
         self.regular = RegularStamps()
-        self.continued = None if is_jump is None else ContinuedPoses(angle)
-        self.held = None if is_jump is None else HeldPoses(angle)
-        self.smoothed = None if is_jump is None else SmoothedPoses(angle)
-        self.slow = None if is_jump is None else SlowPoses(is_jump, angle)
+        self.smoothed = SmoothedPoses(angle)
+        self._steps: list[Portions] = [self.regular]
+        if is_jump is not None:
+            before, after = [ContinuedPoses(angle), HeldPoses(angle)], [self.smoothed, SlowPoses(is_jump, angle)]
+            self._steps = [*before, self.regular, *after]
         self._resolution = Resolution(2 if angle is None else 3)
         self._angle = angle
         self._heading: Array = np.empty(0)  # the last one, rad
@@ -168,19 +168,17 @@ class StreamRepairs:
     @property
     def waiting(self) -> int:
         """How many samples wait."""
-        return self.regular.waiting + sum(
-            step.waiting for step in (self.continued, self.held, self.smoothed, self.slow) if step is not None
-        )
+        return sum(step.waiting for step in self._steps)
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        if self.continued is None or self.held is None or self.smoothed is None or self.slow is None:
+        if len(self._steps) == 1:
             return self.regular.take(new, final)
         values = self._unwrapped(new.values)
         # The repair of one must not hide the resolution from the next: they get it as a further column.
         quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
         new = replace(new, values=np.column_stack([values, quantum]))
-        for step in (self.continued, self.held, self.regular, self.smoothed, self.slow):
+        for step in self._steps:
             new = step.take(new, final)
         return replace(new, values=new.values[:, :-1])
 
