@@ -153,18 +153,13 @@ def test_a_force_is_apart_only_if_that_is_clear(delays: list[float], apart: bool
     assert force_delay(delays).apart == apart
 
 
-def test_a_silent_force_costs_three_pushes_at_most() -> None:
-    sound, silent = (ids(recording) for recording in (bag(NAME), scaled(bag(NAME), 0.0)))
-    assert UNSEEN == 3 and len(sound) - UNSEEN <= len(silent) < len(sound)
-
-
-def test_a_force_that_falls_silent_costs_three_pushes_at_most() -> None:
+@pytest.mark.parametrize(("name", "share"), [(NAME, 0.0), (MANY, 0.5)])
+def test_a_force_that_falls_silent_costs_three_pushes_at_most(name: str, share: float) -> None:
     """However many touches showed it before."""
-    sound = bag(MANY)
-    wrench = wrench_of(sound)
-    last = np.arange(len(wrench)) < len(wrench) // 2
-    silent = replace(sound, wrench=replace(wrench, fx=last * wrench.fx, fy=last * wrench.fy))
-    assert len(ids(sound)) - UNSEEN <= len(ids(silent)) <= len(ids(sound))
+    sound, wrench = bag(name), wrench_of(bag(name))
+    heard = np.arange(len(wrench)) < share * len(wrench)
+    silent = ids(replace(sound, wrench=replace(wrench, fx=heard * wrench.fx, fy=heard * wrench.fy)))
+    assert UNSEEN == 3 and len(ids(sound)) - UNSEEN <= len(silent) <= len(ids(sound)) - (not share)
 
 
 def test_a_clock_of_the_force_that_is_set_is_seen_by_the_last_touches() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.streams import Recording, ScalarStream
+from push_predictor.recordings.streams import taken as columns_taken
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import ScalarTrack, WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
@@ -95,17 +97,14 @@ def warmth_of(windows: list[PushWindow]) -> list[float | None]:
 
 def fed(recording: Recording, finder: WindowFinder, begin: float, end: float) -> None:
     """The sensors' samples from begin to end (s), without scalars."""
-    low, high = START + round(begin * SECOND), START + round(end * SECOND)
-    wrench = recording.wrench
-    assert wrench is not None
-    finder.add_wrench(wrench_rows(wrench, (wrench.stamp >= low) & (wrench.stamp < high)))
-    finder.add_pusher(rows(recording.pusher, (recording.pusher.stamp >= low) & (recording.pusher.stamp < high)))
-    finder.add_slider(rows(recording.slider, (recording.slider.stamp >= low) & (recording.slider.stamp < high)))
+    assert recording.wrench is not None
+    finder.add_wrench(part(recording.wrench, begin, end))
+    finder.add_pusher(part(recording.pusher, begin, end))
+    finder.add_slider(part(recording.slider, begin, end))
 
 
-def part(scalar: ScalarStream, begin: float, end: float) -> ScalarStream:
-    inside = (scalar.stamp >= START + round(begin * SECOND)) & (scalar.stamp < START + round(end * SECOND))
-    return ScalarStream(scalar.stamp[inside], scalar.value[inside])
+def part(of: Any, begin: float, end: float) -> Any:
+    return columns_taken(of, (of.stamp >= START + round(begin * SECOND)) & (of.stamp < START + round(end * SECOND)))
 
 
 def noisy(rate: float, seed: int = 0) -> ScalarStream:
