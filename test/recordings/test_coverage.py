@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The coverage of a push table: what is missing is named, with what to record next."""
+"""The coverage of a push table, in findings and in words; where the contacts of a recording lie against its outline."""
 
 from __future__ import annotations
 
@@ -9,13 +9,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from checked_bags import bag
+from mistakes import outline_scaled, stream_part
+from repository import REPOSITORY
+from synthetic import square_pushes
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
+from push_predictor.recordings.checks.coverage import (
+    MEANING,
+    ContactFit,
+    Coverage,
+    contact_fit,
+    coverage_findings,
+    coverage_of,
+    pushed_part,
+)
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.motion import motion_of
+from push_predictor.recordings.load import load_data
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording, taken
 from push_predictor.recordings.table import PushTable, empty_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
 
 SQUARE, RADIUS = shape_outline("rect1"), 0.00475
 RECTANGLE = Outline(np.array([[-0.06, -0.03], [0.06, -0.03], [0.06, 0.03], [-0.06, 0.03]]))
@@ -141,3 +159,101 @@ def test_without_an_outline_sides_and_sliding_are_unknown() -> None:
 def test_rows_of_different_pushes_are_no_steps() -> None:
     table = pushes()
     assert covered(replace(table, push_id=np.arange(len(table)).astype(str))).sliding is None
+
+
+# --- what pushes leave out of the domain where they judge a model -----------------------------------------------------
+
+
+TABLE, RIG = square_pushes(90)
+HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
+
+
+def of_angles(scale: float) -> PushTable:
+    return replace(TABLE, inputs=TABLE.inputs * [1.0, 1.0, scale])
+
+
+def test_pushes_all_around_give_no_warning() -> None:
+    assert pushed_part(TABLE, RIG) == [] and pushed_part(TABLE) == []
+    assert pushed_part(empty_table(), RIG) == []
+    assert pushed_part(load_data([HEXAGON]), bag("hexagon_delrin").rig) == []
+
+
+@pytest.mark.parametrize(("rows", "count"), [(3, "1 push"), (6, "2 pushes"), (21, "7 pushes")])
+def test_few_pushes_are_counted_and_nobody_is_told_to_learn(rows: int, count: str) -> None:
+    (finding,) = pushed_part(TABLE.take(np.arange(rows)))
+    assert finding.sentence.startswith(f"The data contain {count} only.") and "learnt" not in finding.text
+    assert finding.advice == MEANING and finding.severity == "warning"
+    assert finding.name == "pushed_part"
+
+
+def test_all_that_is_missing_is_one_warning() -> None:
+    (finding,) = pushed_part(of_angles(0.05).take(np.arange(12)))
+    assert finding.text.count(MEANING) == 1
+    assert finding.text.index("4 pushes only") < finding.text.index("push angles span")
+
+
+def test_sides_need_the_outline() -> None:
+    """A hexagon without symmetry has six kinds of sides; the table has pushes on its first."""
+    outline = shape_outline("hex")
+    uneven = replace(outline, vertices=outline.vertices * [1.0, 1.2])
+    one_side = replace(TABLE, inputs=TABLE.inputs * [1.0, 0.1, 1.0])
+    assert pushed_part(one_side) == []
+    (finding,) = pushed_part(one_side, replace(RIG, outline=uneven))
+    assert "Pushed: side 1 of 6" in finding.sentence
+
+
+# --- contacts against the outline, and how much of their time became windows ------------------------------------------
+
+
+APOTHEM = 0.0605 * np.sqrt(0.75)  # m, of the hexagon
+
+
+def hexagon() -> Recording:
+    return bag("hexagon_delrin")
+
+
+def fit_of(recording: Recording, rig: Rig) -> ContactFit:
+    fit = contact_fit(motion_of(recording, rig), rig)
+    assert fit is not None
+    return fit
+
+
+@pytest.mark.parametrize("size", [0.96, 1.0, 1.04])
+def test_gaps_have_the_size_and_sign_of_the_outlines_error(size: float) -> None:
+    fit = fit_of(hexagon(), outline_scaled(require_rig(hexagon()), size))
+    assert fit.side == "side" and len(fit.gaps) == 6
+    for gap in fit.gaps:
+        assert gap == pytest.approx(APOTHEM * (1.0 - size), abs=2e-4)
+    assert (fit.inside, fit.off) == pytest.approx((float(size > 1.0), float(size < 1.0)), abs=0.01)
+    assert min(fit.inside, fit.off) == 0.0
+
+
+def test_a_side_without_contact_has_no_gap() -> None:
+    """The bag begins with pushes on some sides."""
+    half = replace(hexagon(), slider=stream_part(hexagon().slider, 0.0, 0.3))
+    fit = fit_of(half, require_rig(hexagon()))
+    assert 0 < sum(gap is None for gap in fit.gaps) < 6
+    assert fit.lost is None and fit.window_time is None
+
+
+def test_the_time_in_contact_is_that_of_the_samples_without_dropouts() -> None:
+    fit = fit_of(hexagon(), require_rig(hexagon()))
+    assert fit.contact_time == pytest.approx(fit.samples / 100.0, rel=0.02)
+    slider = hexagon().slider
+    gone = np.ones(len(slider), dtype=np.bool_)
+    gone[400:700] = False
+    fewer = fit_of(replace(hexagon(), slider=taken(slider, gone)), require_rig(hexagon()))
+    assert fewer.contact_time == pytest.approx(fewer.samples / 100.0, rel=0.02)
+
+
+def test_windows_use_the_time_in_contact_but_for_the_ends_of_pushes() -> None:
+    rig = require_rig(hexagon())
+    table = windows_to_table(find_windows(hexagon(), rig))
+    fit = contact_fit(motion_of(hexagon(), rig), rig, table)
+    assert fit is not None and fit.window_time == pytest.approx(0.2 * len(table)) and fit.lost is not None
+    assert 0.0 < fit.lost < 0.2 * len(table.pushes) / fit.contact_time
+    half = contact_fit(motion_of(hexagon(), rig), rig, table.take(np.arange(len(table)) < len(table) // 2))
+    assert half is not None and half.lost == pytest.approx(0.5 + 0.5 * fit.lost, abs=0.02)
+    slider = hexagon().slider
+    still = replace(slider, x=0.0 * slider.x, y=0.0 * slider.y, heading=0.0 * slider.x)
+    assert contact_fit(motion_of(replace(hexagon(), slider=still), rig), rig) is None
