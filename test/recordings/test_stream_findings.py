@@ -246,7 +246,7 @@ def test_returns_to_a_place_that_was_just_left_are_counted() -> None:
 
 def test_few_returns_are_no_second_body() -> None:
     stream = body(two_places(2, 100, count=450))
-    assert 0 < places_of(stream).returns < 5 and two_bodies("slider", stream, places_of(stream)) is None
+    assert 0 < places_of(stream).returns < 5 and two_bodies("slider", places_of(stream)) is None
 
 
 def swaps(spans: list[tuple[int, int]], late: int = 0) -> Finding | None:

@@ -110,7 +110,6 @@ def course_of(lags: PushLags, recording: Recording, recorded: Recording) -> Cour
     ends = _split(lags.lag)
     parts = np.split(lags.lag, ends)
     drift, line = _line(lags)
-    pushes = len(lags.lag)
     apart = np.concatenate([part - np.median(part) for part in parts])
     steps_score = _score(apart, 2 * len(ends) + 1)
     left, span = lags.lag - line - drift.value * lags.time, float(np.ptp(lags.time))
@@ -121,9 +120,7 @@ def course_of(lags: PushLags, recording: Recording, recorded: Recording) -> Cour
     for k, end in enumerate(ends):
         size = float(np.median(parts[k + 1]) - np.median(parts[k]))
         sd = float(np.hypot(_sd(parts[k]), _sd(parts[k + 1])))
-        steps.append(
-            _step(recording, recorded, size, sd, float(lags.time[end - 1]), float(lags.time[min(end, pushes - 1)]))
-        )
+        steps.append(_step(recording, recorded, size, sd, float(lags.time[end - 1]), float(lags.time[end])))
     lag, spread = Value(float(np.median(parts[0])), "s", _sd(parts[0])), float(np.median(np.abs(apart)))
     return Course(lag, spread, tuple(steps))
 
@@ -147,21 +144,17 @@ def _findings(course: Course) -> list[Finding]:
     found = []
     if course.lag.value != 0.0:
         found.append(clocks_apart(course.lag, "At the start, the" if course.steps or course.drift else "The"))
-    if course.drift is not None:
-        found.append(_drift(course.drift))
+    if (drift := course.drift) is not None:
+        ppm, sd = 1e6 * drift.value, 1e6 * (drift.sd or 0.0)
+        sentence = (
+            f"The slider's clock runs {abs(ppm):.0f} ppm (sd {sd:.2g}) {'fast' if ppm > 0.0 else 'slow'} against the "
+            f"pusher's: {abs(0.06 * ppm):.1f} ms per minute."
+        )
+        advice = f"{SYNCHRONISE}, and keep them so. Contacts and outcomes are the more wrong, the later a push is."
+        found.append(Finding("clock_drift", "warning", sentence, advice, {"drift": drift}))
     if course.steps:
         found.append(_steps(course.steps))
     return found
-
-
-def _drift(drift: Value) -> Finding:
-    ppm, sd = 1e6 * drift.value, 1e6 * (drift.sd or 0.0)
-    sentence = (
-        f"The slider's clock runs {abs(ppm):.0f} ppm (sd {sd:.2g}) {'fast' if ppm > 0.0 else 'slow'} against the "
-        f"pusher's: {abs(0.06 * ppm):.1f} ms per minute."
-    )
-    advice = f"{SYNCHRONISE}, and keep them so. Contacts and outcomes are the more wrong, the later a push is."
-    return Finding("clock_drift", "warning", sentence, advice, {"drift": drift})
 
 
 def _steps(steps: tuple[Step, ...]) -> Finding:

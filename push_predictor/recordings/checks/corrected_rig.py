@@ -36,16 +36,15 @@ def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
     found = {finding.name: finding.values for finding in findings if finding.name in CORRECTED}
     if not found:
         return rig
+    outline, points = rig.outline, rig.support_points
     if "outline_mirrored" in found:
-        rig = _mirrored(rig)
-    outline = rig.outline
+        outline, points = mirror_image(outline), None if points is None else points * [1.0, -1.0, 1.0]
     yaw = found["outline_turned"]["yaw"].value if "outline_turned" in found else 0.0
     shift = found.get("outline_shifted")
     moved = (0.0, 0.0) if shift is None else _centring(outline, shift["x"].value, shift["y"].value)
     size = found["outline_size"]["scale"].value if "outline_size" in found else 1.0
     radius = found["tip_radius"]["radius"].value if "tip_radius" in found else rig.pusher_radius
     _check_plausible(rig, size, radius)
-    points = rig.support_points
     if points is not None:
         places = transformed_points(outline, points[:, :2], yaw, moved, size)
         points = np.column_stack([places, points[:, 2]])
@@ -73,8 +72,3 @@ def _centring(outline: Outline, x: float, y: float) -> tuple[float, float]:
         return x, y
     x, y = (-outline.centroid).tolist()
     return x, y
-
-
-def _mirrored(rig: Rig) -> Rig:
-    points = None if rig.support_points is None else rig.support_points * [1.0, -1.0, 1.0]
-    return replace(rig, outline=mirror_image(rig.outline), support_points=points)

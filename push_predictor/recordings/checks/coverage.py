@@ -98,7 +98,8 @@ def pushed_part(table: PushTable, rig: Rig | None = None) -> list[Finding]:
     if coverage is None:
         return []
     lacking = [finding for finding in coverage_findings(coverage) if finding.severity == "warning"]
-    sentences = [_without_need(finding, coverage) for finding in lacking]
+    few = f"{_contained(coverage)} only."  # without what a learnt model needs
+    sentences = [few if finding.name == "few_pushes" else finding.sentence for finding in lacking]
     return [Finding("pushed_part", "warning", " ".join(sentences), MEANING)] if sentences else []
 
 
@@ -174,13 +175,9 @@ def _speeds(coverage: Coverage) -> Finding | None:
     low, high = coverage.speeds
     if high > ONE_SPEED * low:
         return None
-    sentence = f"Nearly all pushes have one speed, {_millimetres(low)} to {_millimetres(high)} mm/s."
+    sentence = f"Nearly all pushes have one speed, {1e3 * low:.3g} to {1e3 * high:.3g} mm/s."
     advice = "Record further speeds, 10 to 100 mm/s for example, if you want to predict them."
     return Finding("one_speed", "note", sentence, advice, {"low": Value(low, "m/s"), "high": Value(high, "m/s")})
-
-
-def _millimetres(speed: float) -> str:
-    return f"{1e3 * speed:.3g}"
 
 
 def _angles(coverage: Coverage) -> Finding | None:
@@ -200,13 +197,6 @@ def _slides(coverage: Coverage) -> Finding | None:
     sentence = f"The contact slides along the edge in {100.0 * share:.0f} % of the steps only."
     advice = "Record pushes at angles beyond 40 degrees, and longer ones: there the contact slides."
     return Finding("few_sliding", severity, sentence, advice, {"share": Value(share, "1")})
-
-
-def _without_need(finding: Finding, coverage: Coverage) -> str:
-    """The sentence of a finding, without what a learnt model needs."""
-    if finding.name != "few_pushes":
-        return finding.sentence
-    return f"{_contained(coverage)} only."
 
 
 def _contained(coverage: Coverage) -> str:

@@ -19,7 +19,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream, taken
 from push_predictor.recordings.windows.contact import SLOWEST
 from push_predictor.recordings.windows.finder import WindowFinder
-from push_predictor.recordings.windows.force import DOUBT, LATEST, ForceDelay, force_delay
+from push_predictor.recordings.windows.force import DOUBT, LATEST, force_delay
 from push_predictor.recordings.windows.force import FEWEST as FEWEST_TOUCHES
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array, BoolArray
@@ -262,11 +262,21 @@ def windows_and_delays(recording: Recording, rig: Rig) -> tuple[list[PushWindow]
 
 def timing_finding(delays: list[float]) -> Finding | None:
     """A finding if the force is late or early, throughout or more and more."""
-    whole, first, last = force_delay(delays), *(_part(delays, k) for k in (0, PARTS - 1))
-    changes = _changes(first, last)
+    size = len(delays) // PARTS
+    whole, first, last = map(force_delay, (delays, delays[:size], delays[(PARTS - 1) * size : PARTS * size]))
+    doubt = LATEST + DOUBT * float(np.hypot(first.sd, last.sd))
+    changes = min(first.touches, last.touches) >= FEWEST_TOUCHES and abs(last.value - first.value) > doubt
     if not (whole.shifted or (changes and (first.shifted or last.shifted))):
         return None
-    return _finding(whole, (first, last) if changes else None)
+    side = "after" if whole.value > 0.0 else "before"
+    sentence = (
+        f"The force rises {1e3 * abs(whole.value):.0f} ms {side} the touch that slider and tip show (sd "
+        f"{1e3 * whole.sd:.2g} ms, {whole.touches} touches)."
+    )
+    if changes:
+        sentence += f" Its delay changes from {1e3 * first.value:.0f} to {1e3 * last.value:.0f} ms."
+    advice = f"Synchronise the clocks (chrony, PTP), and record the force without a filter. {OF_ANOTHER_TIME}"
+    return Finding("wrench_lag", "warning", sentence, advice, {"lag": Value(whole.value, "s", whole.sd)})
 
 
 def unseen_finding(delays: list[float]) -> Finding | None:
@@ -293,27 +303,3 @@ def rate_finding(wrench: WrenchStream) -> Finding | None:
     )
     advice = "Record the wrench at 50 Hz or more, or use `--wrench-topic none`."
     return Finding("wrench_rate", "warning", sentence, advice, {"rate": Value(rate, "Hz")})
-
-
-def _part(delays: list[float], number: int) -> ForceDelay:
-    size = len(delays) // PARTS
-    return force_delay(delays[number * size : (number + 1) * size])
-
-
-def _changes(first: ForceDelay, last: ForceDelay) -> bool:
-    """Whether the delay at the end clearly differs from that at the start."""
-    if min(first.touches, last.touches) < FEWEST_TOUCHES:
-        return False
-    return abs(last.value - first.value) > LATEST + DOUBT * float(np.hypot(first.sd, last.sd))
-
-
-def _finding(whole: ForceDelay, ends: tuple[ForceDelay, ForceDelay] | None) -> Finding:
-    side = "after" if whole.value > 0.0 else "before"
-    sentence = (
-        f"The force rises {1e3 * abs(whole.value):.0f} ms {side} the touch that slider and tip show (sd "
-        f"{1e3 * whole.sd:.2g} ms, {whole.touches} touches)."
-    )
-    if ends is not None:
-        sentence += f" Its delay changes from {1e3 * ends[0].value:.0f} to {1e3 * ends[1].value:.0f} ms."
-    advice = f"Synchronise the clocks (chrony, PTP), and record the force without a filter. {OF_ANOTHER_TIME}"
-    return Finding("wrench_lag", "warning", sentence, advice, {"lag": Value(whole.value, "s", whole.sd)})

@@ -106,9 +106,8 @@ def geometry_findings(recording: Recording, rig: Rig, motion: Motion | None) -> 
     if motion is not None and (pushes := _too_brief(motion, rig)) is not None:
         return [unchecked(pushes)]
     contacts, fit = _fit_on_one_clock(recording, rig, contacts)
-    if rig.outline.rotational_symmetry == 0 and _leads(motion) > AT_REST > 3.0 * _leads(
-        motion_of(swapped(recording), rig)
-    ):
+    round_, leads = rig.outline.rotational_symmetry == 0, _leads(motion)
+    if round_ and leads > AT_REST > 3.0 * _leads(motion_of(swapped(recording), rig)):
         return [_swapped(fit.gap)]
     if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
@@ -137,10 +136,8 @@ def _findings_of_large_gap(
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
-    explained_otherwise = another or {"frames_apart", "tip_offset", "outline_shape"} & {
-        finding.name for finding in found
-    }
-    return found if explained_otherwise else [*found, _unexplained(fit.gap)]
+    otherwise = any(finding.name in ("frames_apart", "tip_offset", "outline_shape") for finding in found)
+    return found if another or otherwise else [*found, _unexplained(fit.gap)]
 
 
 def swapped(recording: Recording) -> Recording:
@@ -296,23 +293,20 @@ def _another_body(gap: float) -> Finding:
 
 
 def _mirrored(name: str, gap: float, after: float) -> Finding:
-    mirror = MIRRORS[name]
-    sentence = (
-        f"{mirror.mistake} With it corrected, the median gap in contact falls from {1e3 * gap:.1f} mm to "
-        f"{1e3 * after:.2f} mm."
-    )
-    values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding(name, "warning", sentence, mirror.advice, values)
+    return _falling(name, f"{MIRRORS[name].mistake} With it corrected", MIRRORS[name].advice, gap, after)
 
 
 def _outline_mirrored(gap: float, after: float) -> Finding:
-    sentence = (
-        f"The outline is the mirror image of the slider. Mirrored at the x axis, the median gap in contact falls from "
-        f"{1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
-    )
+    mistake = "The outline is the mirror image of the slider. Mirrored at the x axis"
     advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
+    return _falling("outline_mirrored", mistake, advice, gap, after)
+
+
+def _falling(name: str, mistake: str, advice: str, gap: float, after: float) -> Finding:
+    """A warning about what explains the gap (m), of which a smaller one is left."""
+    sentence = f"{mistake}, the median gap in contact falls from {1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
     values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding("outline_mirrored", "warning", sentence, advice, values)
+    return Finding(name, "warning", sentence, advice, values)
 
 
 def _unexplained(gap: float) -> Finding:

@@ -31,19 +31,13 @@ TURN_SPAN = 0.05  # s between the poses whose turns are summed
 
 def stream_rates(recording: Recording) -> list[Finding]:
     """Findings about the unit of the stamps."""
-    streams = (("slider", recording.slider), ("pusher", recording.pusher))
-    found = [_rate(name, stream) for name, stream in streams if len(stream) > 2]
+    found = [_rate(name, stream) for name, stream in recording.poses.items() if len(stream) > 2]
     return [finding for finding in found if finding is not None]
 
 
 def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
     """Findings about the units of lengths and angles of a recording's streams and rig."""
-    found = [rig_length(rig)]
-    found += [
-        _speed(name, stream)
-        for name, stream in (("slider", recording.slider), ("pusher", recording.pusher))
-        if len(stream) > 2
-    ]
+    found = [rig_length(rig), *(_speed(name, of) for name, of in recording.poses.items() if len(of) > 2)]
     if not any(found) and tilt_of(recording.slider) <= STEEP:  # of a steep z axis, headings may be anything
         found.append(_turning(recording.slider, rig))
     return [finding for finding in found if finding is not None]
@@ -66,13 +60,8 @@ def _rate(name: str, stream: PoseStream) -> Finding | None:
     if LOWEST_RATE <= rate <= HIGHEST_RATE:
         return None
     sentence = f"The {name}'s stamps give {rate:.3g} samples a second: the unit of the stamps is probably ms or us."
-    return Finding(
-        f"units_time_{name}",
-        "refused",
-        sentence,
-        "Give stamps in seconds and nanoseconds.",
-        {"rate": Value(rate, "Hz")},
-    )
+    advice = "Give stamps in seconds and nanoseconds."
+    return Finding(f"units_time_{name}", "refused", sentence, advice, {"rate": Value(rate, "Hz")})
 
 
 def _speed(name: str, stream: PoseStream) -> Finding | None:
@@ -153,10 +142,8 @@ def every(stream: PoseStream, span: float) -> slice:
 
 
 def _tilted(slider: PoseStream, rig: Rig, tilt: float) -> Finding:
-    values, up = (
-        {"tilt": Value(tilt, "rad")},
-        f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical",
-    )
+    values = {"tilt": Value(tilt, "rad")}
+    up = f"The slider's z axis is {np.degrees(tilt):.0f} degrees from the vertical"
     if float(np.nanpercentile(np.abs(slider.heading), COVERED)) < FROZEN:
         sentence = f"{up} and its heading does not change: the quaternion's order is probably w, x, y, z."
         return Finding("quaternion_order", "refused", sentence, "Give orientations as x, y, z, w.", values)

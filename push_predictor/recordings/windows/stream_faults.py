@@ -40,8 +40,8 @@ def describe_recording_faults(recording: Recording, counts: Mapping[str, int]) -
     found = describe_faults(counts)
     if recording.wrench is None:
         found.append("no wrench was recorded: contact is found from geometry alone")
-    for name, stream in (("pusher", recording.pusher), ("wrench", recording.wrench)):
-        if stream is not None and abs(offset := clock_offset(stream, recording.slider)) > CLOCK_TOLERANCE:
+    for name, stream in recording.sensors.items():
+        if abs(offset := clock_offset(stream, recording.slider)) > CLOCK_TOLERANCE:
             found.append(describe_clock_offset(name, offset))
     return found
 

@@ -78,7 +78,7 @@ def places_of(stream: PoseStream) -> Places:
     return Places(jumps, len(returned), float(np.median(step[begins[back] - 1])), float(share))
 
 
-def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:
+def two_bodies(name: str, places: Places) -> Finding | None:
     """A finding if a stream jumps to and fro between two places."""
     if places.returns < FEWEST_RETURNS:
         return None

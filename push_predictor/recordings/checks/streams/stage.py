@@ -63,7 +63,7 @@ def stream_stage(evidence: Evidence) -> Evidence:
 def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:
     """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
     found, sound = list[Finding](), dict[str, Any]()
-    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
+    for name, stream in recording.poses.items():
         lost = continued(stream, headed and name == "slider")
         if (runs := int(np.sum(np.diff(lost, prepend=False) & lost))) < FEWEST_RUNS:
             continue
@@ -80,7 +80,7 @@ def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding
 def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
     """The facts of the streams of poses, and the recording as repaired; headed: whether the slider has headings."""
     facts, repaired = dict[str, StreamFacts](), dict[str, Any]()
-    for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
+    for name, stream in recording.poses.items():
         if len(poses := in_order(stream)) < FEWEST:
             continue
         regular = regular_in_bursts(poses)
@@ -92,13 +92,13 @@ def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], 
 
 def _jumps(recording: Recording) -> tuple[list[Finding], Recording]:
     """What is twice or elsewhere in the streams, and the recording without it."""
-    places = {name: places_of(getattr(recording, name)) for name in ("slider", "pusher")}
+    places = {name: places_of(stream) for name, stream in recording.poses.items()}
     swapped = exchanged(recording, places["slider"], places["pusher"])
-    bodies = [two_bodies(name, getattr(recording, name), of) for name, of in places.items()] if swapped is None else []
+    bodies = [two_bodies(name, of) for name, of in places.items()] if swapped is None else []
     found = [finding for finding in (repeated_samples(recording), swapped, *bodies) if finding is not None]
     if not found:
         return [], recording
-    slider, pusher = (of_one_body(in_order(stream)) for stream in (recording.slider, recording.pusher))
+    slider, pusher = (of_one_body(in_order(stream)) for stream in recording.poses.values())
     wrench = None if recording.wrench is None else in_order(recording.wrench)
     return found, replace(recording, slider=slider, pusher=pusher, wrench=wrench)
 
@@ -125,17 +125,15 @@ def of_one_body(stream: PoseStream) -> PoseStream:
 
 def repeated_samples(recording: Recording) -> Finding | None:
     """A warning if samples are in the recording twice: from two publishers, or from a loop that was recorded."""
-    every = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
-    streams = {name: stream for name, stream in every.items() if stream is not None and len(stream)}
-    twice = {name: repeated(stream) for name, stream in streams.items()}
+    streams = recording.sensors
+    twice = {name: repeated(stream) for name, stream in streams.items() if len(stream)}
     often = {name: again for name, again in twice.items() if np.mean(again) > LEAST_SHARE}
     if not often:
         return None
     listed = ", ".join(f"{name} {100.0 * np.mean(again):.0f} %" for name, again in often.items())
     values = {f"{name}_share": Value(float(np.mean(again)), "1") for name, again in often.items()}
     sentence = f"Samples are recorded twice, with the same stamp and value: {listed}."
-    loop = any(bool(np.any(np.diff(streams[name].stamp) < -CLOCK_SET)) for name in often)
-    if loop:
+    if any(bool(np.any(np.diff(streams[name].stamp) < -CLOCK_SET)) for name in often):
         advice = "A loop was recorded. Its windows count once. Record a replay only once."
         return Finding("loop_recorded", "warning", sentence, advice, values)
     advice = "They count once. Stop the second publisher (`ros2 topic info --verbose` lists both)."

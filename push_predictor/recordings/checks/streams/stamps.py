@@ -39,8 +39,7 @@ BETTER = "Stamp each sample when it is measured, not at receipt."
 
 def stamps_of(recording: Recording) -> Stamps:
     """The stamps of each stream with enough samples, by name."""
-    streams = {"slider": recording.slider, "pusher": recording.pusher, "wrench": recording.wrench}
-    return {name: stream.stamp for name, stream in streams.items() if stream is not None and len(stream) >= FEWEST}
+    return {name: stream.stamp for name, stream in recording.sensors.items() if len(stream) >= FEWEST}
 
 
 def unset_stamps(stamps: Stamps) -> Finding | None:
