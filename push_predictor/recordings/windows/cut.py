@@ -89,21 +89,32 @@ class WindowCutter:
                 self._push, self._edge, self._index = push.push_index, -1, 0
             if motions.touch.at_vertex[k]:
                 self._keep_edge(motions, k)
-            fault = (
-                faults[k]
-                if abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] >= self._least_speed
-                else "not_a_push"
-            )
-            if fault:
+            pushes = abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] >= self._least_speed
+            if fault := faults[k] if pushes else "not_a_push":
                 self.counts[fault] += 1
                 continue
             covariates = {"elapsed_time": (start - first) * NANOSECOND, "slid_distance": self._slid}
             covariates |= self._conditions(motions, k, start, push) | _on_slider(
                 forces[k], push.tare, motions.normal[k]
             )
-            found.append(_window(motions, k, start, end, push, self._index, covariates))
+            window = PushWindow(
+                push_id=push.push_id,
+                index=self._index,
+                start=start,
+                end=end,
+                velocity=float(motions.speed[k]),
+                contact=float(motions.contact[k]),
+                angle=float(motions.angle[k]),
+                duration=(end - start) * NANOSECOND,
+                displacement=motions.displacement[k],
+                slider_start=motions.poses[0, k],
+                slider_end=motions.poses[1, k],
+                push_heading=float(motions.heading[k]),
+                covariates=covariates,
+            )
+            found.append(window)
             self._edge, self._index = int(motions.edge[k]), self._index + 1
-            self._slid += float(np.hypot(*found[-1].displacement[:2]))
+            self._slid += float(np.hypot(*window.displacement[:2]))
         return found
 
     def _keep_edge(self, motions: _Motions, k: int) -> None:
@@ -181,26 +192,6 @@ def _faults(rig: Rig, motions: _Motions) -> list[str]:
     entered = before - after > np.maximum(ENTERED, ENTERED_SHARE * driven)
     outran = moved > OUTRAN + OUTRAN_SHARE * driven
     return list(np.where(entered, "left_behind", np.where(outran, "outran", "")))
-
-
-def _window(
-    motions: _Motions, k: int, start: int, end: int, push: PushContext, index: int, covariates: dict[str, float]
-) -> PushWindow:
-    return PushWindow(
-        push_id=push.push_id,
-        index=index,
-        start=start,
-        end=end,
-        velocity=float(motions.speed[k]),
-        contact=float(motions.contact[k]),
-        angle=float(motions.angle[k]),
-        duration=(end - start) * NANOSECOND,
-        displacement=motions.displacement[k],
-        slider_start=motions.poses[0, k],
-        slider_end=motions.poses[1, k],
-        push_heading=float(motions.heading[k]),
-        covariates=covariates,
-    )
 
 
 def _forces(wrench: Track, times: Array) -> Array:

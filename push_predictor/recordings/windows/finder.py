@@ -50,7 +50,6 @@ class WindowFinder:
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
         self._scalars: dict[str, ScalarTrack] = {}  # by topic
         self._waiting: list[PushWindow] = []  # windows that wait for their scalars
-        self._ready: list[PushWindow] = []
 
     @property
     def counts(self) -> dict[str, int]:
@@ -110,25 +109,24 @@ class WindowFinder:
 
     def take_ready(self) -> list[PushWindow]:
         """The windows that have become complete since the last call."""
+        found = list[PushWindow]()
         while self._session.clocks_set and self._all_clocks_are_set():
-            self._end_session()
+            found += self._end_session()
             self._add_postponed()
-        self._advance(final=False)
-        self._release(final=False)
-        return self._taken()
+        return found + self._found(final=False)
 
     def finish(self) -> list[PushWindow]:
         """The remaining windows, when no more samples will come.
 
         Afterwards the finder starts from the beginning.
         """
-        self._end_session()
+        found = self._end_session()
         while self._postponed:
             self._add_postponed()
-            self._end_session()
+            found += self._end_session()
         self._counts["refused"] += sum(track.discarded for track in self._scalars.values())
         self._scalars = {}
-        return self._taken()
+        return found
 
     def _once(self, name: str, stream: Stream) -> Stream:
         """The samples without those that are there before, as in a loop that was recorded; they are counted."""
@@ -167,17 +165,17 @@ class WindowFinder:
         spans = [np.concatenate([stamp for n, stamp, _ in self._postponed if n == name]) for name in clocks_set]
         return any(int(span[-1]) - int(span[0]) > LONGEST_LAG * 1e9 for span in spans)
 
-    def _end_session(self) -> None:
+    def _end_session(self) -> list[PushWindow]:
         """Finish the windows of the time before the clock was set, or of the whole stream."""
         for name in SENSORS:
             if name not in self._session.clocks_set:
                 nothing = np.empty(0, dtype=np.int64), self._session.tracks[name].values[:0]
                 self._extend(name, *nothing, final=True)
-        self._advance(final=True)
-        self._release(final=True)
+        found = self._found(final=True)
         self._counts += self._session.counts
         self._earlier_contact, self._earlier_touches = self._contact(), self.force_touches
         self._session = ClockSession(self.rig, self.options)
+        return found
 
     def _add_postponed(self) -> None:
         """Add the samples that waited for the new time."""
@@ -191,19 +189,16 @@ class WindowFinder:
 
     # --- windows ------------------------------------------------------------------------------------------------
 
-    def _advance(self, final: bool) -> None:
-        """Find windows as far as all streams are known."""
+    def _found(self, final: bool) -> list[PushWindow]:
+        """Windows as far as all streams are known, those whose scalars are known, in order; with `final` all."""
         self._waiting += self._session.find(final)
         needed = self._session.needed
         for track in self._scalars.values():
             track.forget_before(min(needed, self._waiting[0].start) if self._waiting else needed)
-
-    def _release(self, final: bool) -> None:
-        """Complete the windows whose scalars are known, in order; with `final` all windows."""
         waiting = self._waiting
         count = len(waiting) if final else next((k for k, w in enumerate(waiting) if self._waits(w)), len(waiting))
-        self._ready += [self._with_scalars(window) for window in waiting[:count]]
         self._waiting = waiting[count:]
+        return [self._with_scalars(window) for window in waiting[:count]]
 
     def _waits(self, window: PushWindow) -> bool:
         late = self._session.newest - window.start > LONGEST_GAP
@@ -213,10 +208,6 @@ class WindowFinder:
         values = {f"topic:{name}": track.at(window.start) for name, track in self._scalars.items()}
         known = {name: value for name, value in values.items() if value is not None}
         return replace(window, covariates={**window.covariates, **known})
-
-    def _taken(self) -> list[PushWindow]:
-        ready, self._ready = self._ready, []
-        return ready
 
 
 # --- scalar topics: their values at the start of a window -------------------------------------------------------------

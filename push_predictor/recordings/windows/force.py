@@ -88,7 +88,6 @@ class ForceTiming:
     def __init__(self) -> None:
         self.touches: list[tuple[float, float]] = []
         self.apart = False
-        self._delays: list[float] = []
         self._samples: ContactSamples | None = None  # of the last SEARCHED, and since a touch that is not judged yet
         self._touch: int | None = None  # its index in these
         self._last_contact = -np.inf
@@ -163,9 +162,9 @@ class ForceTiming:
         reached = min(_reached(time, samples.gap, touch) - begin, 0.0)
         delay = _delay(time - begin, np.hypot(x, y), 1.0 - HIGH * share, reached, least_force)
         self.touches.append((float(time[touch]), delay))
-        self._delays.append(delay)
-        unseen = len(self._delays) >= UNSEEN and all(map(math.isnan, self._delays[-UNSEEN:]))
-        self.apart = unseen or any(force_delay(self._delays[-last:]).apart for last in (0, RECENT))
+        delays = [delay for _, delay in self.touches]
+        unseen = len(delays) >= UNSEEN and all(map(math.isnan, delays[-UNSEEN:]))
+        self.apart = unseen or any(force_delay(delays[-last:]).apart for last in (0, RECENT))
 
 
 def _begin(time: Array, sample: int) -> int:

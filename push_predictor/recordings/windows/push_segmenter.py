@@ -92,13 +92,18 @@ class PushSegmenter:
         self, samples: ContactSamples, judged: BoolArray, shown: BoolArray, usable: BoolArray
     ) -> BoolArray:
         """Whether the force does not show contacts (n,), by the touches so far."""
+
+        def clear_force(sample: int) -> float:
+            """The force (N) that shows a contact without delay."""
+            return max(CLEAR * self.options.least_force, NOISE_FACTOR * self._zero.at(int(rows[sample])).noise)
+
         rows, apart = np.flatnonzero(judged), np.zeros(len(samples), dtype=np.bool_)
         apart[rows] = self.timing.take(
             samples if len(rows) == len(samples) else taken(samples, rows),
             (shown & self._moves(samples))[rows],
             usable[rows],
             zero=lambda sample: self._zero.readings(int(rows[sample])),
-            least_force=lambda sample: self._clear_force(self._zero.at(int(rows[sample])).noise),
+            least_force=clear_force,
         )
         return apart
 
@@ -111,10 +116,6 @@ class PushSegmenter:
         size, noise = self._zero.above(samples.force, rows)
         found[rows] = size > np.maximum(self.options.least_force, NOISE_FACTOR * noise)
         return found
-
-    def _clear_force(self, noise: float) -> float:
-        """The force (N) that shows a contact without delay."""
-        return max(CLEAR * self.options.least_force, NOISE_FACTOR * noise)
 
     def _at_rest(self, samples: ContactSamples, sample: int, near: bool, moves: bool) -> bool:
         """Whether a contact goes on at a sample before any free motion, where the force at rest is the zero."""
@@ -153,7 +154,7 @@ class PushSegmenter:
             if stop:
                 self.start = None
                 if ends[k]:
-                    self._end_push()
+                    self.push = self._first_touch = None
             if ask:
                 touches = self._at_rest(samples, k, bool(near[k]), moving) or touches
             self._touching = touches
@@ -191,9 +192,6 @@ class PushSegmenter:
         self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), tare)
         self._pushes += 1
         self.start = None
-
-    def _end_push(self) -> None:
-        self.push, self.start, self._first_touch = None, None, None
 
 
 def _push_id(stamp: int) -> str:
