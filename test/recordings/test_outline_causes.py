@@ -29,9 +29,8 @@ from push_predictor.geometry.shapes import (
     transformed,
 )
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.corrected_rig import corrected_rig
 from push_predictor.recordings.checks.finding import Finding, Severity
-from push_predictor.recordings.checks.geometry import contacts_of
+from push_predictor.recordings.checks.geometry import contacts_of, corrected_rig
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.checks.outline_findings import half_size, outline_findings
 from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem, fit_outline

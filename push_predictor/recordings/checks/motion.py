@@ -19,15 +19,8 @@ from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
-SPANS = (
-    0.05,
-    0.07,
-    0.1,
-    0.14,
-    0.2,
-    0.28,
-    0.4,
-)  # s before and after a sample that determine its speed: the first that noise allows
+# s before and after a sample that determine its speed: the first that noise allows
+SPANS = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4)
 MOVING_SHARE, MOVING = 0.4, 0.01  # of the lowered tip's speed; m/s: the noise of a slider's speed is to be smaller
 NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
 STEADY, STEADY_TIP = 0.5, 0.3  # change of velocity, as a share of it, of a slider and a tip that neither hit nor part
@@ -95,9 +88,8 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     raised, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    kinds = {"moving": moving, "contact": contact, "steady": steady, "push": number}
-    measured = {"noise": noise, "span": slider_speed.span, "tool": tool}
-    return Motion(time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force, **kinds, **measured)
+    measured = (time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force)
+    return Motion(*measured, moving, contact, steady, number, noise, slider_speed.span, tool)
 
 
 def body_velocity(motion: Motion) -> Array:
