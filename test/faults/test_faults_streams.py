@@ -14,7 +14,7 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from lab_bags import short_recording
-from synthetic import START, Push, rows, translating_push
+from synthetic import START, Push, feed, rows, translating_push
 
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -46,7 +46,6 @@ def of(recording: Recording, name: str) -> Stream:
 
 
 def found_in(recording: Recording) -> tuple[list[PushWindow], dict[str, int]]:
-    assert recording.rig is not None
     finder = WindowFinder(recording.rig)
     windows = finder.find(recording)
     return windows, finder.counts
@@ -346,7 +345,6 @@ def test_clock_offset_of_the_pusher_gives_no_wrong_window_and_is_reported(
 @pytest.mark.parametrize("lag", [0.2, 0.4, 1.0])
 def test_tip_that_enters_the_outline_gives_no_window(lag: float) -> None:
     recording, shift = translating_push(Push(2.0, 4.0)), round(lag * SECOND)
-    assert recording.wrench is not None
     early = {name: replace(of(recording, name), stamp=of(recording, name).stamp - shift) for name in SENSORS[1:]}
     windows, counts = found_in(replace(recording, **early))
     assert all(w.displacement[0] > 0.003 for w in windows), "the tip drove 4 mm in each"
@@ -382,7 +380,6 @@ def test_clock_set_back_keeps_the_windows_of_both_times(
         if (stream := getattr(truth.recording, name)) is not None:
             before, again = np.flatnonzero(stream.stamp <= jump), np.flatnonzero(stream.stamp >= back)
             streams[name], until[name] = taken(stream, np.concatenate([before, again])), taken(stream, before)
-    assert truth.recording.rig is not None
     finder = WindowFinder(truth.recording.rig)
     add = {"slider": finder.add_slider, "pusher": finder.add_pusher, "wrench": finder.add_wrench}
     windows: list[PushWindow] = []
@@ -406,17 +403,13 @@ def test_clock_set_back_keeps_the_windows_of_both_times(
 
 def test_single_clock_set_back_does_not_block_the_other_streams() -> None:
     recording = translating_push(Push(0.5, 90.0))
-    assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
     pusher = recording.pusher
     late = pusher.stamp > START + 20 * SECOND
     alone = replace(pusher, stamp=pusher.stamp - 5 * SECOND * late)
     windows: list[PushWindow] = []
     for begin in range(0, len(pusher), 100):
-        part = slice(begin, begin + 100)
-        finder.add_wrench(taken(recording.wrench, part))
-        finder.add_pusher(taken(alone, part))
-        finder.add_slider(taken(recording.slider, part))
+        feed(finder, replace(recording, pusher=alone), lambda of, part=slice(begin, begin + 100): taken(of, part))
         windows += finder.take_ready()
         assert sum(len(stamp) for _, stamp, _ in finder._postponed) < 10_000
     windows += finder.finish()

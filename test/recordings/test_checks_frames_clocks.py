@@ -26,7 +26,6 @@ from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed
 from push_predictor.recordings.read import require_rig
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, joined, taken
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
@@ -270,11 +269,11 @@ def test_fast_pushes_are_no_fault_of_the_outline(speed: float) -> None:
     with coarse_simulator(2.0):
         plan = random_pushes(20, (speed,), 0.03, np.random.default_rng(0))
         recording = simulate(SimulationSpec(slider, "abs", plan, seed=1))
-    rig: Rig | None = recording.rig
-    assert rig is not None
-    motion = motion_of(recording, rig)
-    assert motion is not None and np.sum(motion.touching) < np.sum(motion.contact)
-    assert not [name for name in found(recording, rig) if name.startswith(("outline_s", "clock", "tip", "frames"))]
+    motion = motion_of(recording, recording.rig)
+    assert np.sum(motion.touching) < np.sum(motion.contact)
+    assert not [
+        name for name in found(recording, recording.rig) if name.startswith(("outline_s", "clock", "tip", "frames"))
+    ]
 
 
 # --- a body on the robot's hand moves with the tip where a pushed slider would rest -----------------------------------

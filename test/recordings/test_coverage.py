@@ -57,9 +57,7 @@ def rig_with(outline: Outline) -> Rig:
 
 
 def covered(table: PushTable, outline: Outline = SQUARE) -> Coverage:
-    coverage = coverage_of(table, rig_with(outline))
-    assert coverage is not None
-    return coverage
+    return coverage_of(table, rig_with(outline))
 
 
 def found(table: PushTable, outline: Outline | None = SQUARE) -> dict[str, Finding]:
@@ -213,9 +211,7 @@ def hexagon() -> Recording:
 
 
 def fit_of(recording: Recording, rig: Rig) -> ContactFit:
-    fit = contact_fit(motion_of(recording, rig), rig)
-    assert fit is not None
-    return fit
+    return contact_fit(motion_of(recording, rig), rig)
 
 
 @pytest.mark.parametrize("size", [0.96, 1.0, 1.04])

@@ -29,7 +29,6 @@ ONE_SIDE = "square_abs_repeats"  # 80 short pushes
 
 def altered(name: str, alter: Callable[[WrenchStream], WrenchStream]) -> Recording:
     recording = bag(name)
-    assert recording.wrench is not None
     return replace(recording, wrench=alter(recording.wrench))
 
 
@@ -61,7 +60,6 @@ def test_what_follows_gets_the_force_without_its_lag(seconds: float) -> None:
     """So that its axes and its zero are judged in the contacts."""
     recording = evidence_of(altered(NAME, late(seconds)), rig_of(NAME)).recording
     sound = bag(NAME).wrench
-    assert recording.wrench is not None and sound is not None
     assert np.max(np.abs(recording.wrench.stamp - sound.stamp)) < 20_000_000
 
 
@@ -79,7 +77,6 @@ def test_the_windows_of_a_check_are_those_of_the_recording_as_given() -> None:
     for recording in (bag(NAME), altered(NAME, late(0.12))):
         shared = evidence_of(recording, rig_of(NAME)).windows
         expected = find_windows(recording, rig_of(NAME))
-        assert shared is not None
         assert [(each.start, each.end) for each in shared] == [(each.start, each.end) for each in expected]
     stuck = altered(NAME, lambda wrench: replace(wrench, fx=np.full(len(wrench), 1.5), fy=np.full(len(wrench), -0.5)))
     assert evidence_of(stuck, rig_of(NAME)).windows is None
@@ -89,7 +86,6 @@ def test_the_windows_of_a_check_are_those_of_the_recording_as_given() -> None:
 def test_a_zero_that_varies_as_much_as_it_is_off_is_no_constant(spread: float, named: bool) -> None:
     rig, rng = rig_of(NAME), np.random.default_rng(0)
     motion = motion_of(bag(NAME), rig)
-    assert motion is not None
     free = ~motion.contact[:, None]
     zero = [1.2, 0.0] + rng.uniform(-spread, spread, (len(motion.time), 1)) * [1.0, 0.0]
     force = np.where(free, zero, motion.force + [1.2, 0.0])
@@ -171,7 +167,6 @@ def test_what_costs_little_is_no_finding() -> None:
 
 def test_axes_of_the_tip_are_named_whether_it_turns_or_not() -> None:
     recording, elapsed = bag(NAME), bag(NAME).pusher.stamp - bag(NAME).pusher.stamp[0]
-    assert recording.wrench is not None
     for heading, words in (
         (np.radians(70.0) + 0.0 * elapsed, "use `--wrench-frame tip`"),
         (0.3e-9 * elapsed, "of the force are those of the tip"),
@@ -193,6 +188,5 @@ def test_the_angle_of_the_axes_is_named_with_its_sd(degrees: float) -> None:
 
 def test_a_zero_that_is_off_hides_no_wrong_axes() -> None:
     turned = force_turned(bag(NAME), np.radians(43.0))
-    assert turned.wrench is not None
     both = replace(turned, wrench=biased(3.2, -2.4)(turned.wrench))
     assert [each.name for each in check_recording(both, rig_of(NAME))] == ["wrench_zero", "wrench_frame"]

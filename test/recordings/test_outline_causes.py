@@ -208,7 +208,6 @@ def test_a_tracker_with_noise_and_offsets_gives_no_finding() -> None:
 @pytest.mark.parametrize(("off", "names"), [(0.0007, []), (0.0015, ["outline_shape"])])
 def test_a_single_push_needs_to_be_far_off(off: float, names: list[str]) -> None:
     contacts, rig = contacts_of(motion_of(bag(ROUND), rig_of(ROUND))), rig_of(ROUND)
-    assert contacts is not None
     away = np.where(contacts.push == contacts.push[-1], off, 0.0) / np.linalg.norm(contacts.tips, axis=1)
     moved = replace(contacts, tips=contacts.tips * (1.0 + away[:, None]))
     assert [finding.name for finding in outline_findings(moved, rig, fit_outline(moved, rig))] == names
@@ -307,7 +306,6 @@ def test_a_mirrored_outline_is_found_and_corrected() -> None:
     assert [finding.name for finding in findings] == ["outline_mirrored"]
     corrected = corrected_rig(altered, findings)
     np.testing.assert_allclose(corrected.outline.vertices, rig.outline.vertices, atol=1e-12)
-    assert corrected.support_points is not None and altered.support_points is not None
     np.testing.assert_allclose(corrected.support_points, altered.support_points * [1.0, -1.0, 1.0])
 
 
@@ -344,7 +342,6 @@ def test_a_correction_scales_and_turns_about_the_centroid_and_moves_the_feet() -
     turned = corrected_rig(rig, [finding_of("outline_turned", yaw=np.pi / 2.0), finding_of("outline_size", scale=1.05)])
     assert turned.outline.centroid == pytest.approx([0.02, 0.0])
     assert turned.outline.vertices[0] == pytest.approx([0.02 + 0.0315, -0.0525])
-    assert turned.support_points is not None
     np.testing.assert_allclose(turned.support_points, [[0.02, 0.0105, 0.5], [0.02, -0.0525, 0.5]], atol=1e-12)
 
 
@@ -382,7 +379,6 @@ NEAR_CORNERS = 0.02  # share of the tips whose nearest side changes within a ste
 
 def problem_of(name: str, turn: float = 0.0) -> Problem:
     rig, contacts = rig_of(name), contacts_of(motion_of(whole(name), rig_of(name)))
-    assert contacts is not None
     return Problem(contacts, replace(rig, outline=transformed(rig.outline, turn)), SIMILARITY)
 
 

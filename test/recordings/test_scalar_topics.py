@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from decoding import input_of
 from replay_bags import stamped
-from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
+from synthetic import START, Push, feed, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.nodes.validator.scalar_topics import DELAY, STALE, ClockHistory
 from push_predictor.online import stream_health
@@ -97,10 +97,7 @@ def warmth_of(windows: list[PushWindow]) -> list[float | None]:
 
 def fed(recording: Recording, finder: WindowFinder, begin: float, end: float) -> None:
     """The sensors' samples from begin to end (s), without scalars."""
-    assert recording.wrench is not None
-    finder.add_wrench(part(recording.wrench, begin, end))
-    finder.add_pusher(part(recording.pusher, begin, end))
-    finder.add_slider(part(recording.slider, begin, end))
+    feed(finder, recording, lambda of: part(of, begin, end))
 
 
 def part(of: Any, begin: float, end: float) -> Any:
@@ -238,7 +235,6 @@ def samples(recording: Recording, end: float, **named: float) -> Samples:
     """Sensors up to `end` s, each scalar with one sample at its time."""
     last = recording.slider.stamp < START + round(end * SECOND)
     none = wrench_rows(recording.wrench, np.arange(0)) if recording.wrench else None
-    assert none is not None
     found = {f"/{name}": stream((time, 0.0)) for name, time in named.items()}
     return Samples(rows(recording.slider, last), rows(recording.pusher, last), none, found)
 

@@ -73,7 +73,6 @@ def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
 def test_jitter_is_the_standard_deviation_of_a_stamp(sd: float) -> None:
     stamp = np.delete(grid(3000), slice(500, 520))
     found = stamp_noise(noisy(stamp, sd))
-    assert found is not None
     assert (found.period, found.jitter) == (pytest.approx(0.01, rel=0.02), pytest.approx(1e-3 * sd, rel=0.05))
     assert found.corrected == (sd > 0.5)
     figures = stamp_figures(noisy(stamp, sd), None)
@@ -125,7 +124,6 @@ def test_missing_samples_are_counted() -> None:
     true = np.delete(grid(2000), [300, 301, 700, 1100, 1101, 1102, 1500])
     stamp = noisy(true, 1.3)
     noise = stamp_noise(stamp[:DECIDING])
-    assert noise is not None
     found = missing_before(stamp, noise)
     assert dict(zip(np.flatnonzero(found).tolist(), found[found > 0].tolist(), strict=True)) == {
         300: 2,
@@ -224,7 +222,6 @@ def test_undisturbed_recordings_keep_their_stamps(name: str) -> None:
     finder = WindowFinder(require_rig(recording))
     finder.find(recording)
     for stream in (recording.slider, recording.pusher, recording.wrench):
-        assert stream is not None
         increasing = stream.stamp[np.diff(np.maximum.accumulate(stream.stamp), prepend=0) > 0]
         assert np.array_equal(regular(increasing), increasing)
 
@@ -272,7 +269,6 @@ def test_windows_of_jittery_streams_are_the_same_online_and_offline() -> None:
     recording = with_jitter(short, 2.0)
     rig, offline = require_rig(recording), find_windows(recording, require_rig(recording))
     finder, online = WindowFinder(rig), []
-    assert recording.wrench is not None
     for begin, end in pairwise(range(0, len(recording.slider) + 37, 37)):
         finder.add_wrench(taken(recording.wrench, slice(begin // 2, end // 2)))
         finder.add_pusher(taken(recording.pusher, slice(begin, end)))
@@ -289,7 +285,6 @@ def test_windows_of_jittery_streams_are_the_same_online_and_offline() -> None:
 
 def test_the_check_states_the_jitter_of_streams_with_samples() -> None:
     recording, rig = bag("circle_pu"), rig_of("circle_pu")
-    assert recording.wrench is not None
     sound = replace(recording, wrench=taken(recording.wrench, slice(0)))
     assert "stamp_jitter" not in found(sound, rig)
     finding = found(replace(sound, slider=with_jitter(recording, 2.0).slider), rig)["stamp_jitter"]

@@ -13,7 +13,7 @@ import pytest
 from contact_portions import samples_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
+from synthetic import START, Push, feed, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording, joined, taken
 from push_predictor.recordings.windows.contact import ContactSamples
@@ -46,7 +46,6 @@ def test_translating_slider_moves_only_along_the_push() -> None:
 
 def test_windows_state_what_the_sensor_read_in_free_motion_and_do_not_contain_it() -> None:
     plain = translating_push()
-    assert plain.wrench is not None
     biased = replace(plain, wrench=replace(plain.wrench, fx=plain.wrench.fx + 0.3, fy=plain.wrench.fy - 0.1))
     for a, b in zip(windows_of(plain), windows_of(biased), strict=True):
         for name, bias in (("free_force_x", 0.3), ("free_force_y", -0.1)):
@@ -74,7 +73,6 @@ def test_windows_do_not_depend_on_the_world_frame(shift: tuple[float, float], tu
 @given(cuts=st.lists(st.integers(1, 239), max_size=12, unique=True), order=st.permutations(range(3)))
 def test_windows_do_not_depend_on_portions_and_interleaving(cuts: list[int], order: list[int]) -> None:
     recording = translating_push()
-    assert recording.rig is not None and recording.wrench is not None
     finder, found = WindowFinder(recording.rig), []
     feeds = [
         (finder.add_slider, recording.slider),
@@ -120,14 +118,12 @@ def test_lifted_tip_is_not_in_contact() -> None:
 
 def test_near_tip_without_force_is_not_in_contact() -> None:
     recording = translating_push()
-    assert recording.wrench is not None
     silent = replace(recording.wrench, fx=0.0 * recording.wrench.fx, fy=0.0 * recording.wrench.fy)
     assert windows_of(replace(recording, wrench=silent)) == []
 
 
 def test_bias_of_the_force_sensor_is_not_contact() -> None:
     recording = translating_push(Push(begin=0.7, end=1.6))
-    assert recording.wrench is not None
     biased = replace(recording.wrench, fx=recording.wrench.fx + 5.0, fy=recording.wrench.fy - 3.0)
     same = windows_of(replace(recording, wrench=biased))
     assert [w.start for w in same] == [w.start for w in windows_of(recording)]
@@ -148,7 +144,6 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     time = np.arange(0.0, 2.5, 1.0 / rate)
     driven = 0.02 * np.maximum(time - 1.0, 0.0)  # at rest in contact for a second, then 20 mm/s at once
     rig = translating_push().rig
-    assert rig is not None
     slider = np.column_stack([driven, np.zeros_like(time)])
     pusher = slider - [0.045 + rig.pusher_radius, 0.0] + 3e-5 * rng.standard_normal(slider.shape)
     still = np.zeros_like(time)
@@ -170,7 +165,6 @@ def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float, porti
     )
     for begin in range(0, len(force), portion):
         segmenter.take(taken(samples, slice(begin, begin + portion)))
-    assert segmenter.push is not None and segmenter.push.tare is not None
     assert segmenter.push.tare == pytest.approx((1.5, 0.0))
 
 
@@ -234,13 +228,10 @@ def test_short_stride_gives_overlapping_windows() -> None:
 
 def test_clock_set_back_loses_no_window() -> None:
     recording = translating_push()
-    assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
     found = []
     for _ in range(3):  # as in a looped replay
-        finder.add_wrench(recording.wrench)
-        finder.add_pusher(recording.pusher)
-        finder.add_slider(recording.slider)
+        feed(finder, recording)
         found += finder.take_ready()
     found += finder.finish()
     assert finder.counts["clock_set_back"] >= 2
@@ -250,7 +241,6 @@ def test_clock_set_back_loses_no_window() -> None:
 def test_contact_at_a_vertex_belongs_to_the_edge_it_slid_along() -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     rig = recording.rig
-    assert rig is not None
     time = (recording.slider.stamp - START) * 1e-9
     # The slider recedes as fast as the tip advances, while the tip slides along the first side and beyond its end.
     speed = 0.025
@@ -267,7 +257,6 @@ def test_contact_at_a_vertex_belongs_to_the_edge_it_slid_along() -> None:
 
 def test_the_force_on_the_slider_is_along_the_normal_and_to_its_left() -> None:
     recording = translating_push()
-    assert recording.wrench is not None
     sideways = replace(recording.wrench, fy=np.where(recording.wrench.fx != 0.0, 0.5, 0.0))
     windows = windows_of(replace(recording, wrench=sideways))
     assert len(windows) == 5
@@ -289,13 +278,10 @@ def test_lines_through_the_tip_give_its_place_and_velocity_between_samples() -> 
 
 def test_memory_stays_bounded_over_a_long_stream() -> None:
     recording = translating_push()
-    assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
     span = int(recording.slider.stamp[-1] - recording.slider.stamp[0]) + 10_000_000
     for k in range(30):
-        finder.add_wrench(replace(recording.wrench, stamp=recording.wrench.stamp + k * span))
-        finder.add_pusher(replace(recording.pusher, stamp=recording.pusher.stamp + k * span))
-        finder.add_slider(replace(recording.slider, stamp=recording.slider.stamp + k * span))
+        feed(finder, recording, lambda of, late=k * span: replace(of, stamp=of.stamp + late))
         finder.take_ready()
     assert max(len(track) for track in finder._session.tracks.values()) < 2 * len(recording.slider)
 

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +19,7 @@ from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array, IntArray
 
@@ -122,6 +124,13 @@ def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
 def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
     """The wrench samples selected by `keep`."""
     return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
+
+
+def feed(finder: WindowFinder, recording: Recording, part: Callable[[Any], Any] = lambda stream: stream) -> None:
+    """Add a part of each stream."""
+    finder.add_wrench(part(recording.wrench))
+    finder.add_pusher(part(recording.pusher))
+    finder.add_slider(part(recording.slider))
 
 
 def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:
