@@ -170,7 +170,9 @@ def test_clocks_that_never_meet_are_named_before_anything_about_motion() -> None
     assert list(findings) == ["clocks_never_meet"]
     assert "The time of pusher counts from the start of a simulation" in findings["clocks_never_meet"].sentence
     (finding,) = clocks_never_meet({"slider": times(100), "pusher": times(100) + 100 * SECOND})
-    assert "simulation" not in finding.sentence  # all count from a start
+    assert "simulation" not in finding.sentence and "zones" not in finding.sentence  # all count from a start
+    (finding,) = clocks_never_meet({"slider": times(100), "pusher": times(100) - 5400 * SECOND})
+    assert "the clocks are set to different time zones" in finding.sentence
     (finding,) = clocks_never_meet({"slider": times(100), "pusher": times(100) + 10**9 * SECOND})
     assert "The time of slider counts from the start of a simulation" in finding.sentence
 

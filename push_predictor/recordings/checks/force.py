@@ -65,21 +65,19 @@ def force_stage(evidence: Evidence) -> Evidence:
         stamp = kept.wrench.stamp - round(late.values["lag"].value / NANOSECOND)
         kept = replace(kept, wrench=replace(kept.wrench, stamp=stamp))
     if kept is not recording:
-        motion = motion_of(kept, rig)
+        motion = motion_of(kept, rig) or motion
     found += [each for each in (rate_finding(recording.wrench), late) if each is not None]
     directed = not evidence.has(*MIRRORS, "frames_apart")
     found += wrench_findings(motion, rig, outlined, directed)
     return replace(evidence.found(found or [unseen_finding(delays)], kept), windows=windows)
 
 
-def wrench_findings(motion: Motion | None, rig: Rig, outlined: bool = True, directed: bool = True) -> list[Finding]:
+def wrench_findings(motion: Motion, rig: Rig, outlined: bool = True, directed: bool = True) -> list[Finding]:
     """Findings about the zero, unit and axes of the wrench; empty without one.
 
     outlined: whether the outline shows where the tip is in contact. directed: whether slider and tip have one world
     frame, so that directions show axes.
     """
-    if motion is None:
-        return []
     free = _free(motion, rig) if outlined else np.zeros(len(motion.time), dtype=np.bool_)
     zero, spread = _zero(motion.force[free])
     touching = motion.touching & np.isfinite(motion.force[:, 0])
@@ -197,8 +195,7 @@ def _scale(size: Array, rig: Rig) -> Finding | None:
 
 def presence_findings(recording: Recording, motion: Motion) -> tuple[list[Finding], Recording]:
     """Findings about a force that is missing or stuck, and the recording without the samples that are stuck."""
-    wrench = recording.wrench
-    if wrench is None or not motion.contact.any():
+    if (wrench := recording.wrench) is None or not motion.contact.any():
         return [], recording
     time = (wrench.stamp - recording.slider.stamp[0]) * NANOSECOND
     missing, stuck = _missing(motion), _stuck(time, np.column_stack([wrench.fx, wrench.fy]), motion)

@@ -55,9 +55,7 @@ class PushSegmenter:
         self._last_contact: int | None = None
 
     def take(self, samples: ContactSamples) -> list[tuple[int, int, PushContext]]:
-        """Add a portion of samples and return the windows that end at or before the last of them."""
-        if not len(samples):
-            return []
+        """Add a portion of samples, at least one, and return the windows that end at or before the last of them."""
         options, known = self.options, samples.force_known
         lowered = samples.height <= options.lift
         inside = (samples.gap < -INSIDE) & lowered
