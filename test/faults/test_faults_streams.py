@@ -39,12 +39,6 @@ EXAMPLES = int(os.environ.get("FAULT_EXAMPLES", "8"))
 OFTEN = settings(max_examples=EXAMPLES, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
 
 
-def of(recording: Recording, name: str) -> Stream:
-    stream = getattr(recording, name)
-    assert isinstance(stream, (PoseStream, WrenchStream))
-    return stream
-
-
 def found_in(recording: Recording) -> tuple[list[PushWindow], dict[str, int]]:
     finder = WindowFinder(recording.rig)
     windows = finder.find(recording)
@@ -118,7 +112,7 @@ def place_in(stream: Stream, share: float, count: int = 1) -> int:
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, back=st.integers(2, 60))
 def test_late_sample_is_discarded_and_counted(which: str, name: str, share: float, back: int) -> None:
-    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    truth, stream = CLEAN[which], getattr(CLEAN[which].recording, name)
     place = min(place_in(stream, share), len(stream) - back - 8)
     order = np.r_[0:place, place + 1 : place + back + 1, place, place + back + 1 : len(stream)]
     windows, counts = found_in(replace(truth.recording, **{name: taken(stream, order)}))
@@ -129,7 +123,7 @@ def test_late_sample_is_discarded_and_counted(which: str, name: str, share: floa
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 40))
 def test_repeated_samples_are_used_once(which: str, name: str, share: float, count: int) -> None:
-    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    truth, stream = CLEAN[which], getattr(CLEAN[which].recording, name)
     place = place_in(stream, share, count)
     order = np.r_[0 : place + count, place : len(stream)]
     windows, counts = found_in(replace(truth.recording, **{name: taken(stream, order)}))
@@ -147,7 +141,7 @@ def test_repeated_samples_are_used_once(which: str, name: str, share: float, cou
 )
 @example(which="made up", name="wrench", share=0.1266, count=3, ahead=5 * PERIOD)  # the force's last zeros are missing
 def test_future_stamp_discards_only_its_sample(which: str, name: str, share: float, count: int, ahead: int) -> None:
-    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    truth, stream = CLEAN[which], getattr(CLEAN[which].recording, name)
     place = place_in(stream, share, 12)
     stamp = stream.stamp.copy()
     stamp[place : place + count] += ahead
@@ -159,7 +153,7 @@ def test_future_stamp_discards_only_its_sample(which: str, name: str, share: flo
 @pytest.mark.parametrize("name", SENSORS)
 @pytest.mark.parametrize("stamp", [0, START - 3 * DAY, START + 3 * DAY])
 def test_isolated_first_or_last_stamp_is_discarded(name: str, stamp: int) -> None:
-    stream = of(MADE_UP.recording, name)
+    stream = getattr(MADE_UP.recording, name)
     for place in (0, len(stream) - 1):
         stamps = stream.stamp.copy()
         stamps[place] = stamp
@@ -191,7 +185,7 @@ def repositioned(stream: PoseStream, place: int, count: int) -> bool:
 def test_jump_away_and_back_discards_only_the_samples_away(
     which: str, name: str, share: float, count: int, jump: float, direction: float
 ) -> None:
-    truth, stream = CLEAN[which], CLEAN[which].recording.__getattribute__(name)
+    truth, stream = CLEAN[which], getattr(CLEAN[which].recording, name)
     place = place_in(stream, share, 12)
     x, y = stream.x.copy(), stream.y.copy()
     x[place : place + count] += jump * np.cos(direction)
@@ -205,7 +199,7 @@ def test_jump_away_and_back_discards_only_the_samples_away(
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 3))
 def test_nan_or_infinity_discards_only_its_sample(which: str, name: str, share: float, count: int) -> None:
-    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    truth, stream = CLEAN[which], getattr(CLEAN[which].recording, name)
     place, column = place_in(stream, share, count), "fx" if name == "wrench" else "x"
     values = getattr(stream, column).copy()
     values[place : place + count] = np.nan
@@ -216,7 +210,7 @@ def test_nan_or_infinity_discards_only_its_sample(which: str, name: str, share: 
 
 def assert_is_as_without(windows: list[PushWindow], truth: Clean, name: str, places: Sequence[int]) -> None:
     """The windows equal those of the recording without some samples, and are correct."""
-    stream = of(truth.recording, name)
+    stream = getattr(truth.recording, name)
     left, _ = found_in(replace(truth.recording, **{name: taken(stream, np.delete(np.arange(len(stream)), places))}))
     assert [(w.push_id, w.start) for w in windows] == [(w.push_id, w.start) for w in left]
     for found, expected in zip(windows, left, strict=True):
@@ -235,7 +229,7 @@ def test_no_window_spans_a_dropout_of_any_stream(which: str, name: str, share: f
     truth = CLEAN[which]
     if truth.recording.wrench is None and name == "wrench":
         return
-    stream = of(truth.recording, name)
+    stream = getattr(truth.recording, name)
     begin = stream.stamp[place_in(stream, share)]
     gone = (stream.stamp > begin) & (stream.stamp < begin + length * SECOND)
     windows, counts = found_in(replace(truth.recording, **{name: taken(stream, ~gone)}))
@@ -310,7 +304,7 @@ def test_no_window_spans_a_clock_set_back_by_less_than_a_second(which: str, shar
         return replace(stream, stamp=np.where(stream.stamp > when, stream.stamp - back, stream.stamp))
 
     windows, counts = found_in(
-        replace(truth.recording, **{name: put_back(of(truth.recording, name)) for name in names})
+        replace(truth.recording, **{name: put_back(getattr(truth.recording, name)) for name in names})
     )
     if when < truth.recording.slider.stamp[-1] - 2 * SECOND:
         assert counts["slider late"] >= 8
@@ -345,7 +339,9 @@ def test_clock_offset_of_the_pusher_gives_no_wrong_window_and_is_reported(
 @pytest.mark.parametrize("lag", [0.2, 0.4, 1.0])
 def test_tip_that_enters_the_outline_gives_no_window(lag: float) -> None:
     recording, shift = translating_push(Push(2.0, 4.0)), round(lag * SECOND)
-    early = {name: replace(of(recording, name), stamp=of(recording, name).stamp - shift) for name in SENSORS[1:]}
+    early = {
+        name: replace(getattr(recording, name), stamp=getattr(recording, name).stamp - shift) for name in SENSORS[1:]
+    }
     windows, counts = found_in(replace(recording, **early))
     assert all(w.displacement[0] > 0.003 for w in windows), "the tip drove 4 mm in each"
     assert counts["left_behind"] >= 1 and (lag < 0.3 or windows == [])

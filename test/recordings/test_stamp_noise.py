@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -16,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
-from push_predictor.evaluation.validation import Comparison, compare, metrics_json
-from push_predictor.models.push_model import PushModel
+from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.stream_health import stamp_figures
 from push_predictor.recordings.read import require_rig
@@ -218,50 +216,36 @@ def with_jitter(recording: Recording, sd: float, kind: str = "gaussian", seed: i
 
 @pytest.mark.parametrize("name", ["hexagon_delrin", "ellipse_plywood"])
 def test_undisturbed_recordings_keep_their_stamps(name: str) -> None:
-    recording = bag(name)
-    finder = WindowFinder(require_rig(recording))
-    finder.find(recording)
-    for stream in (recording.slider, recording.pusher, recording.wrench):
+    for stream in bag(name).sensors.values():
         increasing = stream.stamp[np.diff(np.maximum.accumulate(stream.stamp), prepend=0) > 0]
         assert np.array_equal(regular(increasing), increasing)
 
 
-@cache
 def half(number: int) -> Recording:
     """The first or second half of a recording, of some 60 pushes."""
     recording = bag("square_abs_test")
     middle = int(recording.slider.stamp[len(recording.slider) // 2])
-    streams = {name: getattr(recording, name) for name in ("slider", "pusher", "wrench")}
-    return replace(recording, **{k: taken(of, (of.stamp >= middle) == bool(number)) for k, of in streams.items()})
+    streams = {k: taken(of, (of.stamp >= middle) == bool(number)) for k, of in recording.sensors.items()}
+    return replace(recording, **streams)
 
 
 def table_of(recording: Recording) -> PushTable:
     return windows_to_table(find_windows(recording, require_rig(recording)))
 
 
-@cache
-def model() -> PushModel:
-    return train_model(
-        table_of(half(0)), require_rig(half(0)), "gp", name="square", options=TrainingOptions(n_train=60, mean="zero")
-    )
-
-
-@cache
-def scored(sd: float, kind: str = "gaussian") -> tuple[PushTable, Comparison, dict[str, Any]]:
-    table = table_of(with_jitter(half(1), sd, kind) if sd else half(1))
-    comparison = compare(model(), table)
-    return table, comparison, metrics_json(comparison)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gaussian", pytest.param("delay", marks=pytest.mark.long)])
 def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percent(kind: str) -> None:
     """The alarm stays silent, too."""
-    clean, (table, comparison, jittery) = scored(0.0)[2], scored(2.0, kind)
-    assert len(table.pushes) == len(scored(0.0)[0].pushes) > 55 and abs(len(table) - len(scored(0.0)[0])) < 8
-    assert jittery["nmse"]["total"] < 1.05 * clean["nmse"]["total"]
-    assert jittery["nlpd"]["total"] == pytest.approx(clean["nlpd"]["total"], abs=0.15)
-    assert not alarm_state(calibrate(model()), table, comparison.mean, comparison.covariance).fired
+    options = TrainingOptions(n_train=60, mean="zero")
+    model = train_model(table_of(half(0)), require_rig(half(0)), "gp", name="square", options=options)
+    clean, jittery = table_of(half(1)), table_of(with_jitter(half(1), 2.0, kind))
+    assert len(jittery.pushes) == len(clean.pushes) > 55 and abs(len(jittery) - len(clean)) < 8
+    found_clean, comparison = metrics_json(compare(model, clean)), compare(model, jittery)
+    found_jittery = metrics_json(comparison)
+    assert found_jittery["nmse"]["total"] < 1.05 * found_clean["nmse"]["total"]
+    assert found_jittery["nlpd"]["total"] == pytest.approx(found_clean["nlpd"]["total"], abs=0.15)
+    assert not alarm_state(calibrate(model), jittery, comparison.mean, comparison.covariance).fired
 
 
 def test_windows_of_jittery_streams_are_the_same_online_and_offline() -> None:
