@@ -202,8 +202,8 @@ def test_the_push_page_gives_the_size_of_every_standard_outline():
 
 OF_VARIABLES = {  # prefix and pattern of names that stand elsewhere in the module
     "geometry.py: name": ("", r'(?:^ +(?="\w+": Mirror)|_falling\()"(\w+)"'),
-    "tables.py: name": ("", r'_finding\("(\w+)"'),
-    "tables.py: f'units_{name.split()[0]}'": ("units_", r'_column\("(\w+)'),
+    "units.py: name": ("", r'_finding\("(\w+)"'),
+    "units.py: f'units_{name.split()[0]}'": ("units_", r'_column\("(\w+)'),
 }
 
 

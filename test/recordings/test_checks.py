@@ -37,7 +37,7 @@ from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.force import wrench_findings
 from push_predictor.recordings.checks.motion import motion_of
-from push_predictor.recordings.checks.tables import check_table
+from push_predictor.recordings.checks.units import check_table
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig

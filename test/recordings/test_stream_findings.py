@@ -16,12 +16,13 @@ from stream_faults import at_rate, extrapolated, flipped, held, in_bursts, lost,
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import ellipse, square
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.streams.places import exchanged, places_of, two_bodies, without_flips
-from push_predictor.recordings.checks.streams.poses import StreamFacts, pose_facts
-from push_predictor.recordings.checks.streams.stage import in_order, repeated_samples
-from push_predictor.recordings.checks.streams.stamps import (
+from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies, without_flips
+from push_predictor.recordings.checks.poses import StreamFacts, pose_facts
+from push_predictor.recordings.checks.streams import (
     clocks_never_meet,
+    in_order,
     regular_in_bursts,
+    repeated_samples,
     stamp_findings,
     unset_stamps,
 )

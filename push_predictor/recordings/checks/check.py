@@ -27,8 +27,8 @@ from push_predictor.recordings.checks.finding import Evidence, Finding, Value
 from push_predictor.recordings.checks.force import force_stage
 from push_predictor.recordings.checks.frames import frame_stage
 from push_predictor.recordings.checks.geometry import geometry_stage
-from push_predictor.recordings.checks.streams.stage import stream_stage
-from push_predictor.recordings.checks.tables import check_table, table_signs
+from push_predictor.recordings.checks.streams import stream_stage
+from push_predictor.recordings.checks.units import check_table, table_signs
 from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
