@@ -67,17 +67,13 @@ def coverage_of(table: PushTable, rig: Rig | None = None) -> Coverage | None:
     """The coverage of a table, None without a row. Sides and sliding contacts need the rig."""
     if not len(table):
         return None
-    counts, side, alike = (None, "side", 0) if rig is None else _sides(table, rig.outline)
-    return Coverage(
-        len(table.pushes),
-        len(table),
-        counts,
-        side,
-        alike,
-        _middle(table.inputs[:, 0]),
-        _middle(table.inputs[:, 2]),
-        None if rig is None else _sliding(table, rig),
-    )
+    speeds, angles = _middle(table.inputs[:, 0]), _middle(table.inputs[:, 2])
+    if rig is None:
+        return Coverage(len(table.pushes), len(table), None, "side", 0, speeds, angles, None)
+    order, (index, count, side) = rig.outline.rotational_symmetry, sides_of(rig.outline, table.inputs[:, 1])
+    alike = 0 if order == 0 else count // order if count % order == 0 else count
+    counts = np.bincount(index, minlength=count)
+    return Coverage(len(table.pushes), len(table), counts, side, alike, speeds, angles, _sliding(table, rig))
 
 
 def coverage_findings(coverage: Coverage | None) -> list[Finding]:
@@ -108,14 +104,6 @@ def sides_of(outline: Outline, contact: Array) -> tuple[IntArray, int, str]:
     if outline.semi_axes is None and len(outline.vertices) <= MOST_SIDES:
         return outline.edge(contact)[0], len(outline.vertices), "side"
     return np.floor(4.0 * contact).astype(np.int64), 4, "quarter"
-
-
-def _sides(table: PushTable, outline: Outline) -> tuple[IntArray, str, int]:
-    """Windows on each side, the name of a side, and the number of sides after which the outline repeats."""
-    order, (index, count, side) = outline.rotational_symmetry, sides_of(outline, table.inputs[:, 1])
-    repeats = order and count % order == 0
-    alike = 0 if order == 0 else count // order if repeats else count
-    return np.bincount(index, minlength=count), side, alike
 
 
 def _sliding(table: PushTable, rig: Rig) -> float | None:

@@ -139,7 +139,8 @@ def _findings_of_large_gap(
     if found := _mirror_image_findings(contacts, rig, fit.gap, min(explained, mirrors[best])):
         return found
     if mirrors[best] < explained:
-        return [_mirrored(best, fit.gap, mirrors[best])]
+        mirror = MIRRORS[best]
+        return [_falling(best, f"{mirror.mistake} With it corrected", mirror.advice, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
     if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
         recorded = _gap_as_recorded(contacts, rig)
@@ -253,7 +254,10 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
     fit = fit_outline(contacts, image)
     if fit.gap >= most or _is_implausible(fit, rig):
         return []
-    return [_outline_mirrored(gap, fit.gap), *outline_findings(contacts, image, fit)]
+    mistake = "The outline is the mirror image of the slider. Mirrored at the x axis"
+    advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
+    mirrored = _falling("outline_mirrored", mistake, advice, gap, fit.gap)
+    return [mirrored, *outline_findings(contacts, image, fit)]
 
 
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
@@ -299,16 +303,6 @@ def _swapped(gap: float) -> Finding:
 def _another_body(gap: float) -> Finding:
     sentence = f"While the slider moves, the tip is {1e3 * gap:.0f} mm from the outline, in the median."
     return Finding("another_body", "refused", sentence, TOPICS, {"gap": Value(gap, "m")})
-
-
-def _mirrored(name: str, gap: float, after: float) -> Finding:
-    return _falling(name, f"{MIRRORS[name].mistake} With it corrected", MIRRORS[name].advice, gap, after)
-
-
-def _outline_mirrored(gap: float, after: float) -> Finding:
-    mistake = "The outline is the mirror image of the slider. Mirrored at the x axis"
-    advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
-    return _falling("outline_mirrored", mistake, advice, gap, after)
 
 
 def _falling(name: str, mistake: str, advice: str, gap: float, after: float) -> Finding:

@@ -218,7 +218,8 @@ def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding
 
 def table_signs(table: PushTable, rig: Rig | None = None) -> list[Finding]:
     """Findings about the signs of dy, and with a rig of dtheta."""
-    dy = _agreement(table.outcomes[:, 1], -_sign_beyond(table.inputs[:, 2], CONE))
+    angle = table.inputs[:, 2]
+    dy = _agreement(table.outcomes[:, 1], np.where(np.abs(angle) > CONE, -np.sign(angle), 0.0))
     turn = Agreement(0.0, 0) if rig is None else _agreement(table.outcomes[:, 2], _turning_signs(table, rig))
     if dy.wrong and turn.wrong:
         return [_finding("table_mirrored", "dy and dtheta have the wrong sign", {"dy": dy, "dtheta": turn})]
@@ -246,10 +247,6 @@ def _turning_signs(table: PushTable, rig: Rig) -> Array:
     lines = [rotate(normal, turn) for turn in (*edges, angle)]
     moments = [np.sign(arm[:, 0] * line[:, 1] - arm[:, 1] * line[:, 0]) for line in lines]
     return np.asarray(np.where((moments[0] == moments[1]) & (moments[1] == moments[2]), moments[0], 0.0))
-
-
-def _sign_beyond(values: Array, least: float) -> Array:
-    return np.asarray(np.where(np.abs(values) > least, np.sign(values), 0.0))
 
 
 def _finding(name: str, what: str, agreements: dict[str, Agreement]) -> Finding:

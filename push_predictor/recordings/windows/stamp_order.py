@@ -109,8 +109,9 @@ class StampOrder:
             if accepted:
                 keep[place : place + accepted] = True
                 interrupted[place] = self._late_since_last >= LATE_RUN
-                self._accept(stamp[place : place + accepted], values[place + accepted - 1])
+                self._recent.extend(stamp[place : place + accepted][-REMEMBERED:].tolist())
                 place += accepted
+                self._last, self._last_values, self._late_since_last = int(stamp[place - 1]), values[place - 1], 0
         self.waiting = stamp[place:], values[place:]
         return OrderedSamples(stamp[keep], values[keep], interrupted[keep])
 
@@ -124,14 +125,12 @@ class StampOrder:
 
     def _regular_run(self, stamp: IntArray, values: Array, irregular: Sequence[int], place: int, final: bool) -> int:
         """Number of samples from `place` on that follow regularly and are followed by LOOKAHEAD - 1 regular ones."""
-        if not self._follows(int(stamp[place]), values[place]):
+        first = int(stamp[place])
+        if not 0 < first - self._last <= ISOLATION or self._jumps_to(values[place], first):
             return 0
         end = irregular[bisect_left(irregular, place)]  # the last sample of the run
         complete = final and end == len(stamp) - 1
         return max(0, end - place + 1 - (0 if complete else LOOKAHEAD - 1))
-
-    def _follows(self, stamp: int, values: Array) -> bool:
-        return 0 < stamp - self._last <= ISOLATION and not self._jumps_to(values, stamp)
 
     def _jumps_to(self, values: Array, stamp: int) -> bool:
         return self._last_values is not None and self._jumps(self._last_values, values, stamp - self._last)
@@ -200,10 +199,6 @@ class StampOrder:
     def _discard(self, kind: str) -> None:
         self.counts[kind] += 1
         self._late_since_last += kind == "late"
-
-    def _accept(self, stamps: IntArray, last_values: Array) -> None:
-        self._last, self._last_values, self._late_since_last = int(stamps[-1]), last_values, 0
-        self._recent.extend(stamps[-REMEMBERED:].tolist())
 
 
 def _longest_increasing(block: Sequence[int], last: int) -> list[int]:
