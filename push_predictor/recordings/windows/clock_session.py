@@ -53,8 +53,9 @@ class ClockSession:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of faults by kind; faults of samples also by stream."""
+        """Number of faults by kind; faults of samples also by stream. samples, touching: of the slider, in contact."""
         found = self._dropouts + self._cutter.counts + Counter(self._segmenter.counts)
+        found.update(samples=self._segmenter.samples, touching=self._segmenter.touching)
         for name, track in self.tracks.items():
             # A slider that continues elsewhere was repositioned: a reset, which the segmenter counts.
             of_stream = track.counts if name != "slider" else track.order.counts
@@ -68,11 +69,6 @@ class ClockSession:
         """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
         found = {name: track.repairs.regular for name, track in self.tracks.items()}
         return {name: each.noise.jitter for name, each in found.items() if each.noise is not None and each.corrected}
-
-    @property
-    def contact(self) -> tuple[int, int]:
-        """Number of slider samples in contact, and of all that were evaluated."""
-        return self._segmenter.touching, self._segmenter.samples
 
     @property
     def force_touches(self) -> list[tuple[float, float]]:

@@ -26,7 +26,6 @@ from push_predictor.recordings.windows.push_window import PushWindow, WindowOpti
 from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray
 
-SENSORS = ("slider", "pusher", "wrench")
 LONGEST_GAP = 5_000_000_000  # ns; in a longer gap between samples a scalar keeps the earlier value
 
 
@@ -44,7 +43,6 @@ class WindowFinder:
     def __init__(self, rig: Rig, options: WindowOptions | None = None) -> None:
         self.rig, self.options = rig, options or WindowOptions()
         self._counts: Counter[str] = Counter()  # without those of the present session
-        self._earlier_contact = (0, 0)  # of earlier sessions
         self._earlier_touches: list[tuple[float, float]] = []
         self._session = ClockSession(rig, self.options)
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
@@ -66,8 +64,8 @@ class WindowFinder:
     @property
     def contact_share(self) -> float | None:
         """Share of the slider's samples so far in which the tip touches it, None before the first."""
-        touching, samples = self._contact()
-        return touching / samples if samples else None
+        found = self._counts + self._session.counts
+        return found["touching"] / found["samples"] if found["samples"] else None
 
     @property
     def force_touches(self) -> list[tuple[float, float]]:
@@ -167,13 +165,12 @@ class WindowFinder:
 
     def _end_session(self) -> list[PushWindow]:
         """Finish the windows of the time before the clock was set, or of the whole stream."""
-        for name in SENSORS:
+        for name, track in self._session.tracks.items():
             if name not in self._session.clocks_set:
-                nothing = np.empty(0, dtype=np.int64), self._session.tracks[name].values[:0]
-                self._extend(name, *nothing, final=True)
+                self._extend(name, np.empty(0, dtype=np.int64), track.values[:0], final=True)
         found = self._found(final=True)
         self._counts += self._session.counts
-        self._earlier_contact, self._earlier_touches = self._contact(), self.force_touches
+        self._earlier_touches = self.force_touches
         self._session = ClockSession(self.rig, self.options)
         return found
 
@@ -182,10 +179,6 @@ class WindowFinder:
         postponed, self._postponed = self._postponed, []
         for name, stamp, values in postponed:
             self._add(name, stamp, values)
-
-    def _contact(self) -> tuple[int, int]:
-        earlier, present = self._earlier_contact, self._session.contact
-        return earlier[0] + present[0], earlier[1] + present[1]
 
     # --- windows ------------------------------------------------------------------------------------------------
 
