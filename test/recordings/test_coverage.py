@@ -74,57 +74,48 @@ def with_inputs(table: PushTable, column: int, scale: float, middle: float = 0.0
     return replace(table, inputs=inputs)
 
 
-def test_pushes_of_all_kinds_give_no_finding() -> None:
+def sticking(share: float, slip: float) -> PushTable:
+    """All pushes but a share of them stick; slip: of those, in path lengths of the tip."""
+    table, stuck = pushes(), pushes(slip=slip)
+    sliding = np.arange(len(table)) // WINDOWS % 10 < 10 * share
+    return replace(table, inputs=np.where(sliding[:, None], table.inputs, stuck.inputs))
+
+
+@pytest.mark.parametrize(
+    ("table", "outline", "name", "severity", "words"),
+    [
+        (empty_table(), SQUARE, "no_pushes", "warning", "nothing can be learnt"),
+        (pushes(7), SQUARE, "few_pushes", "warning", "at least 23 more"),
+        (pushes(8), SQUARE, "few_pushes", "note", "at least 22 more"),
+        (pushes(29), SQUARE, "few_pushes", "note", "at least 1 more"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "sides 1 and 3 of 4, counter-clockwise"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "Push sides 2 and 4 too"),
+        (on_sides(pushes(), 0, 2), RECTANGLE, "few_sides", "warning", "sides 1 and 3"),  # the long sides alone
+        (on_sides(pushes(), 0, 1), RECTANGLE, "few_sides", "note", "sides 1 and 2"),
+        (on_sides(pushes(), 0, 1), shape_outline("ellip3"), "few_sides", "note", "quarters 1 and 2 of 4"),
+        (with_inputs(pushes(), 0, 0.01, 0.02), SQUARE, "one_speed", "note", "mm/s"),
+        (with_inputs(pushes(), 2, 0.2), SQUARE, "few_angles", "warning", "-60 to 60 degrees"),
+        (with_inputs(pushes(), 2, 0.4), SQUARE, "few_angles", "note", "-60 to 60 degrees"),
+        (sticking(0.0, 0.18), SQUARE, "few_sliding", "warning", "in 0 %"),  # each step against the path of its push
+        (sticking(0.1, 0.05), SQUARE, "few_sliding", "note", "slides"),
+    ],
+)
+def test_what_is_missing_is_named(table: PushTable, outline: Outline, name: str, severity: str, words: str) -> None:
+    finding = found(table, outline)[name]
+    assert finding.severity == severity and words in finding.text
+
+
+def test_pushes_of_all_kinds_have_no_finding_and_a_circle_has_no_sides() -> None:
     assert found(pushes()) == {}
+    assert "few_sides" not in found(on_sides(pushes(), 0, 1), shape_outline("ellip1"))
 
 
-@pytest.mark.parametrize(("count", "severity"), [(7, "warning"), (8, "note"), (29, "note")])
-def test_few_pushes_are_counted(count: int, severity: str) -> None:
-    finding = found(pushes(count))["few_pushes"]
-    assert finding.severity == severity
-    assert f"at least {30 - count} more" in finding.advice
-
-
-def test_no_push_at_all_is_a_warning() -> None:
-    assert [finding.name for finding in coverage_findings(coverage_of(empty_table(), rig_with(SQUARE)))] == [
-        "no_pushes"
-    ]
-
-
-def test_missing_sides_of_a_square_are_a_note_and_named() -> None:
-    finding = found(on_sides(pushes(), 0, 2))["few_sides"]
-    assert finding.severity == "note"
-    assert "sides 1 and 3 of 4" in finding.sentence and "Push sides 2 and 4 too" in finding.advice
-
-
-def test_a_kind_of_side_that_was_never_pushed_is_a_warning() -> None:
-    assert found(on_sides(pushes(), 0, 2), RECTANGLE)["few_sides"].severity == "warning"  # the long sides alone
-    assert found(on_sides(pushes(), 0, 1), RECTANGLE)["few_sides"].severity == "note"
-
-
-def test_a_smooth_outline_is_judged_by_quarters_and_a_circle_not_at_all() -> None:
-    half = on_sides(pushes(), 0, 1)
-    assert "quarters 1 and 2 of 4" in found(half, shape_outline("ellip3"))["few_sides"].sentence
-    assert "few_sides" not in found(half, shape_outline("ellip1"))
-
-
-def test_one_speed_is_a_note() -> None:
-    finding = found(with_inputs(pushes(), 0, 0.01, 0.02))["one_speed"]
-    assert finding.severity == "note" and "mm/s" in finding.sentence
-
-
-@pytest.mark.parametrize(("share", "severity"), [(0.2, "warning"), (0.4, "note")])
-def test_a_small_range_of_angles_is_found(share: float, severity: str) -> None:
-    finding = found(with_inputs(pushes(), 2, share))["few_angles"]
-    assert finding.severity == severity and "-60 to 60 degrees" in finding.advice
-
-
-def test_contacts_that_stick_are_found() -> None:
-    assert found(pushes(slip=0.18))["few_sliding"].severity == "warning"  # each step against the path of its own push
-    mixed = pushes()
-    sliding = np.arange(len(mixed)) // WINDOWS % 10 == 0
-    inputs = np.where(sliding[:, None], mixed.inputs, pushes(slip=0.05).inputs)
-    assert found(replace(mixed, inputs=inputs))["few_sliding"].severity == "note"
+def test_a_contact_slides_either_way_from_one_window_of_a_push_to_the_next() -> None:
+    table, steps = pushes(), np.arange(80 * WINDOWS)
+    assert covered(table).sliding == covered(pushes(slip=-0.5)).sliding == 1.0
+    assert covered(replace(table, covariates={"elapsed_time": 0.2 * steps})).sliding == 1.0
+    assert covered(replace(table, covariates={"elapsed_time": 0.01 * steps})).sliding is None  # they overlap
+    assert covered(replace(table, push_id=steps.astype(str))).sliding is None
 
 
 def test_a_contact_that_rolls_around_the_tip_does_not_slide() -> None:
@@ -138,25 +129,10 @@ def test_a_contact_that_rolls_around_the_tip_does_not_slide() -> None:
     assert covered(table).sliding != 0.0
 
 
-def test_windows_that_overlap_say_nothing_about_sliding() -> None:
-    table = pushes()
-    assert covered(replace(table, covariates={"elapsed_time": 0.01 * np.arange(len(table))})).sliding is None
-    assert covered(replace(table, covariates={"elapsed_time": 0.2 * np.arange(len(table))})).sliding == 1.0
-
-
-def test_a_contact_slides_in_either_direction() -> None:
-    assert covered(pushes(slip=0.5)).sliding == covered(pushes(slip=-0.5)).sliding == 1.0
-
-
 def test_without_an_outline_sides_and_sliding_are_unknown() -> None:
     coverage = coverage_of(pushes())
     assert coverage is not None and coverage.side_counts is None and coverage.sliding is None
     assert found(on_sides(pushes(), 0), None) == {"few_pushes": found(on_sides(pushes(), 0), None)["few_pushes"]}
-
-
-def test_rows_of_different_pushes_are_no_steps() -> None:
-    table = pushes()
-    assert covered(replace(table, push_id=np.arange(len(table)).astype(str))).sliding is None
 
 
 # --- what pushes leave out of the domain where they judge a model -----------------------------------------------------
