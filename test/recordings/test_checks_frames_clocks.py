@@ -19,7 +19,7 @@ from synthetic import RADIUS, Push, translating_push
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.clocks import clock_stage, push_lags
+from push_predictor.recordings.checks.clocks import clock_stage
 from push_predictor.recordings.checks.finding import Evidence
 from push_predictor.recordings.checks.frames import fixed_to_tip
 from push_predictor.recordings.checks.motion import motion_of
@@ -228,12 +228,6 @@ def test_a_clock_that_drifts_is_named_with_its_rate(name: str, ppm: float) -> No
 def test_a_constant_lag_is_found_however_long(lag: float) -> None:
     finding = found(late(sample("square_abs_test"), lag), rig_of("square_abs_test"))["clocks_apart"]
     assert finding.values["lag"].value == pytest.approx(lag, abs=0.003)
-
-
-def test_lags_of_single_pushes_are_those_of_the_stamps() -> None:
-    lags = push_lags(late(bag(HEXAGON), 0.04), rig_of(HEXAGON))
-    assert lags is not None and lags.share > 0.9
-    assert np.median(lags.lag) == pytest.approx(0.04, abs=0.003)
 
 
 @pytest.mark.parametrize("name", BOTH)
