@@ -14,7 +14,7 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from lab_bags import short_recording
-from synthetic import START, Push, feed, rows, translating_push
+from synthetic import START, Push, feed, translating_push
 
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.windows.finder import WindowFinder
@@ -263,7 +263,7 @@ def test_reset_during_a_push_ends_it(
     def put(stream: PoseStream) -> PoseStream:
         late = stream.stamp > begin
         x, y = stream.x + jump * np.cos(direction) * late, stream.y + jump * np.sin(direction) * late
-        return rows(replace(stream, x=x, y=y), (stream.stamp <= begin) | (stream.stamp > end))
+        return taken(replace(stream, x=x, y=y), (stream.stamp <= begin) | (stream.stamp > end))
 
     reset = replace(truth.recording, slider=put(slider), pusher=put(pusher) if tip_too else pusher)
     windows, counts = found_in(reset)

@@ -13,7 +13,7 @@ import pytest
 from contact_portions import samples_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import START, Push, feed, moved, pose_stream, rows, stamps, translating_push, windows_of, wrench_rows
+from synthetic import START, Push, feed, moved, pose_stream, stamps, translating_push, windows_of
 
 from push_predictor.recordings.streams import Recording, joined, taken
 from push_predictor.recordings.windows.contact import ContactSamples
@@ -96,8 +96,7 @@ def test_no_window_spans_a_dropout(stream: str) -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     time = (getattr(recording, stream).stamp - START) * 1e-9
     keep = (time < 1.2) | (time > 1.26)  # 60 ms without samples, six periods
-    take = wrench_rows if stream == "wrench" else rows
-    windows = windows_of(replace(recording, **{stream: take(getattr(recording, stream), keep)}))
+    windows = windows_of(replace(recording, **{stream: taken(getattr(recording, stream), keep)}))
     assert windows and all((w.end - START) * 1e-9 < 1.22 or (w.start - START) * 1e-9 > 1.2 for w in windows)
     assert len({w.push_id for w in windows}) == 1  # still one push: its windows are not independent
 
@@ -105,7 +104,7 @@ def test_no_window_spans_a_dropout(stream: str) -> None:
 def test_gap_of_three_periods_is_no_dropout() -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     time = (recording.slider.stamp - START) * 1e-9
-    gappy = replace(recording, slider=rows(recording.slider, (time < 1.195) | (time > 1.215)))
+    gappy = replace(recording, slider=taken(recording.slider, (time < 1.195) | (time > 1.215)))
     assert len(windows_of(gappy)) == len(windows_of(recording))
 
 

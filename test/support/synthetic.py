@@ -17,7 +17,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
@@ -25,6 +25,7 @@ from push_predictor.types import Array, IntArray
 
 START = 1_600_000_000_000_000_000  # ns
 RADIUS = 0.00475
+rows = wrench_rows = taken  # samples of a stream, by mask, indices or slice
 
 
 def square_rig() -> Rig:
@@ -114,16 +115,6 @@ def moved(recording: Recording, shift: Array, turn: float) -> Recording:
 def _moved_pose(stream: PoseStream, shift: Array, turn: float) -> PoseStream:
     world = to_world(np.column_stack([stream.x, stream.y]), np.array([*shift, turn]))
     return PoseStream(stream.stamp, world[:, 0], world[:, 1], stream.z, stream.heading + turn)
-
-
-def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
-    """The samples selected by `keep` (mask, indices or slice)."""
-    return PoseStream(stream.stamp[keep], stream.x[keep], stream.y[keep], stream.z[keep], stream.heading[keep])
-
-
-def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
-    """The wrench samples selected by `keep`."""
-    return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
 
 
 def feed(finder: WindowFinder, recording: Recording, part: Callable[[Any], Any] = lambda stream: stream) -> None:
