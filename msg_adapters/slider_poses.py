@@ -14,8 +14,7 @@ from geometry_msgs.msg import PoseWithCovariance
 from msg_adapters import ns_to_stamp, stamp_to_ns
 from msg_adapters.predictions import covariates_of_push, covariates_of_pushes
 from push_predictor.errors import RequestError, TooLargeError
-from push_predictor.geometry.frames import yaw_of_quaternion
-from push_predictor.geometry.spatial import SpatialPose
+from push_predictor.geometry.frames import SpatialPose, yaw_of_quaternion
 from push_predictor.models.request import OUT_OF_DOMAIN
 from push_predictor.planning.rollout import A_COVARIANCE, FARTHEST, MOST_PARTICLES, Rollout, is_covariance
 from push_predictor.planning.slider_pose import SliderAfter, WorldPush

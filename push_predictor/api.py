@@ -32,7 +32,7 @@ from push_predictor.planning import choose
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
 from push_predictor.planning.repertoire import Repertoire
-from push_predictor.recordings.checks.data_checks import DataChecks
+from push_predictor.recordings.checks.check import DataChecks
 from push_predictor.recordings.load import different_supports, load_data, load_rig_for, required_rig
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig

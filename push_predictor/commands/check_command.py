@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Check the data and print the findings. Raises RecordingError that names what is refused."""
     from push_predictor.evaluation.check_page import check_json, pushed, write_check_page
-    from push_predictor.recordings.checks.checked import checked_data
+    from push_predictor.recordings.checks.check import checked_data
     from push_predictor.reporting import html
 
     check_data(options.data)

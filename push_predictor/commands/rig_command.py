@@ -145,7 +145,7 @@ def _check_call(options: argparse.Namespace, shape: str | None) -> None:
 def _corrected(options: argparse.Namespace) -> tuple[Rig, tuple[str, ...], tuple[Finding, ...]]:
     """The rig corrected by the findings of `check` about the recording, no notes, and these findings."""
     from push_predictor.recordings.checks.check import check_recording
-    from push_predictor.recordings.checks.corrected_rig import corrected_rig
+    from push_predictor.recordings.checks.geometry import corrected_rig
     from push_predictor.recordings.read import read_recording, require_rig
 
     check_data([options.recording])

@@ -137,7 +137,7 @@ def _model(options: argparse.Namespace) -> PushModel:
 
 def _matter(options: argparse.Namespace, model: PushModel) -> Pushes:
     from push_predictor.models.pushes import Pushes
-    from push_predictor.recordings.checks.data_checks import DataChecks
+    from push_predictor.recordings.checks.check import DataChecks
     from push_predictor.recordings.load import load_data
 
     path = options.matter

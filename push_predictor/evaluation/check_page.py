@@ -14,10 +14,10 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.atomic import write_whole
-from push_predictor.recordings.checks.checked import CheckedData
-from push_predictor.recordings.checks.coverage import Coverage
+from push_predictor.recordings.checks.check import CheckedData
+from push_predictor.recordings.checks.coverage import OFF, ContactFit, Coverage
 from push_predictor.recordings.checks.finding import Finding
-from push_predictor.recordings.checks.motion import OFF, ContactFit, Motion, motion_of
+from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting import html

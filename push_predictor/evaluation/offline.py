@@ -28,7 +28,7 @@ from push_predictor.recordings.windows.stream_faults import describe_recording_f
 from push_predictor.watch import Watch, no_watch, part_of, watched
 
 if TYPE_CHECKING:
-    from push_predictor.recordings.checks.data_checks import DataChecks
+    from push_predictor.recordings.checks.check import DataChecks
 
 
 def recorded_windows(

@@ -231,9 +231,9 @@ class Outline:
     @cached_property
     def _table(self) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        x, y = self._in_axes(self.vertices[:1])[0]
-        first = np.arctan2(y / b, x / a)
-        return np.asarray(first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
+        first = self.vertices[:1]
+        x, y = (first if self.pose == CENTRED else to_body(first, np.array(self.pose)))[0]
+        return np.asarray(np.arctan2(y / b, x / a) + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
@@ -245,10 +245,6 @@ class Outline:
         normal = paired(b * np.cos(parameter), a * np.sin(parameter))
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         return np.asarray(normal if self.pose == CENTRED else rotate(normal, np.array(self.pose[2])))
-
-    def _in_axes(self, points: Array) -> Array:
-        """Points (n, 2) of the body frame along the semi-axes."""
-        return points if self.pose == CENTRED else to_body(points, np.array(self.pose))
 
     def _curve_parameter(self, contact: Array) -> Array:
         return np.asarray(np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table))

@@ -17,8 +17,8 @@ import numpy as np
 
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG
-from push_predictor.recordings.windows.repairs.regular_stamps import stamp_noise
-from push_predictor.recordings.windows.scalar_track import LONGEST_GAP
+from push_predictor.recordings.windows.finder import LONGEST_GAP
+from push_predictor.recordings.windows.regular_stamps import stamp_noise
 from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, describe_clock_offset
 from push_predictor.types import IntArray
 

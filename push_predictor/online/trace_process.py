@@ -110,7 +110,7 @@ def _for_client(text: str, task: TraceTask) -> str:
 def _traced(connection: Connection, task: TraceTask) -> Traced:
     # Imported here: the node that starts this process does not need these modules.
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.recordings.checks.data_checks import DataChecks
+    from push_predictor.recordings.checks.check import DataChecks
     from push_predictor.residuals.outcome import trace_json
     from push_predictor.residuals.reporting.sentences import answer, rivals, worth
     from push_predictor.residuals.trace import trace_data

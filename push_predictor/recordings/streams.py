@@ -125,6 +125,16 @@ class Recording:
     wrench_bias: WrenchBias | None = None
     losses: tuple[str, ...] = ()
 
+    @property
+    def poses(self) -> dict[str, PoseStream]:
+        """The streams of poses, by name."""
+        return {"slider": self.slider, "pusher": self.pusher}
+
+    @property
+    def sensors(self) -> dict[str, PoseStream | WrenchStream]:
+        """The streams of poses and that of the wrench, if there is one, by name."""
+        return self.poses | ({} if self.wrench is None else {"wrench": self.wrench})
+
     def __repr__(self) -> str:
         seconds = 1e-9 * float(self.slider.stamp[-1] - self.slider.stamp[0]) if len(self.slider) else 0.0
         force = f"{len(self.wrench)} wrenches" if self.wrench is not None else "no force sensor"

@@ -45,7 +45,7 @@ from push_predictor.types import Array
 from push_predictor.watch import Watch, no_watch
 
 if TYPE_CHECKING:
-    from push_predictor.recordings.checks.data_checks import DataChecks
+    from push_predictor.recordings.checks.check import DataChecks
 
 NO_GAIN = Estimate(0.0, 0.0, 0.0)
 

@@ -17,7 +17,7 @@ from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
-from push_predictor.recordings.checks.data_checks import DataChecks
+from push_predictor.recordings.checks.check import DataChecks
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig

@@ -212,7 +212,6 @@ def test_recorded_sd_agrees_with_a_correct_prediction(square: Rig) -> None:
     cells = coarse_cells(square.outline, table)
     recorded = recorded_map(square.outline, observed, mean, cells)
     predicted = predicted_at_windows(square.outline, observed, mean, np.broadcast_to(sd**2, mean.shape), cells)
-    assert recorded.windows is not None
     full = recorded.windows >= FEWEST
     ratio = (recorded.sd / predicted.sd)[full] ** 2
     error = np.sqrt(2.0 / recorded.windows[full])[:, None]

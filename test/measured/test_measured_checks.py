@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from mistakes import MISTAKES
 
-from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.units import check_table
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import known_rig
 from push_predictor.recordings.read import read_recording, require_rig

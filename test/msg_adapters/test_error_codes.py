@@ -20,7 +20,7 @@ from synthetic import square_pushes
 from push_predictor import errors
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import FrameError, PushPredictorError, RequestError
-from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
+from push_predictor.geometry.frames import SAME_FRAME, SpatialPose
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model

@@ -27,7 +27,7 @@ from synthetic import square_pushes
 
 from msg_adapters.slider_poses import FLAT, fill_slider_response, world_push, world_slider
 from push_predictor.errors import RequestError
-from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
+from push_predictor.geometry.frames import SAME_FRAME, SpatialPose, vertical_turn
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model

@@ -18,8 +18,7 @@ from synthetic import square_pushes
 
 from msg_adapters.slider_poses import fill_rollout_response, steps_from_request, world_start
 from push_predictor.errors import RequestError
-from push_predictor.geometry.frames import quaternion_of_yaw, yaw_of_quaternion
-from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
+from push_predictor.geometry.frames import SAME_FRAME, SpatialPose, quaternion_of_yaw, vertical_turn, yaw_of_quaternion
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate

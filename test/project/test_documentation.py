@@ -201,8 +201,8 @@ def test_the_push_page_gives_the_size_of_every_standard_outline():
 
 
 OF_VARIABLES = {  # prefix and pattern of names that stand elsewhere in the module
-    "stage.py: name": ("", r'^ +"(\w+)": Mirror\('),
-    "table_signs.py: name": ("", r'_finding\("(\w+)"'),
+    "geometry.py: name": ("", r'(?:^ +(?="\w+": Mirror)|_falling\()"(\w+)"'),
+    "units.py: name": ("", r'_finding\("(\w+)"'),
     "units.py: f'units_{name.split()[0]}'": ("units_", r'_column\("(\w+)'),
 }
 

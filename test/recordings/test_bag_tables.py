@@ -16,9 +16,9 @@ from mistakes import BAGS, force_of_another_time, mirrored
 from repository import REPOSITORY
 
 from push_predictor.geometry.shapes import transformed
-from push_predictor.recordings.checks.check import check_table
-from push_predictor.recordings.checks.checked import CheckedData, checked_data, checked_recording
+from push_predictor.recordings.checks.check import CheckedData, checked_data, checked_recording
 from push_predictor.recordings.checks.coverage import coverage_findings
+from push_predictor.recordings.checks.units import check_table
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Frames with another axis up, points away from the tip, clocks that drift or are set, noise and fast pushes."""
+"""Frames with another axis up, points away from the tip, bodies on the hand, clocks that drift or are set, noise."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ import pytest
 from checked_bags import bag, found, rig_of, sample
 from coarse import coarse_simulator
 from lab_bags import pose_rows
-from mistakes import UPSIDE_DOWN, late, spatial_rows
+from mistakes import UPSIDE_DOWN, late, on_hand, spatial_rows, stream_part
 from stream_faults import held
+from synthetic import RADIUS, Push, translating_push
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.shapes import ellipse
 from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.checks.clocks.push_lags import push_lags
-from push_predictor.recordings.checks.clocks.stage import clock_stage
-from push_predictor.recordings.checks.evidence import Evidence
+from push_predictor.recordings.checks.clocks import clock_stage
+from push_predictor.recordings.checks.finding import Evidence
+from push_predictor.recordings.checks.frames import fixed_to_tip
 from push_predictor.recordings.checks.motion import motion_of
 from push_predictor.recordings.decoder.rules import pusher_stream, slider_stream
 from push_predictor.recordings.fields.pose_rows import composed
-from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.streams import PoseStream, Recording, joined, taken
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
@@ -229,12 +230,6 @@ def test_a_constant_lag_is_found_however_long(lag: float) -> None:
     assert finding.values["lag"].value == pytest.approx(lag, abs=0.003)
 
 
-def test_lags_of_single_pushes_are_those_of_the_stamps() -> None:
-    lags = push_lags(late(bag(HEXAGON), 0.04), rig_of(HEXAGON))
-    assert lags is not None and lags.share > 0.9
-    assert np.median(lags.lag) == pytest.approx(0.04, abs=0.003)
-
-
 @pytest.mark.parametrize("name", BOTH)
 @pytest.mark.parametrize("rate", [20.0, 50.0])
 def test_along_a_single_side_no_outline_is_shifted(name: str, rate: float) -> None:
@@ -268,8 +263,64 @@ def test_fast_pushes_are_no_fault_of_the_outline(speed: float) -> None:
     with coarse_simulator(2.0):
         plan = random_pushes(20, (speed,), 0.03, np.random.default_rng(0))
         recording = simulate(SimulationSpec(slider, "abs", plan, seed=1))
-    rig: Rig | None = recording.rig
-    assert rig is not None
-    motion = motion_of(recording, rig)
-    assert motion is not None and np.sum(motion.touching) < np.sum(motion.contact)
-    assert not [name for name in found(recording, rig) if name.startswith(("outline_s", "clock", "tip", "frames"))]
+    motion = motion_of(recording, recording.rig)
+    assert np.sum(motion.touching) < np.sum(motion.contact)
+    assert not [
+        name for name in found(recording, recording.rig) if name.startswith(("outline_s", "clock", "tip", "frames"))
+    ]
+
+
+# --- a body on the robot's hand moves with the tip where a pushed slider would rest -----------------------------------
+
+
+LONG = Push(end=10.5, speed=0.1)  # a metre
+TOUCHING = 0.045 + RADIUS  # m from the slider's centre to the tip
+AHEAD = np.array([1.0, 0.0])  # the direction of the push, against the first side of the square
+
+
+def refused(recording: Recording) -> bool:
+    return fixed_to_tip(motion_of(recording, require_rig(recording)), require_rig(recording)) is not None
+
+
+def trimmed(recording: Recording) -> Recording:
+    """From first touch to last contact."""
+    begin, end = 0.6 / 11.3, 10.4 / 11.3
+    slider, pusher = (stream_part(poses, begin, end) for poses in (recording.slider, recording.pusher))
+    return replace(recording, slider=slider, pusher=pusher)
+
+
+def test_a_slider_that_is_pushed_from_first_to_last_is_no_body_on_the_hand() -> None:
+    """In its frame the tip does not move either."""
+    assert not refused(translating_push(LONG)) and not refused(trimmed(translating_push(LONG)))
+
+
+def test_a_body_that_never_touches_the_tip_is_refused_without_a_way_back() -> None:
+    push = trimmed(translating_push(LONG))
+    assert not refused(on_hand(push, tuple(TOUCHING * AHEAD)))  # nothing distinguishes it from a slider
+    rig = require_rig(push)
+    finding = fixed_to_tip(motion_of(on_hand(push, tuple((TOUCHING + 0.03) * AHEAD)), rig), rig)
+    assert finding is not None and finding.name == "another_body" and finding.severity == "refused"
+    assert finding.values["spread"].value < 1e-3
+
+
+def test_a_body_that_follows_the_tip_on_its_way_back_is_refused() -> None:
+    """A tip that moves away pulls nothing."""
+    assert refused(on_hand(translating_push(), tuple(TOUCHING * AHEAD)))
+    assert not refused(translating_push())
+
+
+def test_a_body_that_the_lifted_tip_carries_is_refused() -> None:
+    push = trimmed(translating_push(LONG))
+    raised = replace(push.pusher, z=np.where(np.arange(len(push.pusher)) > 0.8 * len(push.pusher), 0.03, 0.0))
+    assert refused(on_hand(replace(push, pusher=raised), tuple(TOUCHING * AHEAD)))
+
+
+@pytest.mark.parametrize(
+    ("push", "size", "judged"),
+    [(LONG, 0.03, False), (LONG, 0.012, False), (LONG, 0.008, True), (Push(end=0.9), 0.004, False)],
+)
+def test_a_body_whose_place_at_the_tip_varies_is_not_judged(push: Push, size: float, judged: bool) -> None:
+    """By more than 10 mm, or by as much as the tip travels."""
+    body = on_hand(translating_push(push), (0.12, 0.0))
+    swing = size * np.sin(np.linspace(0.0, 60.0, len(body.slider)))
+    assert refused(replace(body, slider=replace(body.slider, x=body.slider.x + swing))) is judged

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The coverage of a push table: what is missing is named, with what to record next."""
+"""The coverage of a push table, in findings and in words; where the contacts of a recording lie against its outline."""
 
 from __future__ import annotations
 
@@ -9,13 +9,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from checked_bags import bag
+from mistakes import outline_scaled, stream_part
+from repository import REPOSITORY
+from synthetic import square_pushes
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
+from push_predictor.recordings.checks.coverage import (
+    MEANING,
+    ContactFit,
+    Coverage,
+    contact_fit,
+    coverage_findings,
+    coverage_of,
+    pushed_part,
+)
 from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.motion import motion_of
+from push_predictor.recordings.load import load_data
+from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording, taken
 from push_predictor.recordings.table import PushTable, empty_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
 
 SQUARE, RADIUS = shape_outline("rect1"), 0.00475
 RECTANGLE = Outline(np.array([[-0.06, -0.03], [0.06, -0.03], [0.06, 0.03], [-0.06, 0.03]]))
@@ -39,9 +57,7 @@ def rig_with(outline: Outline) -> Rig:
 
 
 def covered(table: PushTable, outline: Outline = SQUARE) -> Coverage:
-    coverage = coverage_of(table, rig_with(outline))
-    assert coverage is not None
-    return coverage
+    return coverage_of(table, rig_with(outline))
 
 
 def found(table: PushTable, outline: Outline | None = SQUARE) -> dict[str, Finding]:
@@ -58,57 +74,48 @@ def with_inputs(table: PushTable, column: int, scale: float, middle: float = 0.0
     return replace(table, inputs=inputs)
 
 
-def test_pushes_of_all_kinds_give_no_finding() -> None:
+def sticking(share: float, slip: float) -> PushTable:
+    """All pushes but a share of them stick; slip: of those, in path lengths of the tip."""
+    table, stuck = pushes(), pushes(slip=slip)
+    sliding = np.arange(len(table)) // WINDOWS % 10 < 10 * share
+    return replace(table, inputs=np.where(sliding[:, None], table.inputs, stuck.inputs))
+
+
+@pytest.mark.parametrize(
+    ("table", "outline", "name", "severity", "words"),
+    [
+        (empty_table(), SQUARE, "no_pushes", "warning", "nothing can be learnt"),
+        (pushes(7), SQUARE, "few_pushes", "warning", "at least 23 more"),
+        (pushes(8), SQUARE, "few_pushes", "note", "at least 22 more"),
+        (pushes(29), SQUARE, "few_pushes", "note", "at least 1 more"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "sides 1 and 3 of 4, counter-clockwise"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "Push sides 2 and 4 too"),
+        (on_sides(pushes(), 0, 2), RECTANGLE, "few_sides", "warning", "sides 1 and 3"),  # the long sides alone
+        (on_sides(pushes(), 0, 1), RECTANGLE, "few_sides", "note", "sides 1 and 2"),
+        (on_sides(pushes(), 0, 1), shape_outline("ellip3"), "few_sides", "note", "quarters 1 and 2 of 4"),
+        (with_inputs(pushes(), 0, 0.01, 0.02), SQUARE, "one_speed", "note", "mm/s"),
+        (with_inputs(pushes(), 2, 0.2), SQUARE, "few_angles", "warning", "-60 to 60 degrees"),
+        (with_inputs(pushes(), 2, 0.4), SQUARE, "few_angles", "note", "-60 to 60 degrees"),
+        (sticking(0.0, 0.18), SQUARE, "few_sliding", "warning", "in 0 %"),  # each step against the path of its push
+        (sticking(0.1, 0.05), SQUARE, "few_sliding", "note", "slides"),
+    ],
+)
+def test_what_is_missing_is_named(table: PushTable, outline: Outline, name: str, severity: str, words: str) -> None:
+    finding = found(table, outline)[name]
+    assert finding.severity == severity and words in finding.text
+
+
+def test_pushes_of_all_kinds_have_no_finding_and_a_circle_has_no_sides() -> None:
     assert found(pushes()) == {}
+    assert "few_sides" not in found(on_sides(pushes(), 0, 1), shape_outline("ellip1"))
 
 
-@pytest.mark.parametrize(("count", "severity"), [(7, "warning"), (8, "note"), (29, "note")])
-def test_few_pushes_are_counted(count: int, severity: str) -> None:
-    finding = found(pushes(count))["few_pushes"]
-    assert finding.severity == severity
-    assert f"at least {30 - count} more" in finding.advice
-
-
-def test_no_push_at_all_is_a_warning() -> None:
-    assert [finding.name for finding in coverage_findings(coverage_of(empty_table(), rig_with(SQUARE)))] == [
-        "no_pushes"
-    ]
-
-
-def test_missing_sides_of_a_square_are_a_note_and_named() -> None:
-    finding = found(on_sides(pushes(), 0, 2))["few_sides"]
-    assert finding.severity == "note"
-    assert "sides 1 and 3 of 4" in finding.sentence and "Push sides 2 and 4 too" in finding.advice
-
-
-def test_a_kind_of_side_that_was_never_pushed_is_a_warning() -> None:
-    assert found(on_sides(pushes(), 0, 2), RECTANGLE)["few_sides"].severity == "warning"  # the long sides alone
-    assert found(on_sides(pushes(), 0, 1), RECTANGLE)["few_sides"].severity == "note"
-
-
-def test_a_smooth_outline_is_judged_by_quarters_and_a_circle_not_at_all() -> None:
-    half = on_sides(pushes(), 0, 1)
-    assert "quarters 1 and 2 of 4" in found(half, shape_outline("ellip3"))["few_sides"].sentence
-    assert "few_sides" not in found(half, shape_outline("ellip1"))
-
-
-def test_one_speed_is_a_note() -> None:
-    finding = found(with_inputs(pushes(), 0, 0.01, 0.02))["one_speed"]
-    assert finding.severity == "note" and "mm/s" in finding.sentence
-
-
-@pytest.mark.parametrize(("share", "severity"), [(0.2, "warning"), (0.4, "note")])
-def test_a_small_range_of_angles_is_found(share: float, severity: str) -> None:
-    finding = found(with_inputs(pushes(), 2, share))["few_angles"]
-    assert finding.severity == severity and "-60 to 60 degrees" in finding.advice
-
-
-def test_contacts_that_stick_are_found() -> None:
-    assert found(pushes(slip=0.18))["few_sliding"].severity == "warning"  # each step against the path of its own push
-    mixed = pushes()
-    sliding = np.arange(len(mixed)) // WINDOWS % 10 == 0
-    inputs = np.where(sliding[:, None], mixed.inputs, pushes(slip=0.05).inputs)
-    assert found(replace(mixed, inputs=inputs))["few_sliding"].severity == "note"
+def test_a_contact_slides_either_way_from_one_window_of_a_push_to_the_next() -> None:
+    table, steps = pushes(), np.arange(80 * WINDOWS)
+    assert covered(table).sliding == covered(pushes(slip=-0.5)).sliding == 1.0
+    assert covered(replace(table, covariates={"elapsed_time": 0.2 * steps})).sliding == 1.0
+    assert covered(replace(table, covariates={"elapsed_time": 0.01 * steps})).sliding is None  # they overlap
+    assert covered(replace(table, push_id=steps.astype(str))).sliding is None
 
 
 def test_a_contact_that_rolls_around_the_tip_does_not_slide() -> None:
@@ -122,22 +129,103 @@ def test_a_contact_that_rolls_around_the_tip_does_not_slide() -> None:
     assert covered(table).sliding != 0.0
 
 
-def test_windows_that_overlap_say_nothing_about_sliding() -> None:
-    table = pushes()
-    assert covered(replace(table, covariates={"elapsed_time": 0.01 * np.arange(len(table))})).sliding is None
-    assert covered(replace(table, covariates={"elapsed_time": 0.2 * np.arange(len(table))})).sliding == 1.0
-
-
-def test_a_contact_slides_in_either_direction() -> None:
-    assert covered(pushes(slip=0.5)).sliding == covered(pushes(slip=-0.5)).sliding == 1.0
-
-
 def test_without_an_outline_sides_and_sliding_are_unknown() -> None:
     coverage = coverage_of(pushes())
     assert coverage is not None and coverage.side_counts is None and coverage.sliding is None
     assert found(on_sides(pushes(), 0), None) == {"few_pushes": found(on_sides(pushes(), 0), None)["few_pushes"]}
 
 
-def test_rows_of_different_pushes_are_no_steps() -> None:
-    table = pushes()
-    assert covered(replace(table, push_id=np.arange(len(table)).astype(str))).sliding is None
+# --- what pushes leave out of the domain where they judge a model -----------------------------------------------------
+
+
+TABLE, RIG = square_pushes(90)
+HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
+
+
+def of_angles(scale: float) -> PushTable:
+    return replace(TABLE, inputs=TABLE.inputs * [1.0, 1.0, scale])
+
+
+def test_pushes_all_around_give_no_warning() -> None:
+    assert pushed_part(TABLE, RIG) == [] and pushed_part(TABLE) == []
+    assert pushed_part(empty_table(), RIG) == []
+    assert pushed_part(load_data([HEXAGON]), bag("hexagon_delrin").rig) == []
+
+
+@pytest.mark.parametrize(("rows", "count"), [(3, "1 push"), (6, "2 pushes"), (21, "7 pushes")])
+def test_few_pushes_are_counted_and_nobody_is_told_to_learn(rows: int, count: str) -> None:
+    (finding,) = pushed_part(TABLE.take(np.arange(rows)))
+    assert finding.sentence.startswith(f"The data contain {count} only.") and "learnt" not in finding.text
+    assert finding.advice == MEANING and finding.severity == "warning"
+    assert finding.name == "pushed_part"
+
+
+def test_all_that_is_missing_is_one_warning() -> None:
+    (finding,) = pushed_part(of_angles(0.05).take(np.arange(12)))
+    assert finding.text.count(MEANING) == 1
+    assert finding.text.index("4 pushes only") < finding.text.index("push angles span")
+
+
+def test_sides_need_the_outline() -> None:
+    """A hexagon without symmetry has six kinds of sides; the table has pushes on its first."""
+    outline = shape_outline("hex")
+    uneven = replace(outline, vertices=outline.vertices * [1.0, 1.2])
+    one_side = replace(TABLE, inputs=TABLE.inputs * [1.0, 0.1, 1.0])
+    assert pushed_part(one_side) == []
+    (finding,) = pushed_part(one_side, replace(RIG, outline=uneven))
+    assert "Pushed: side 1 of 6" in finding.sentence
+
+
+# --- contacts against the outline, and how much of their time became windows ------------------------------------------
+
+
+APOTHEM = 0.0605 * np.sqrt(0.75)  # m, of the hexagon
+
+
+def hexagon() -> Recording:
+    return bag("hexagon_delrin")
+
+
+def fit_of(recording: Recording, rig: Rig) -> ContactFit:
+    return contact_fit(motion_of(recording, rig), rig)
+
+
+@pytest.mark.parametrize("size", [0.96, 1.0, 1.04])
+def test_gaps_have_the_size_and_sign_of_the_outlines_error(size: float) -> None:
+    fit = fit_of(hexagon(), outline_scaled(require_rig(hexagon()), size))
+    assert fit.side == "side" and len(fit.gaps) == 6
+    for gap in fit.gaps:
+        assert gap == pytest.approx(APOTHEM * (1.0 - size), abs=2e-4)
+    assert (fit.inside, fit.off) == pytest.approx((float(size > 1.0), float(size < 1.0)), abs=0.01)
+    assert min(fit.inside, fit.off) == 0.0
+
+
+def test_a_side_without_contact_has_no_gap() -> None:
+    """The bag begins with pushes on some sides."""
+    half = replace(hexagon(), slider=stream_part(hexagon().slider, 0.0, 0.3))
+    fit = fit_of(half, require_rig(hexagon()))
+    assert 0 < sum(gap is None for gap in fit.gaps) < 6
+    assert fit.lost is None and fit.window_time is None
+
+
+def test_the_time_in_contact_is_that_of_the_samples_without_dropouts() -> None:
+    fit = fit_of(hexagon(), require_rig(hexagon()))
+    assert fit.contact_time == pytest.approx(fit.samples / 100.0, rel=0.02)
+    slider = hexagon().slider
+    gone = np.ones(len(slider), dtype=np.bool_)
+    gone[400:700] = False
+    fewer = fit_of(replace(hexagon(), slider=taken(slider, gone)), require_rig(hexagon()))
+    assert fewer.contact_time == pytest.approx(fewer.samples / 100.0, rel=0.02)
+
+
+def test_windows_use_the_time_in_contact_but_for_the_ends_of_pushes() -> None:
+    rig = require_rig(hexagon())
+    table = windows_to_table(find_windows(hexagon(), rig))
+    fit = contact_fit(motion_of(hexagon(), rig), rig, table)
+    assert fit is not None and fit.window_time == pytest.approx(0.2 * len(table)) and fit.lost is not None
+    assert 0.0 < fit.lost < 0.2 * len(table.pushes) / fit.contact_time
+    half = contact_fit(motion_of(hexagon(), rig), rig, table.take(np.arange(len(table)) < len(table) // 2))
+    assert half is not None and half.lost == pytest.approx(0.5 + 0.5 * fit.lost, abs=0.02)
+    slider = hexagon().slider
+    still = replace(slider, x=0.0 * slider.x, y=0.0 * slider.y, heading=0.0 * slider.x)
+    assert contact_fit(motion_of(replace(hexagon(), slider=still), rig), rig) is None

@@ -22,7 +22,7 @@ import pytest
 from push_predictor.cli import build_parser
 from push_predictor.commands.common.options import Reading, with_signed_axes
 from push_predictor.errors import PushPredictorError
-from push_predictor.recordings.checks.checked import checked_data
+from push_predictor.recordings.checks.check import checked_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.windows.finder import find_windows
 

@@ -179,7 +179,7 @@ def test_composition_through_a_random_tree_is_that_of_matrices(
 
 
 def matrix(row: np.ndarray) -> np.ndarray:
-    from push_predictor.geometry.spatial import SpatialPose
+    from push_predictor.geometry.frames import SpatialPose
 
     found = np.eye(4)
     found[:3, :3], found[:3, 3] = SpatialPose(row[:3], row[3:]).rotation, row[:3]

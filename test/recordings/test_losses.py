@@ -16,8 +16,7 @@ from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.bag.reader import is_bag_file
-from push_predictor.recordings.checks.check import LISTED, check_recording
-from push_predictor.recordings.checks.data_checks import DataChecks
+from push_predictor.recordings.checks.check import LISTED, DataChecks, check_recording
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table_file import is_recording

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import struct
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from decoding import input_of
 from replay_bags import stamped
-from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
+from synthetic import START, Push, feed, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.nodes.validator.scalar_topics import DELAY, STALE, ClockHistory
 from push_predictor.online import stream_health
@@ -21,10 +22,10 @@ from push_predictor.recordings.bag.message_types import POSE
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.streams import Recording, ScalarStream
+from push_predictor.recordings.streams import taken as columns_taken
 from push_predictor.recordings.topics import Topics
-from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.finder import ScalarTrack, WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.scalar_track import ScalarTrack
 from push_predictor.types import Array
 
 SECOND = 10**9
@@ -96,17 +97,11 @@ def warmth_of(windows: list[PushWindow]) -> list[float | None]:
 
 def fed(recording: Recording, finder: WindowFinder, begin: float, end: float) -> None:
     """The sensors' samples from begin to end (s), without scalars."""
-    low, high = START + round(begin * SECOND), START + round(end * SECOND)
-    wrench = recording.wrench
-    assert wrench is not None
-    finder.add_wrench(wrench_rows(wrench, (wrench.stamp >= low) & (wrench.stamp < high)))
-    finder.add_pusher(rows(recording.pusher, (recording.pusher.stamp >= low) & (recording.pusher.stamp < high)))
-    finder.add_slider(rows(recording.slider, (recording.slider.stamp >= low) & (recording.slider.stamp < high)))
+    feed(finder, recording, lambda of: part(of, begin, end))
 
 
-def part(scalar: ScalarStream, begin: float, end: float) -> ScalarStream:
-    inside = (scalar.stamp >= START + round(begin * SECOND)) & (scalar.stamp < START + round(end * SECOND))
-    return ScalarStream(scalar.stamp[inside], scalar.value[inside])
+def part(of: Any, begin: float, end: float) -> Any:
+    return columns_taken(of, (of.stamp >= START + round(begin * SECOND)) & (of.stamp < START + round(end * SECOND)))
 
 
 def noisy(rate: float, seed: int = 0) -> ScalarStream:
@@ -240,7 +235,6 @@ def samples(recording: Recording, end: float, **named: float) -> Samples:
     """Sensors up to `end` s, each scalar with one sample at its time."""
     last = recording.slider.stamp < START + round(end * SECOND)
     none = wrench_rows(recording.wrench, np.arange(0)) if recording.wrench else None
-    assert none is not None
     found = {f"/{name}": stream((time, 0.0)) for name, time in named.items()}
     return Samples(rows(recording.slider, last), rows(recording.pusher, last), none, found)
 

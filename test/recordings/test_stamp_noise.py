@@ -5,29 +5,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from checked_bags import bag, found, rig_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
-from push_predictor.evaluation.validation import Comparison, compare, metrics_json
-from push_predictor.models.push_model import PushModel
+from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.stream_health import stamp_figures
-from push_predictor.recordings.checks.check import check_recording
-from push_predictor.recordings.read import read_recording, require_rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
+from push_predictor.recordings.read import require_rig
+from push_predictor.recordings.streams import Recording, taken
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows import regular_stamps
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.recordings.windows.repairs import regular_stamps
-from push_predictor.recordings.windows.repairs.regular_stamps import (
+from push_predictor.recordings.windows.regular_stamps import (
     AROUND,
     DECIDING,
     MOST_WIDTH,
@@ -36,10 +33,9 @@ from push_predictor.recordings.windows.repairs.regular_stamps import (
     stamp_noise,
     width,
 )
-from push_predictor.recordings.windows.stamp_order import OrderedSamples
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, uninterrupted
 from push_predictor.types import IntArray
 
-BAGS = Path(__file__).resolve().parents[2] / "bags"
 MS = 1_000_000
 START = 1_700_000_000_000 * MS
 
@@ -55,7 +51,7 @@ def noisy(stamp: IntArray, sd: float, seed: int = 0) -> IntArray:
 
 
 def samples(stamp: IntArray) -> OrderedSamples:
-    return OrderedSamples(stamp, np.arange(len(stamp))[:, None] * 1.0, np.zeros(len(stamp), np.bool_), False)
+    return uninterrupted(stamp, np.arange(len(stamp))[:, None] * 1.0)
 
 
 def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
@@ -63,9 +59,7 @@ def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
     taker, parts = RegularStamps(), []
     whole = samples(stamp)
     for first in [*range(0, len(stamp), portion), len(stamp)]:
-        rows = slice(first, first + portion)
-        part = OrderedSamples(whole.stamp[rows], whole.values[rows], whole.interrupted[rows], False)
-        parts.append(taker.take(part, final=first == len(stamp)))
+        parts.append(taker.take(taken(whole, slice(first, first + portion)), final=first == len(stamp)))
     assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values) and not taker.waiting
     return np.concatenate([part.stamp for part in parts])
 
@@ -77,7 +71,6 @@ def regular(stamp: IntArray, portion: int = 10**9) -> IntArray:
 def test_jitter_is_the_standard_deviation_of_a_stamp(sd: float) -> None:
     stamp = np.delete(grid(3000), slice(500, 520))
     found = stamp_noise(noisy(stamp, sd))
-    assert found is not None
     assert (found.period, found.jitter) == (pytest.approx(0.01, rel=0.02), pytest.approx(1e-3 * sd, rel=0.05))
     assert found.corrected == (sd > 0.5)
     figures = stamp_figures(noisy(stamp, sd), None)
@@ -129,7 +122,6 @@ def test_missing_samples_are_counted() -> None:
     true = np.delete(grid(2000), [300, 301, 700, 1100, 1101, 1102, 1500])
     stamp = noisy(true, 1.3)
     noise = stamp_noise(stamp[:DECIDING])
-    assert noise is not None
     found = missing_before(stamp, noise)
     assert dict(zip(np.flatnonzero(found).tolist(), found[found > 0].tolist(), strict=True)) == {
         300: 2,
@@ -210,11 +202,6 @@ def test_few_samples_are_kept() -> None:
 # --- recordings -------------------------------------------------------------------------------------------------------
 
 
-@cache
-def bag(name: str) -> Recording:
-    return read_recording(BAGS / name)
-
-
 def with_jitter(recording: Recording, sd: float, kind: str = "gaussian", seed: int = 0) -> Recording:
     """Jitter in the stamps of every stream, independent from sample to sample; sd in ms."""
     rng = np.random.default_rng(seed)
@@ -229,102 +216,62 @@ def with_jitter(recording: Recording, sd: float, kind: str = "gaussian", seed: i
 
 @pytest.mark.parametrize("name", ["hexagon_delrin", "ellipse_plywood"])
 def test_undisturbed_recordings_keep_their_stamps(name: str) -> None:
-    recording = bag(name)
-    finder = WindowFinder(require_rig(recording))
-    finder.find(recording)
-    for stream in (recording.slider, recording.pusher, recording.wrench):
-        assert stream is not None
+    for stream in bag(name).sensors.values():
         increasing = stream.stamp[np.diff(np.maximum.accumulate(stream.stamp), prepend=0) > 0]
         assert np.array_equal(regular(increasing), increasing)
 
 
-def rows(stream: Any, begin: int, end: int) -> Any:
-    return taken(stream, slice(begin, end))
-
-
-@cache
 def half(number: int) -> Recording:
     """The first or second half of a recording, of some 60 pushes."""
     recording = bag("square_abs_test")
     middle = int(recording.slider.stamp[len(recording.slider) // 2])
-    kept = {}
-    for name in ("slider", "pusher", "wrench"):
-        stream = getattr(recording, name)
-        at = int(np.searchsorted(stream.stamp, middle))
-        kept[name] = rows(stream, *((0, at) if number == 0 else (at, len(stream))))
-    return replace(recording, **kept)
+    streams = {k: taken(of, (of.stamp >= middle) == bool(number)) for k, of in recording.sensors.items()}
+    return replace(recording, **streams)
 
 
 def table_of(recording: Recording) -> PushTable:
     return windows_to_table(find_windows(recording, require_rig(recording)))
 
 
-@cache
-def model() -> PushModel:
-    return train_model(
-        table_of(half(0)), require_rig(half(0)), "gp", name="square", options=TrainingOptions(n_train=60, mean="zero")
-    )
-
-
-@cache
-def scored(sd: float, kind: str = "gaussian") -> tuple[PushTable, Comparison, dict[str, Any]]:
-    table = table_of(with_jitter(half(1), sd, kind) if sd else half(1))
-    comparison = compare(model(), table)
-    return table, comparison, metrics_json(comparison)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gaussian", pytest.param("delay", marks=pytest.mark.long)])
 def test_two_milliseconds_of_jitter_change_the_accuracy_by_less_than_five_percent(kind: str) -> None:
-    clean, (table, _, found) = scored(0.0)[2], scored(2.0, kind)
-    assert len(table.pushes) == len(scored(0.0)[0].pushes) > 55 and abs(len(table) - len(scored(0.0)[0])) < 8
-    assert found["nmse"]["total"] < 1.05 * clean["nmse"]["total"]
-    assert found["nlpd"]["total"] == pytest.approx(clean["nlpd"]["total"], abs=0.15)
-
-
-@pytest.mark.slow
-def test_the_alarm_stays_silent_with_jitter() -> None:
-    calibration = calibrate(model())
-    table, comparison, _ = scored(2.0)
-    assert not alarm_state(calibration, table, comparison.mean, comparison.covariance).fired
+    """The alarm stays silent, too."""
+    options = TrainingOptions(n_train=60, mean="zero")
+    model = train_model(table_of(half(0)), require_rig(half(0)), "gp", name="square", options=options)
+    clean, jittery = table_of(half(1)), table_of(with_jitter(half(1), 2.0, kind))
+    assert len(jittery.pushes) == len(clean.pushes) > 55 and abs(len(jittery) - len(clean)) < 8
+    found_clean, comparison = metrics_json(compare(model, clean)), compare(model, jittery)
+    found_jittery = metrics_json(comparison)
+    assert found_jittery["nmse"]["total"] < 1.05 * found_clean["nmse"]["total"]
+    assert found_jittery["nlpd"]["total"] == pytest.approx(found_clean["nlpd"]["total"], abs=0.15)
+    assert not alarm_state(calibrate(model), jittery, comparison.mean, comparison.covariance).fired
 
 
 def test_windows_of_jittery_streams_are_the_same_online_and_offline() -> None:
     short = bag("circle_pu")
     recording = with_jitter(short, 2.0)
     rig, offline = require_rig(recording), find_windows(recording, require_rig(recording))
-    finder, found = WindowFinder(rig), []
-    assert recording.wrench is not None
+    finder, online = WindowFinder(rig), []
     for begin, end in pairwise(range(0, len(recording.slider) + 37, 37)):
-        finder.add_wrench(rows(recording.wrench, begin // 2, end // 2))
-        finder.add_pusher(rows(recording.pusher, begin, end))
-        finder.add_slider(rows(recording.slider, begin, end))
-        found += finder.take_ready()
+        finder.add_wrench(taken(recording.wrench, slice(begin // 2, end // 2)))
+        finder.add_pusher(taken(recording.pusher, slice(begin, end)))
+        finder.add_slider(taken(recording.slider, slice(begin, end)))
+        online += finder.take_ready()
     assert {*finder.stamp_jitter} == {"slider", "pusher", "wrench"}
     assert finder.stamp_jitter["slider"] == pytest.approx(0.002, rel=0.4)
-    found += finder.finish()
-    assert len(found) == len(offline) > 20
-    for one, other in zip(found, offline, strict=True):
+    online += finder.finish()
+    assert len(online) == len(offline) > 20
+    for one, other in zip(online, offline, strict=True):
         assert (one.start, one.end, one.push_id) == (other.start, other.end, other.push_id)
         np.testing.assert_allclose(one.displacement, other.displacement, rtol=0.0, atol=1e-12)
 
 
-def test_the_check_states_the_jitter() -> None:
-    recording = bag("circle_pu")
-    assert not [each for each in check_recording(recording, require_rig(recording)) if each.name == "stamp_jitter"]
-    slider = with_jitter(recording, 2.0).slider
-    (found,) = [
-        each
-        for each in check_recording(replace(recording, slider=slider), require_rig(recording))
-        if each.name == "stamp_jitter"
-    ]
-    assert found.severity == "note" and "slider 2 ms (20 % of the period)." in found.sentence
-    assert [*found.values] == ["slider_jitter"] and found.values["slider_jitter"].value == pytest.approx(2e-3, rel=0.1)
-
-
-def test_streams_without_samples_have_no_finding() -> None:
-    recording = bag("circle_pu")
-    none = WrenchStream(*(np.empty(0, kind) for kind in (np.int64, float, float, float)))
-    assert isinstance(recording.slider, PoseStream)
-    assert not [each for each in check_recording(replace(recording, wrench=none), require_rig(recording))
-                if each.name == "stamp_jitter"]  # fmt: skip
+def test_the_check_states_the_jitter_of_streams_with_samples() -> None:
+    recording, rig = bag("circle_pu"), rig_of("circle_pu")
+    sound = replace(recording, wrench=taken(recording.wrench, slice(0)))
+    assert "stamp_jitter" not in found(sound, rig)
+    finding = found(replace(sound, slider=with_jitter(recording, 2.0).slider), rig)["stamp_jitter"]
+    assert finding.severity == "note" and "slider 2 ms (20 % of the period)." in finding.sentence
+    assert [*finding.values] == ["slider_jitter"]
+    assert finding.values["slider_jitter"].value == pytest.approx(2e-3, rel=0.1)

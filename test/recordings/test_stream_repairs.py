@@ -5,19 +5,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from checked_bags import bag
+from stream_faults import at_rate, extrapolated, flipped, in_bursts, lost, rounded
+from stream_faults import held as held_poses
 
-from push_predictor.recordings.streams import PoseStream
-from push_predictor.recordings.windows.repairs.continued import ContinuedPoses, continued
-from push_predictor.recordings.windows.repairs.flips import HeadingFlips
-from push_predictor.recordings.windows.repairs.held import HeldPoses
-from push_predictor.recordings.windows.repairs.regular_stamps import RegularStamps, stamp_noise
-from push_predictor.recordings.windows.repairs.resolution import Resolution
-from push_predictor.recordings.windows.repairs.smoothing import SmoothedPoses
+from push_predictor.recordings.streams import PoseStream, joined, taken
+from push_predictor.recordings.windows.flips import HeadingFlips
+from push_predictor.recordings.windows.regular_stamps import RegularStamps, burst_period, missing_in_bursts, stamp_noise
+from push_predictor.recordings.windows.resolution import SPEED_ERROR, Resolution, SmoothedPoses, fit_span
 from push_predictor.recordings.windows.slow import SlowPoses
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, taken
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, uninterrupted
 from push_predictor.recordings.windows.track import Track
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses, continued
 from push_predictor.types import Array, IntArray
 
 MS = 1_000_000
@@ -28,7 +32,7 @@ def samples(x: Array, period: float = 10.0, quantum: float = 0.0) -> OrderedSamp
     """Samples of a body at places x (n,) m on a line, as the repairs get them; period in ms."""
     none = np.zeros(len(x))
     values = np.column_stack([x, none, none, none, none + quantum])
-    return OrderedSamples(times(len(x), period), values, np.zeros(len(x), np.bool_), False)
+    return uninterrupted(times(len(x), period), values)
 
 
 def times(count: int, period: float = 10.0) -> IntArray:
@@ -61,6 +65,7 @@ def held(x: Array, quantum: float = 0.0) -> tuple[OrderedSamples, OrderedSamples
         (steps((120, 0.0), (1, 2.0), (30, 0.5)), 0.0),  # at rest for longer than a source is silent
         (steps((20, 1.0), (1, 0.0), (1, 0.9), (20, 0.1)), 0.0),  # slower than before
         (steps((20, 0.5), (20, 0.0), (1, 100.0), (150, 0.0), (1, 1000.0), (20, 0.5)), 0.0),  # put elsewhere twice
+        (steps((100, 0.0), (150, 0.5), (150, 0.0)), 0.0),  # at rest, without noise
     ],
 )
 def test_poses_that_may_be_measured_stay(x: Array, quantum: float) -> None:
@@ -150,23 +155,19 @@ def on_a_line(x: Array, begin: int, count: int) -> Array:
     return x
 
 
-def test_continued_poses_are_marked_from_the_first_on_where_a_coincidence_is_excluded() -> None:
-    assert np.array_equal(np.flatnonzero(continued(body(on_a_line(measured(), 50, 6)), False)), np.arange(50, 56))
-    assert not continued(body(on_a_line(measured(), 50, 4)), False).any()
-
-
-@pytest.mark.parametrize("portion", [1, 7, 53])
+@pytest.mark.parametrize("portion", [1, 7])
 def test_continued_poses_are_left_out_portion_by_portion(portion: int) -> None:
-    stream = body(on_a_line(on_a_line(measured(200), 50, 6), 120, 30))
+    """From the first on, where a coincidence is excluded."""
+    stream = body(on_a_line(on_a_line(on_a_line(measured(200), 20, 4), 50, 6), 120, 30))
     rows = np.column_stack([stream.x, stream.y, np.zeros((200, 2))])
     step, found = ContinuedPoses(None), []
     for begin in range(0, 200, portion):
         now = slice(begin, begin + portion)
-        found.append(step.take(OrderedSamples(stream.stamp[now], rows[now], np.zeros(200, np.bool_)[now], False)))
+        found.append(step.take(uninterrupted(stream.stamp[now], rows[now])))
         assert step.waiting <= 31
-    found.append(step.take(OrderedSamples(stream.stamp[:0], rows[:0], np.zeros(0, np.bool_), False), final=True))
+    found.append(step.take(uninterrupted(stream.stamp[:0], rows[:0]), final=True))
     wanted = ~continued(stream, angle=False)
-    assert np.sum(~wanted) == 36 and step.waiting == 0
+    assert np.array_equal(np.flatnonzero(~wanted), [*range(50, 56), *range(120, 150)]) and step.waiting == 0
     assert np.array_equal(np.concatenate([each.stamp for each in found]), stream.stamp[wanted])
 
 
@@ -174,10 +175,7 @@ def test_a_line_of_over_two_seconds_is_a_motion_and_is_not_waited_for() -> None:
     stream = body(on_a_line(measured(400), 50, 300))
     rows = np.column_stack([stream.x, stream.y, np.zeros((400, 2))])
     step = ContinuedPoses(None)
-    given = [
-        step.take(OrderedSamples(stream.stamp[k : k + 1], rows[k : k + 1], np.zeros(1, np.bool_), False))
-        for k in range(300)
-    ]
+    given = [step.take(uninterrupted(stream.stamp[k : k + 1], rows[k : k + 1])) for k in range(300)]
     assert step.waiting <= 1 and sum(len(each.stamp) for each in given) >= 299
     assert not continued(stream, angle=False).any()
 
@@ -191,6 +189,12 @@ def test_repeated_and_rounded_poses_and_a_steady_motion_without_noise_are_not_co
     assert not continued(body(MM * np.cumsum(counts)), False).any()
 
 
+def test_poses_on_a_line_between_two_measured_ones_are_not_continued() -> None:
+    x, inner, ends = measured(), np.arange(50, 58), [49, 58]
+    x[inner] = np.interp(inner, ends, x[ends])
+    assert not continued(body(x), False).any()
+
+
 # --- resolution -------------------------------------------------------------------------------------------------------
 
 
@@ -202,6 +206,23 @@ def test_a_resolution_is_known_from_steps_that_vary() -> None:
     assert resolution(MM * np.cumsum(np.tile([10, 11, 10, 12], 20))) == pytest.approx(MM)  # no step is that small
     assert resolution(MM * np.cumsum([1, 2, 1, 3, 1, 2, 1])) == 0.0  # too few
     assert resolution(steps(*[(8, 0.5), (8, 0.7)] * 13)) == 0.0  # steady motions at some speeds
+
+
+@pytest.mark.parametrize("step", [1e-3, 2.5e-4, 1e-4])
+def test_the_resolution_of_measured_poses_is_that_of_their_decimals(step: float) -> None:
+    pusher = bag("ellipse_plywood").pusher
+    known = Resolution(2).take(np.column_stack([np.round(pusher.x / step) * step, pusher.y]))[-1]
+    assert known[0] == pytest.approx(step, rel=1e-6) and known[1] < 2e-5
+
+
+def test_a_line_over_the_span_of_a_resolution_has_the_stated_error() -> None:
+    rng, step, period = np.random.default_rng(0), 2e-4, 0.01
+    time = np.arange(round(float(fit_span(step, period)) / period)) * period
+    slopes = [
+        np.polyfit(time, np.round((speed * time + rng.uniform(0.0, step)) / step) * step, 1)[0] - speed
+        for speed in rng.uniform(0.02, 0.08, 2000)
+    ]
+    assert 0.3 * SPEED_ERROR < np.std(slopes) < 1.2 * SPEED_ERROR
 
 
 # --- smoothed poses ---------------------------------------------------------------------------------------------------
@@ -237,13 +258,6 @@ def test_noise_beyond_the_rounding_is_no_kink() -> None:
     assert np.std(left) < 0.45 * COARSE
 
 
-def test_lines_do_not_depend_on_the_portions_however_coarse_the_poses_are() -> None:
-    recorded = samples(0.005 * np.round(steps((200, 0.5)) / 0.005), quantum=0.005)
-    taker, whole = SmoothedPoses(3), SmoothedPoses(3).take(recorded, final=True)
-    parts = [taker.take(taken(recorded, slice(k, k + 30)), final=k == 180) for k in range(0, 201, 30)]
-    np.testing.assert_allclose(np.concatenate([part.values for part in parts]), whole.values, atol=1e-12)
-
-
 # --- slow streams -----------------------------------------------------------------------------------------------------
 
 SLOW = 50.0  # ms
@@ -261,9 +275,9 @@ def inside(found: OrderedSamples, begin: int, end: int) -> int:
 def test_poses_are_put_between_those_of_a_slow_stream_but_not_where_it_breaks() -> None:
     plain = samples(steps((40, 2.0)), SLOW)
     late = plain.stamp + np.where(np.arange(41) < 20, 0, 1000 * MS)
-    gap = OrderedSamples(late, plain.values, plain.interrupted, False)
+    gap = OrderedSamples(late, plain.values, plain.interrupted)
     jump = samples(steps((19, 2.0), (1, 200.0), (20, 2.0)), SLOW)
-    missing = OrderedSamples(plain.stamp, plain.values, np.arange(41) == 20, False)
+    missing = OrderedSamples(plain.stamp, plain.values, np.arange(41) == 20)
     for recorded in (gap, jump, missing):
         found = filled(recorded)
         assert inside(found, int(recorded.stamp[19]), int(recorded.stamp[20])) == 0
@@ -294,16 +308,6 @@ def test_a_stop_is_placed_and_a_slower_motion_is_none() -> None:
         assert len(filled(samples(x, SLOW), None).stamp) == len(x)
 
 
-def test_poses_of_a_slow_stream_do_not_depend_on_the_portions() -> None:
-    recorded = samples(steps((15, 0.0), (1, 1.0), (15, 2.0), (1, 0.5), (15, 0.0)), SLOW)
-    taker, whole = SlowPoses(is_jump, 3), filled(recorded)
-    parts = [taker.take(taken(recorded, slice(k, k + 1))) for k in range(len(recorded.stamp))]
-    parts.append(taker.take(taken(recorded, slice(0, 0)), final=True))
-    assert np.array_equal(np.concatenate([part.stamp for part in parts]), whole.stamp)
-    np.testing.assert_allclose(np.concatenate([part.values for part in parts]), whole.values, atol=1e-12)
-    assert len(whole.stamp) > 100 and taker.waiting == 0
-
-
 def test_a_body_that_turns_off_at_once_is_at_its_end_from_the_turn_on() -> None:
     x, y = steps((20, 2.0), (1, 1.0), (20, 0.0)), steps((20, 0.0), (1, 1.0), (20, 2.0))
     recorded = samples(x, SLOW)
@@ -318,12 +322,59 @@ def test_poses_that_arrive_together_lie_on_the_line_of_those_that_arrived_soon()
     late = np.where(np.arange(606) % 6 < 3, 0, 1) * (19 - 20 * (np.arange(606) % 6 - 3)) * MS
     late[300:305] = (160 - 20 * np.arange(5)) * MS + np.arange(5)  # held up for eight periods
     stamp = np.maximum.accumulate(true + np.maximum(late, 0)) + np.arange(606)
-    recorded = OrderedSamples(stamp, np.zeros((606, 1)), np.zeros(606, np.bool_), False)
+    recorded = uninterrupted(stamp, np.zeros((606, 1)))
     taker, whole = RegularStamps(), RegularStamps().take(recorded, final=True).stamp
     parts = [taker.take(taken(recorded, slice(k, k + 50)), final=k == 600) for k in range(0, 606, 50)]
     assert taker.noise is not None and taker.noise.bursts
     assert np.array_equal(np.concatenate([part.stamp for part in parts]), whole)
     assert np.abs(whole - true).max() < 2 * MS
+
+
+def test_a_sample_that_is_missing_in_bursts_is_counted() -> None:
+    grid = times(101, 20.0)
+    assert burst_period(in_bursts(grid)) == pytest.approx(0.02, rel=0.01)
+    assert burst_period(grid) is None  # a regular stream
+    random = np.cumsum(np.random.default_rng(0).exponential(20.0, 101) * MS).astype(np.int64)
+    assert burst_period(random) is None  # no grid
+    missing = missing_in_bursts(in_bursts(np.delete(grid, [50, 51])), 0.02)
+    assert missing.sum() == 2 and abs(int(np.flatnonzero(missing)[0]) - 50) <= 4
+    assert missing_in_bursts(np.delete(grid, [50, 51]), 0.02).sum() == 2  # the steps around it are equal
+
+
+# --- all of them ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "alter",
+    [
+        lambda of: of,
+        lambda of: lost(of, np.arange(300, 1300, 160), 12),
+        lambda of: extrapolated(of, np.arange(300, 1300, 160), 12),
+        lambda of: held_poses(of, 30.0),
+        lambda of: rounded(of, 2e-4, 1e-3),
+        lambda of: rounded(of, 5e-3, 1e-3),
+        lambda of: flipped(of, np.arange(300, 1300, 160), 12, np.pi),
+        lambda of: at_rate(of, 20.0),
+        lambda of: replace(at_rate(of, 50.0), stamp=in_bursts(at_rate(of, 50.0).stamp)),
+    ],
+)
+@pytest.mark.parametrize("portion", [1, 13])
+def test_repairs_do_not_depend_on_the_portions(portion: int, alter: Callable[[PoseStream], PoseStream]) -> None:
+    stream = alter(taken(bag("ellipse_plywood").slider, slice(1500)))
+    rows = np.column_stack([stream.x, stream.y, stream.z, stream.heading])
+
+    def repaired(portion: int) -> OrderedSamples:
+        flips, track, parts = HeadingFlips(), Track(4, position=True, angle=3), []
+        for begin in range(0, len(rows), portion):
+            stamp, values = stream.stamp[begin : begin + portion], rows[begin : begin + portion].copy()
+            values[:, 3] -= flips.take(stamp, values[:, [0, 1, 3]])
+            parts.append(track.repairs.take(uninterrupted(stamp, values), final=begin + portion >= len(rows)))
+        assert track.repairs.waiting == 0
+        return joined(parts)
+
+    whole, found = repaired(len(rows)), repaired(portion)
+    assert np.array_equal(found.stamp, whole.stamp)
+    np.testing.assert_allclose(found.values, whole.values, atol=1e-12)
 
 
 # --- stamps -----------------------------------------------------------------------------------------------------------
@@ -333,7 +384,7 @@ def test_the_noise_of_stamps_is_that_of_the_last_block() -> None:
     rng = np.random.default_rng(0)
     stamp = times(300) + np.where(np.arange(300) < 101, 0, 300_000 * rng.standard_normal(300)).astype(np.int64)
     taker = RegularStamps()
-    taker.take(OrderedSamples(stamp, np.zeros((300, 1)), np.zeros(300, np.bool_), False), final=True)
+    taker.take(uninterrupted(stamp, np.zeros((300, 1))), final=True)
     assert taker.noise is not None and not taker.corrected
     assert taker.noise.jitter == pytest.approx(3e-4, rel=0.4)
 

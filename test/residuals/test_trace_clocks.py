@@ -18,7 +18,7 @@ from synthetic import square_rig
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
-from push_predictor.recordings.checks.data_checks import DataChecks
+from push_predictor.recordings.checks.check import DataChecks
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.channels.clocks import NAMES, clock_errors

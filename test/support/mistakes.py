@@ -14,11 +14,11 @@ from repository import REPOSITORY
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.recordings.checks.geometry.stage import swapped
+from push_predictor.recordings.checks.geometry import swapped
 from push_predictor.recordings.decoder.rules import slider_stream
 from push_predictor.recordings.fields.pose_rows import composed, normalised
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.streams import PoseStream, Recording, taken
 from push_predictor.types import Array
 
 BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
@@ -49,8 +49,7 @@ def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Rec
 
 def stream_part(poses: PoseStream, begin: float, end: float) -> PoseStream:
     """The samples between two shares of a stream."""
-    part = slice(round(begin * len(poses)), round(end * len(poses)))
-    return replace(poses, **{name: values[part] for name, values in vars(poses).items() if values is not None})
+    return taken(poses, slice(round(begin * len(poses)), round(end * len(poses))))
 
 
 def scaled(recording: Recording, stream: str, factor: float) -> Recording:

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +17,15 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream, taken
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array, IntArray
 
 START = 1_600_000_000_000_000_000  # ns
 RADIUS = 0.00475
+rows = wrench_rows = taken  # samples of a stream, by mask, indices or slice
 
 
 def square_rig() -> Rig:
@@ -114,14 +117,11 @@ def _moved_pose(stream: PoseStream, shift: Array, turn: float) -> PoseStream:
     return PoseStream(stream.stamp, world[:, 0], world[:, 1], stream.z, stream.heading + turn)
 
 
-def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
-    """The samples selected by `keep` (mask, indices or slice)."""
-    return PoseStream(stream.stamp[keep], stream.x[keep], stream.y[keep], stream.z[keep], stream.heading[keep])
-
-
-def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
-    """The wrench samples selected by `keep`."""
-    return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
+def feed(finder: WindowFinder, recording: Recording, part: Callable[[Any], Any] = lambda stream: stream) -> None:
+    """Add a part of each stream."""
+    finder.add_wrench(part(recording.wrench))
+    finder.add_pusher(part(recording.pusher))
+    finder.add_slider(part(recording.slider))
 
 
 def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:

@@ -193,7 +193,7 @@ class Reading:
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
-        from push_predictor.recordings.checks.data_checks import DataChecks
+        from push_predictor.recordings.checks.check import DataChecks
 
         self.rig, self.topics = given_rig(options), topics_of(options)
         self.checks = DataChecks(options.strict, warn)

@@ -42,7 +42,7 @@ from msg_adapters.slider_poses import (
 )
 from push_predictor.design.batch import suggest_pushes
 from push_predictor.errors import FrameError, PredictionError, RequestError, TooLargeError
-from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
+from push_predictor.geometry.frames import SAME_FRAME, SpatialPose
 from push_predictor.models.prediction import NOT_FINITE, Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push

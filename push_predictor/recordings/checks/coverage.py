@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The part of the domain that pushes cover: their number, sides, speeds, angles and the share of sliding contacts."""
+"""The part of the domain that pushes cover, by number, side, speed, angle and sliding; how contacts fit the outline."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.geometry.frames import to_body
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
+from push_predictor.recordings.checks.motion import Motion
+from push_predictor.recordings.dropouts import longest_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
@@ -25,6 +28,7 @@ FEWEST_STEPS = 20  # from one window of a push to the next
 MOST_SIDES = 12  # an outline with more vertices is divided into quarters
 MIDDLE = (5.0, 95.0)  # percentiles
 NAMED = 4  # sides
+OFF = 0.001  # m from the outline
 MEANING = "The results are valid only for the part of the domain that was pushed."
 
 
@@ -63,17 +67,13 @@ def coverage_of(table: PushTable, rig: Rig | None = None) -> Coverage | None:
     """The coverage of a table, None without a row. Sides and sliding contacts need the rig."""
     if not len(table):
         return None
-    counts, side, alike = (None, "side", 0) if rig is None else _sides(table, rig.outline)
-    return Coverage(
-        len(table.pushes),
-        len(table),
-        counts,
-        side,
-        alike,
-        _middle(table.inputs[:, 0]),
-        _middle(table.inputs[:, 2]),
-        None if rig is None else _sliding(table, rig),
-    )
+    speeds, angles = _middle(table.inputs[:, 0]), _middle(table.inputs[:, 2])
+    if rig is None:
+        return Coverage(len(table.pushes), len(table), None, "side", 0, speeds, angles, None)
+    order, (index, count, side) = rig.outline.rotational_symmetry, sides_of(rig.outline, table.inputs[:, 1])
+    alike = 0 if order == 0 else count // order if count % order == 0 else count
+    counts = np.bincount(index, minlength=count)
+    return Coverage(len(table.pushes), len(table), counts, side, alike, speeds, angles, _sliding(table, rig))
 
 
 def coverage_findings(coverage: Coverage | None) -> list[Finding]:
@@ -94,7 +94,8 @@ def pushed_part(table: PushTable, rig: Rig | None = None) -> list[Finding]:
     if coverage is None:
         return []
     lacking = [finding for finding in coverage_findings(coverage) if finding.severity == "warning"]
-    sentences = [_without_need(finding, coverage) for finding in lacking]
+    few = f"{_contained(coverage)} only."  # without what a learnt model needs
+    sentences = [few if finding.name == "few_pushes" else finding.sentence for finding in lacking]
     return [Finding("pushed_part", "warning", " ".join(sentences), MEANING)] if sentences else []
 
 
@@ -103,14 +104,6 @@ def sides_of(outline: Outline, contact: Array) -> tuple[IntArray, int, str]:
     if outline.semi_axes is None and len(outline.vertices) <= MOST_SIDES:
         return outline.edge(contact)[0], len(outline.vertices), "side"
     return np.floor(4.0 * contact).astype(np.int64), 4, "quarter"
-
-
-def _sides(table: PushTable, outline: Outline) -> tuple[IntArray, str, int]:
-    """Windows on each side, the name of a side, and the number of sides after which the outline repeats."""
-    order, (index, count, side) = outline.rotational_symmetry, sides_of(outline, table.inputs[:, 1])
-    repeats = order and count % order == 0
-    alike = 0 if order == 0 else count // order if repeats else count
-    return np.bincount(index, minlength=count), side, alike
 
 
 def _sliding(table: PushTable, rig: Rig) -> float | None:
@@ -170,13 +163,9 @@ def _speeds(coverage: Coverage) -> Finding | None:
     low, high = coverage.speeds
     if high > ONE_SPEED * low:
         return None
-    sentence = f"Nearly all pushes have one speed, {_millimetres(low)} to {_millimetres(high)} mm/s."
+    sentence = f"Nearly all pushes have one speed, {1e3 * low:.3g} to {1e3 * high:.3g} mm/s."
     advice = "Record further speeds, 10 to 100 mm/s for example, if you want to predict them."
     return Finding("one_speed", "note", sentence, advice, {"low": Value(low, "m/s"), "high": Value(high, "m/s")})
-
-
-def _millimetres(speed: float) -> str:
-    return f"{1e3 * speed:.3g}"
 
 
 def _angles(coverage: Coverage) -> Finding | None:
@@ -198,12 +187,73 @@ def _slides(coverage: Coverage) -> Finding | None:
     return Finding("few_sliding", severity, sentence, advice, {"share": Value(share, "1")})
 
 
-def _without_need(finding: Finding, coverage: Coverage) -> str:
-    """The sentence of a finding, without what a learnt model needs."""
-    if finding.name != "few_pushes":
-        return finding.sentence
-    return f"{_contained(coverage)} only."
-
-
 def _contained(coverage: Coverage) -> str:
     return f"The data contain {coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
+
+
+# --- how the contacts lie on the outline ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ContactFit:
+    """The contacts of a recording against the outline of its rig, as given.
+
+    samples: in contact, judged by motion alone. inside, off: shares of them with the tip over OFF inside the outline,
+    or away from it. side: "side" or "quarter"; gaps: median gap (m, negative inside) on each, counter-clockwise from
+    the first vertex, None without a contact. contact_time, window_time: s in contact, and in windows; the latter None
+    where no windows were searched for.
+    """
+
+    samples: int
+    inside: float
+    off: float
+    side: str
+    gaps: tuple[float | None, ...]
+    contact_time: float
+    window_time: float | None
+
+    @property
+    def lost(self) -> float | None:
+        """Share of the time in contact that is in no window, None where no windows were searched for."""
+        if self.window_time is None:
+            return None
+        return max(0.0, 1.0 - self.window_time / self.contact_time)
+
+    def record(self) -> dict[str, object]:
+        """The entry in the JSON."""
+        return {
+            "samples": self.samples,
+            "inside_share": self.inside,
+            "off_share": self.off,
+            "gap_by_side": list(self.gaps),
+            "contact_time": self.contact_time,
+            "window_time": self.window_time,
+            "lost_share": self.lost,
+        }
+
+
+def contact_fit(motion: Motion | None, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
+    """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
+    if motion is None or not motion.contact.any():
+        return None
+    touch = motion.contact
+    nearest = rig.outline.project(to_body(motion.tip, motion.slider)[touch])
+    gap, (index, count, side) = nearest.distance - rig.pusher_radius, sides_of(rig.outline, nearest.contact)
+    gaps = [float(np.median(gap[index == k])) if np.any(index == k) else None for k in range(count)]
+    return ContactFit(
+        samples=int(np.sum(touch)),
+        inside=float(np.mean(gap < -OFF)),
+        off=float(np.mean(gap > OFF)),
+        side=side,
+        gaps=tuple(gaps),
+        contact_time=_contact_time(motion),
+        window_time=None if table is None else float(np.sum(table.duration)),
+    )
+
+
+def _contact_time(motion: Motion) -> float:
+    """Time (s) from samples in contact to the next ones, without dropouts."""
+    step = np.diff(motion.time)
+    period = float(np.median(step))
+    step = np.append(np.where(step > longest_interval(period), period, step), period)
+    return float(np.sum(step[motion.contact]))

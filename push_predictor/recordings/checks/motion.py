@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Motion of slider and tip on one time axis, the samples in contact, and how well these lie on the rig's outline."""
+"""Motion of slider and tip on one time axis, and the samples in contact."""
 
 from __future__ import annotations
 
@@ -10,32 +10,22 @@ from math import comb
 
 import numpy as np
 
-from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.recordings.checks.coverage import sides_of
+from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.dropouts import longest_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.contact import LONGEST_BREAK
 from push_predictor.recordings.windows.push_window import WindowOptions
-from push_predictor.recordings.windows.repairs.regular_stamps import SD
+from push_predictor.recordings.windows.regular_stamps import SD
 from push_predictor.types import Array, BoolArray, IntArray
 
-SPANS = (
-    0.05,
-    0.07,
-    0.1,
-    0.14,
-    0.2,
-    0.28,
-    0.4,
-)  # s before and after a sample that determine its speed: the first that noise allows
+# s before and after a sample that determine its speed: the first that noise allows
+SPANS = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4)
 MOVING_SHARE, MOVING = 0.4, 0.01  # of the lowered tip's speed; m/s: the noise of a slider's speed is to be smaller
 NOISE = 7.0  # standard deviations of the speed of a slider at rest: what is faster moves
 STEADY, STEADY_TIP = 0.5, 0.3  # change of velocity, as a share of it, of a slider and a tip that neither hit nor part
 FEWEST = 5  # samples of each stream
 LEAST_STEADY = 0.7  # share of the contact without its begin and end, from which on those distort no robust fit
-OFF = 0.001  # m from the outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,44 +63,6 @@ class Motion:
         return self.steady if vague and steady >= FEWEST else self.contact
 
 
-@dataclass(frozen=True)
-class ContactFit:
-    """The contacts of a recording against the outline of its rig, as given.
-
-    samples: in contact, judged by motion alone. inside, off: shares of them with the tip over OFF inside the outline,
-    or away from it. side: "side" or "quarter"; gaps: median gap (m, negative inside) on each, counter-clockwise from
-    the first vertex, None without a contact. contact_time, window_time: s in contact, and in windows; the latter None
-    where no windows were searched for.
-    """
-
-    samples: int
-    inside: float
-    off: float
-    side: str
-    gaps: tuple[float | None, ...]
-    contact_time: float
-    window_time: float | None
-
-    @property
-    def lost(self) -> float | None:
-        """Share of the time in contact that is in no window, None where no windows were searched for."""
-        if self.window_time is None:
-            return None
-        return max(0.0, 1.0 - self.window_time / self.contact_time)
-
-    def record(self) -> dict[str, object]:
-        """The entry in the JSON."""
-        return {
-            "samples": self.samples,
-            "inside_share": self.inside,
-            "off_share": self.off,
-            "gap_by_side": list(self.gaps),
-            "contact_time": self.contact_time,
-            "window_time": self.window_time,
-            "lost_share": self.lost,
-        }
-
-
 def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     """The motion of a recording, None if slider and tip have no common time."""
     slider, pusher = recording.slider, recording.pusher
@@ -136,9 +88,8 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     raised, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
-    kinds = {"moving": moving, "contact": contact, "steady": steady, "push": number}
-    measured = {"noise": noise, "span": slider_speed.span, "tool": tool}
-    return Motion(time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force, **kinds, **measured)
+    measured = (time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force)
+    return Motion(*measured, moving, contact, steady, number, noise, slider_speed.span, tool)
 
 
 def body_velocity(motion: Motion) -> Array:
@@ -150,25 +101,6 @@ def sums_by_push(values: Array, push: IntArray) -> Array:
     """Sums (m, k) of n rows of values (n, k) over each of the m pushes with numbers (n,)."""
     number = np.unique(push, return_inverse=True)[1]
     return np.column_stack([np.bincount(number, column) for column in values.T])
-
-
-def contact_fit(motion: Motion | None, rig: Rig, table: PushTable | None = None) -> ContactFit | None:
-    """The fit of a recording's contacts, None without one. table: of its windows, tiled end to end."""
-    if motion is None or not motion.contact.any():
-        return None
-    touch = motion.contact
-    nearest = rig.outline.project(to_body(motion.tip, motion.slider)[touch])
-    gap, (index, count, side) = nearest.distance - rig.pusher_radius, sides_of(rig.outline, nearest.contact)
-    gaps = [float(np.median(gap[index == k])) if np.any(index == k) else None for k in range(count)]
-    return ContactFit(
-        samples=int(np.sum(touch)),
-        inside=float(np.mean(gap < -OFF)),
-        off=float(np.mean(gap > OFF)),
-        side=side,
-        gaps=tuple(gaps),
-        contact_time=_contact_time(motion),
-        window_time=None if table is None else float(np.sum(table.duration)),
-    )
 
 
 def _number(time: Array, contact: BoolArray) -> IntArray:
@@ -256,11 +188,3 @@ def _force(recording: Recording, origin: int, time: Array) -> Array:
         float(np.median(np.diff(known)))
     )
     return np.asarray(np.where((missing & ~near)[:, None], np.nan, force))
-
-
-def _contact_time(motion: Motion) -> float:
-    """Time (s) from samples in contact to the next ones, without dropouts."""
-    step = np.diff(motion.time)
-    period = float(np.median(step))
-    step = np.append(np.where(step > longest_interval(period), period, step), period)
-    return float(np.sum(step[motion.contact]))

@@ -14,9 +14,9 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import REACH, contact_samples
 from push_predictor.recordings.windows.cut import WindowCutter
+from push_predictor.recordings.windows.flips import HeadingFlips
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter, touches_nothing
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.repairs.flips import HeadingFlips
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -53,8 +53,9 @@ class ClockSession:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of faults by kind; faults of samples also by stream."""
+        """Number of faults by kind; faults of samples also by stream. samples, touching: of the slider, in contact."""
         found = self._dropouts + self._cutter.counts + Counter(self._segmenter.counts)
+        found.update(samples=self._segmenter.samples, touching=self._segmenter.touching)
         for name, track in self.tracks.items():
             # A slider that continues elsewhere was repositioned: a reset, which the segmenter counts.
             of_stream = track.counts if name != "slider" else track.order.counts
@@ -68,11 +69,6 @@ class ClockSession:
         """The jitter (s) of the stamps that are replaced by regular ones, by sensor."""
         found = {name: track.repairs.regular for name, track in self.tracks.items()}
         return {name: each.noise.jitter for name, each in found.items() if each.noise is not None and each.corrected}
-
-    @property
-    def contact(self) -> tuple[int, int]:
-        """Number of slider samples in contact, and of all that were evaluated."""
-        return self._segmenter.touching, self._segmenter.samples
 
     @property
     def force_touches(self) -> list[tuple[float, float]]:
@@ -100,10 +96,10 @@ class ClockSession:
         ordered = track.order.take(stamp, values, final)
         if self._origin is None and len(ordered.stamp):
             self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(track.repairs.take(ordered, final or ordered.clock_set), self._origin or 0)
-        if ordered.clock_set:
+        track.extend(track.repairs.take(ordered, final or track.order.clock_set), self._origin or 0)
+        if track.order.clock_set:
             self.clocks_set.add(name)
-        return ordered.clock_set
+        return track.order.clock_set
 
     def find(self, final: bool) -> list[PushWindow]:
         """Evaluate the samples that all streams have passed; returns the windows completed by them."""
@@ -116,18 +112,12 @@ class ClockSession:
         last = int(np.searchsorted(slider.time, until, side="right"))
         if last <= first:
             return []
-        samples = contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last)
+        wrench = self.tracks["wrench"] if len(self.tracks["wrench"]) else None
+        samples = contact_samples(self._rig, slider, self.tracks["pusher"], wrench, first, last)
         found = self._cutter.cut(self.tracks, self._segmenter.take(samples), self._origin or 0, self._first)
-        self._count_dropouts(float(slider.time[last - 1]))
         self.evaluated = int(slider.stamp[last - 1])
-        self._forget(float(slider.time[last - 1]))
+        self._count_and_forget(float(slider.time[last - 1]))
         return found
-
-    def _count_dropouts(self, until: float) -> None:
-        for name, track in self.tracks.items():
-            count = track.dropouts(self._counted_until, until)
-            self._dropouts.update({f"{name} dropouts": count, "dropouts": count})
-        self._counted_until = until
 
     def _horizon(self, final: bool) -> float | None:
         """The time (s) up to which all streams are known, None until their periods are known."""
@@ -140,15 +130,16 @@ class ClockSession:
         newest, reached = (which(track.time[-1] for track in present) for which in (max, min))
         return float(max(reached, newest - LONGEST_LAG) - REACH)
 
-    def _wrench(self) -> Track | None:
-        return self.tracks["wrench"] if len(self.tracks["wrench"]) else None
-
-    def _forget(self, evaluated: float) -> None:
+    def _count_and_forget(self, evaluated: float) -> None:
+        """Count the dropouts up to a time (s), and forget the samples that no further window needs."""
         start, needed = self._segmenter.start, evaluated
         if start is not None and self._origin is not None:
-            needed = min(evaluated, (start - self._origin) * 1e-9)
-        for track in self.tracks.values():
+            needed = min(evaluated, (start - self._origin) * NANOSECOND)
+        for name, track in self.tracks.items():
+            count = track.dropouts(self._counted_until, evaluated)
+            self._dropouts.update({f"{name} dropouts": count, "dropouts": count})
             track.forget_before(needed - HISTORY)
+        self._counted_until = evaluated
 
 
 def free_motion(rig: Rig, slider: PoseStream, pusher: PoseStream, stamp: IntArray) -> BoolArray:

@@ -68,7 +68,7 @@ def contact_samples(
     tips = {span: pusher.at(time + span) for span in (0.0, -NEAR, FIT_SPAN, FORWARD_SPAN, NEAR, REACH)}
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     absent = _absent(wrench, time)
-    after_break, in_break = _breaks([slider, pusher], before, time)
+    after_break, in_break = np.logical_or(slider.breaks_in(before, time), pusher.breaks_in(before, time))
     if wrench is not None:
         overlap, beyond = wrench.breaks_in(before, time)
         after_break, in_break = after_break | overlap & ~absent, in_break | beyond & ~absent
@@ -114,15 +114,6 @@ def _gaps(rig: Rig, slider: Track, pusher: Track, first: int, last: int) -> tupl
     opening_speed = (gap - gap[earlier]) / np.maximum(time - time[earlier], SHORTEST_SPAN)
     rows = slice(first - begin, last - begin)
     return gap[rows], closing_speed[rows], opening_speed[rows]
-
-
-def _breaks(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray, BoolArray]:
-    """Whether any stream has a break since the previous sample (n,), and at the sample (n,)."""
-    after_break, in_break = np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.bool_)
-    for track in tracks:
-        overlap, beyond = track.breaks_in(before, time)
-        after_break, in_break = after_break | overlap, in_break | beyond
-    return after_break, in_break
 
 
 def _absent(wrench: Track | None, time: Array) -> BoolArray:

@@ -16,8 +16,8 @@ from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
-from push_predictor.recordings.windows.parts import part_lines, part_means, part_rows
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.resolution import part_lines, part_means, part_rows
 from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
 
@@ -89,21 +89,32 @@ class WindowCutter:
                 self._push, self._edge, self._index = push.push_index, -1, 0
             if motions.touch.at_vertex[k]:
                 self._keep_edge(motions, k)
-            fault = (
-                faults[k]
-                if abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] >= self._least_speed
-                else "not_a_push"
-            )
-            if fault:
+            pushes = abs(motions.angle[k]) < np.pi / 2.0 and motions.speed[k] >= self._least_speed
+            if fault := faults[k] if pushes else "not_a_push":
                 self.counts[fault] += 1
                 continue
             covariates = {"elapsed_time": (start - first) * NANOSECOND, "slid_distance": self._slid}
             covariates |= self._conditions(motions, k, start, push) | _on_slider(
                 forces[k], push.tare, motions.normal[k]
             )
-            found.append(_window(motions, k, start, end, push, self._index, covariates))
+            window = PushWindow(
+                push_id=push.push_id,
+                index=self._index,
+                start=start,
+                end=end,
+                velocity=float(motions.speed[k]),
+                contact=float(motions.contact[k]),
+                angle=float(motions.angle[k]),
+                duration=(end - start) * NANOSECOND,
+                displacement=motions.displacement[k],
+                slider_start=motions.poses[0, k],
+                slider_end=motions.poses[1, k],
+                push_heading=float(motions.heading[k]),
+                covariates=covariates,
+            )
+            found.append(window)
             self._edge, self._index = int(motions.edge[k]), self._index + 1
-            self._slid += float(np.hypot(*found[-1].displacement[:2]))
+            self._slid += float(np.hypot(*window.displacement[:2]))
         return found
 
     def _keep_edge(self, motions: _Motions, k: int) -> None:
@@ -149,14 +160,9 @@ def pusher_motion(pusher: Track, begin: Array, end: Array) -> tuple[Array, Array
     position[few] = pusher.at(begin[few])[:, :2]
     velocity[few] = (pusher.at(end[few])[:, :2] - position[few]) / (end - begin)[few, None]
     if not few.all():
-        position[~few], velocity[~few] = _lines(pusher, begin[~few], first[~few], last[~few])
-    return position, velocity
-
-
-def _lines(pusher: Track, begin: Array, first: IntArray, last: IntArray) -> tuple[Array, Array]:
-    """Positions and velocities (n, 2) at times (n,) of lines through the samples from each first to each last."""
-    count, rows = last - first, part_rows(first, last)
-    position, velocity, _ = part_lines(pusher.time[rows] - np.repeat(begin, count), pusher.values[rows, :2], count)
+        count, rows = (last - first)[~few], part_rows(first[~few], last[~few])
+        time = pusher.time[rows] - np.repeat(begin[~few], count)
+        position[~few], velocity[~few], _ = part_lines(time, pusher.values[rows, :2], count)
     return position, velocity
 
 
@@ -186,26 +192,6 @@ def _faults(rig: Rig, motions: _Motions) -> list[str]:
     entered = before - after > np.maximum(ENTERED, ENTERED_SHARE * driven)
     outran = moved > OUTRAN + OUTRAN_SHARE * driven
     return list(np.where(entered, "left_behind", np.where(outran, "outran", "")))
-
-
-def _window(
-    motions: _Motions, k: int, start: int, end: int, push: PushContext, index: int, covariates: dict[str, float]
-) -> PushWindow:
-    return PushWindow(
-        push_id=push.push_id,
-        index=index,
-        start=start,
-        end=end,
-        velocity=float(motions.speed[k]),
-        contact=float(motions.contact[k]),
-        angle=float(motions.angle[k]),
-        duration=(end - start) * NANOSECOND,
-        displacement=motions.displacement[k],
-        slider_start=motions.poses[0, k],
-        slider_end=motions.poses[1, k],
-        push_heading=float(motions.heading[k]),
-        covariates=covariates,
-    )
 
 
 def _forces(wrench: Track, times: Array) -> Array:

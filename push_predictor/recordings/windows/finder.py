@@ -18,15 +18,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import CLOCK_SET
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, Stream, WrenchStream, repeated, taken
 from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTrack
 from push_predictor.recordings.windows.stream_faults import FAULTS
 from push_predictor.types import Array, IntArray
 
-SENSORS = ("slider", "pusher", "wrench")
+LONGEST_GAP = 5_000_000_000  # ns; in a longer gap between samples a scalar keeps the earlier value
 
 
 def find_windows(recording: Recording, rig: Rig, options: WindowOptions | None = None) -> list[PushWindow]:
@@ -43,13 +43,11 @@ class WindowFinder:
     def __init__(self, rig: Rig, options: WindowOptions | None = None) -> None:
         self.rig, self.options = rig, options or WindowOptions()
         self._counts: Counter[str] = Counter()  # without those of the present session
-        self._earlier_contact = (0, 0)  # of earlier sessions
         self._earlier_touches: list[tuple[float, float]] = []
         self._session = ClockSession(rig, self.options)
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
         self._scalars: dict[str, ScalarTrack] = {}  # by topic
         self._waiting: list[PushWindow] = []  # windows that wait for their scalars
-        self._ready: list[PushWindow] = []
 
     @property
     def counts(self) -> dict[str, int]:
@@ -66,8 +64,8 @@ class WindowFinder:
     @property
     def contact_share(self) -> float | None:
         """Share of the slider's samples so far in which the tip touches it, None before the first."""
-        touching, samples = self._contact()
-        return touching / samples if samples else None
+        found = self._counts + self._session.counts
+        return found["touching"] / found["samples"] if found["samples"] else None
 
     @property
     def force_touches(self) -> list[tuple[float, float]]:
@@ -109,25 +107,24 @@ class WindowFinder:
 
     def take_ready(self) -> list[PushWindow]:
         """The windows that have become complete since the last call."""
+        found = list[PushWindow]()
         while self._session.clocks_set and self._all_clocks_are_set():
-            self._end_session()
+            found += self._end_session()
             self._add_postponed()
-        self._advance(final=False)
-        self._release(final=False)
-        return self._taken()
+        return found + self._found(final=False)
 
     def finish(self) -> list[PushWindow]:
         """The remaining windows, when no more samples will come.
 
         Afterwards the finder starts from the beginning.
         """
-        self._end_session()
+        found = self._end_session()
         while self._postponed:
             self._add_postponed()
-            self._end_session()
+            found += self._end_session()
         self._counts["refused"] += sum(track.discarded for track in self._scalars.values())
         self._scalars = {}
-        return self._taken()
+        return found
 
     def _once(self, name: str, stream: Stream) -> Stream:
         """The samples without those that are there before, as in a loop that was recorded; they are counted."""
@@ -166,17 +163,16 @@ class WindowFinder:
         spans = [np.concatenate([stamp for n, stamp, _ in self._postponed if n == name]) for name in clocks_set]
         return any(int(span[-1]) - int(span[0]) > LONGEST_LAG * 1e9 for span in spans)
 
-    def _end_session(self) -> None:
+    def _end_session(self) -> list[PushWindow]:
         """Finish the windows of the time before the clock was set, or of the whole stream."""
-        for name in SENSORS:
+        for name, track in self._session.tracks.items():
             if name not in self._session.clocks_set:
-                nothing = np.empty(0, dtype=np.int64), self._session.tracks[name].values[:0]
-                self._extend(name, *nothing, final=True)
-        self._advance(final=True)
-        self._release(final=True)
+                self._extend(name, np.empty(0, dtype=np.int64), track.values[:0], final=True)
+        found = self._found(final=True)
         self._counts += self._session.counts
-        self._earlier_contact, self._earlier_touches = self._contact(), self.force_touches
+        self._earlier_touches = self.force_touches
         self._session = ClockSession(self.rig, self.options)
+        return found
 
     def _add_postponed(self) -> None:
         """Add the samples that waited for the new time."""
@@ -184,25 +180,18 @@ class WindowFinder:
         for name, stamp, values in postponed:
             self._add(name, stamp, values)
 
-    def _contact(self) -> tuple[int, int]:
-        earlier, present = self._earlier_contact, self._session.contact
-        return earlier[0] + present[0], earlier[1] + present[1]
-
     # --- windows ------------------------------------------------------------------------------------------------
 
-    def _advance(self, final: bool) -> None:
-        """Find windows as far as all streams are known."""
+    def _found(self, final: bool) -> list[PushWindow]:
+        """Windows as far as all streams are known, those whose scalars are known, in order; with `final` all."""
         self._waiting += self._session.find(final)
         needed = self._session.needed
         for track in self._scalars.values():
             track.forget_before(min(needed, self._waiting[0].start) if self._waiting else needed)
-
-    def _release(self, final: bool) -> None:
-        """Complete the windows whose scalars are known, in order; with `final` all windows."""
         waiting = self._waiting
         count = len(waiting) if final else next((k for k, w in enumerate(waiting) if self._waits(w)), len(waiting))
-        self._ready += [self._with_scalars(window) for window in waiting[:count]]
         self._waiting = waiting[count:]
+        return [self._with_scalars(window) for window in waiting[:count]]
 
     def _waits(self, window: PushWindow) -> bool:
         late = self._session.newest - window.start > LONGEST_GAP
@@ -213,6 +202,52 @@ class WindowFinder:
         known = {name: value for name, value in values.items() if value is not None}
         return replace(window, covariates={**window.covariates, **known})
 
-    def _taken(self) -> list[PushWindow]:
-        ready, self._ready = self._ready, []
-        return ready
+
+# --- scalar topics: their values at the start of a window -------------------------------------------------------------
+
+
+class ScalarTrack:
+    """The samples of one topic, with increasing stamps.
+
+    discarded: number of samples whose stamp did not increase.
+    """
+
+    def __init__(self) -> None:
+        self._stamp: IntArray = np.empty(0, dtype=np.int64)
+        self._value: Array = np.empty(0)
+        self.discarded = 0
+
+    def add(self, stream: ScalarStream) -> None:
+        """Append samples; where the clock was set back, all earlier samples are removed."""
+        if not len(stream):
+            return
+        stamp, value = np.append(self._stamp, stream.stamp), np.append(self._value, stream.value)
+        back = np.flatnonzero(np.diff(stamp) < -CLOCK_SET)
+        if back.size:
+            stamp, value = stamp[back[-1] + 1 :], value[back[-1] + 1 :]
+        newer = np.diff(np.maximum.accumulate(stamp), prepend=np.iinfo(np.int64).min // 2) > 0
+        self.discarded += int(np.sum(~newer))
+        self._stamp, self._value = stamp[newer], value[newer]
+
+    def known_at(self, stamp: int) -> bool:
+        """Whether there is a sample at or after a time (ns), so that the value at this time is final."""
+        return bool(len(self._stamp)) and int(self._stamp[-1]) >= stamp
+
+    def at(self, stamp: int) -> float | None:
+        """The value at a time (ns), None without samples.
+
+        It is linear between samples, and constant in gaps longer than LONGEST_GAP and beyond the ends.
+        """
+        if not len(self._stamp):
+            return None
+        after = int(np.searchsorted(self._stamp, stamp, side="right"))
+        if after == 0 or after == len(self._stamp):
+            return float(self._value[max(after - 1, 0)])
+        begin, end = int(self._stamp[after - 1]), int(self._stamp[after])
+        first, second = float(self._value[after - 1]), float(self._value[after])
+        return first + (second - first) * ((stamp - begin) / (end - begin)) if end - begin <= LONGEST_GAP else first
+
+    def forget_before(self, stamp: int) -> None:
+        """Remove the samples before a time (ns), except the last of them."""
+        keep = max(0, int(np.searchsorted(self._stamp, stamp, side="right")) - 1)
+        self._stamp, self._value = self._stamp[keep:], self._value[keep:]

@@ -11,8 +11,7 @@ from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import taken
 from push_predictor.recordings.windows.contact import LONGEST_BREAK, ContactSamples
 from push_predictor.recordings.windows.cut import PushContext
-from push_predictor.recordings.windows.force_timing import ForceTiming
-from push_predictor.recordings.windows.force_zero import ForceZero
+from push_predictor.recordings.windows.force import ForceTiming, ForceZero
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
 from push_predictor.types import BoolArray
 
@@ -32,8 +31,8 @@ def touches_nothing(samples: ContactSamples, options: WindowOptions) -> BoolArra
 class PushSegmenter:
     """Takes contact samples in order and returns the windows that are complete: start and end in ns, and the push.
 
-    counts: resets and samples inside the outline. push: the current push, None between pushes. samples, touching: how
-    many samples there were, and how many of them in contact.
+    counts: resets and samples inside the outline. push: the current push, None between pushes. start: that (ns) of the
+    incomplete window, None without one. samples, touching: how many samples there were, and how many in contact.
     """
 
     def __init__(self, options: WindowOptions) -> None:
@@ -45,7 +44,7 @@ class PushSegmenter:
         self.samples = self.touching = 0
         self.timing = ForceTiming()
         self._zero = ForceZero()
-        self._start: int | None = None  # of the incomplete window
+        self.start: int | None = None
         self._last_good = -np.inf
         self._last_time: float | None = None
         self._idle = 0.0
@@ -55,15 +54,8 @@ class PushSegmenter:
         self._first_touch: int | None = None
         self._last_contact: int | None = None
 
-    @property
-    def start(self) -> int | None:
-        """Start (ns) of the incomplete window, None without one."""
-        return self._start
-
     def take(self, samples: ContactSamples) -> list[tuple[int, int, PushContext]]:
-        """Add a portion of samples and return the windows that end at or before the last of them."""
-        if not len(samples):
-            return []
+        """Add a portion of samples, at least one, and return the windows that end at or before the last of them."""
         options, known = self.options, samples.force_known
         lowered = samples.height <= options.lift
         inside = (samples.gap < -INSIDE) & lowered
@@ -98,13 +90,18 @@ class PushSegmenter:
         self, samples: ContactSamples, judged: BoolArray, shown: BoolArray, usable: BoolArray
     ) -> BoolArray:
         """Whether the force does not show contacts (n,), by the touches so far."""
+
+        def clear_force(sample: int) -> float:
+            """The force (N) that shows a contact without delay."""
+            return max(CLEAR * self.options.least_force, NOISE_FACTOR * self._zero.at(int(rows[sample])).noise)
+
         rows, apart = np.flatnonzero(judged), np.zeros(len(samples), dtype=np.bool_)
         apart[rows] = self.timing.take(
             samples if len(rows) == len(samples) else taken(samples, rows),
             (shown & self._moves(samples))[rows],
             usable[rows],
             zero=lambda sample: self._zero.readings(int(rows[sample])),
-            least_force=lambda sample: self._clear_force(self._zero.at(int(rows[sample])).noise),
+            least_force=clear_force,
         )
         return apart
 
@@ -117,10 +114,6 @@ class PushSegmenter:
         size, noise = self._zero.above(samples.force, rows)
         found[rows] = size > np.maximum(self.options.least_force, NOISE_FACTOR * noise)
         return found
-
-    def _clear_force(self, noise: float) -> float:
-        """The force (N) that shows a contact without delay."""
-        return max(CLEAR * self.options.least_force, NOISE_FACTOR * noise)
 
     def _at_rest(self, samples: ContactSamples, sample: int, near: bool, moves: bool) -> bool:
         """Whether a contact goes on at a sample before any free motion, where the force at rest is the zero."""
@@ -157,9 +150,9 @@ class PushSegmenter:
         ):
             self._idle += step
             if stop:
-                self._start = None
+                self.start = None
                 if ends[k]:
-                    self._end_push()
+                    self.push = self._first_touch = None
             if ask:
                 touches = self._at_rest(samples, k, bool(near[k]), moving) or touches
             self._touching = touches
@@ -170,13 +163,13 @@ class PushSegmenter:
                 if self.push is None or self._idle > self.options.push_pause:
                     self._begin_push(stamp, self._zero.at(k).mean)
                 self._idle, self._last_good, self._last_contact = 0.0, at, stamp
-                if self._start is None and at_speed:
-                    self._start = stamp
-                if self._start is not None and self._start + self._length <= stamp:
+                if self.start is None and at_speed:
+                    self.start = stamp
+                if self.start is not None and self.start + self._length <= stamp:
                     done += self._complete(stamp)
             else:
                 if at - self._last_good > self.options.bounce:
-                    self._start = None
+                    self.start = None
                 if not touches and self._idle > self.options.push_pause:
                     self._first_touch = None
         return done
@@ -184,9 +177,9 @@ class PushSegmenter:
     def _complete(self, stamp: int) -> list[tuple[int, int, PushContext]]:
         """The windows of the push that end at or before a stamp (ns)."""
         done = []
-        while self.push is not None and self._start is not None and self._start + self._length <= stamp:
-            done.append((self._start, self._start + self._length, self.push))
-            self._start += self._stride
+        while self.push is not None and self.start is not None and self.start + self._length <= stamp:
+            done.append((self.start, self.start + self._length, self.push))
+            self.start += self._stride
         return done
 
     def _begin_push(self, stamp: int, tare: tuple[float, float] | None) -> None:
@@ -196,10 +189,7 @@ class PushSegmenter:
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
         self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), tare)
         self._pushes += 1
-        self._start = None
-
-    def _end_push(self) -> None:
-        self.push, self._start, self._first_touch = None, None, None
+        self.start = None
 
 
 def _push_id(stamp: int) -> str:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import DROPOUT_PERIODS, NANOSECOND, SHORTEST_DROPOUT
-from push_predictor.recordings.windows.repairs.resolution import lengths
-from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, joined, taken
+from push_predictor.recordings.streams import joined, taken
+from push_predictor.recordings.windows.resolution import lengths
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
 SLOW = 0.015  # s between samples of a slow stream
@@ -26,7 +27,7 @@ FULL = 0.98  # of the same speed: a motion over nearly all of an interval needs 
 LEAST = 2e-4  # m in one interval: less is noise
 
 
-class SlowPoses:
+class SlowPoses(Portions):
     """Takes the samples of one stream in order and returns them with poses between those of a slow stream.
 
     Those of a body with a heading, whose contact is asked for at each pose, are put between all samples; of the tip,
@@ -35,28 +36,22 @@ class SlowPoses:
 
     def __init__(self, is_jump: IsJump, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        super().__init__()  # keeps those that show the usual interval
         self._is_jump = is_jump
         self._angle = angle
-        self._samples: OrderedSamples | None = None  # one that waits, after those that show the usual interval
-        self._returned = 0
-
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return 0 if self._samples is None else len(self._samples.stamp) - self._returned
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        samples = new if self._samples is None else joined(self._samples, new)
+        samples = self._with(new)
         slow = self._slow(samples)
         end = len(samples.stamp) - (0 if final or not len(slow) or not slow[-1] else 1)
         found = taken(samples, slice(self._returned, end))
         if slow[self._returned : end].any():
             first = max(self._returned, 1)
             before = taken(samples, slice(self._returned, first))
-            found = joined(before, self._with_poses(samples, np.arange(first, end), slow))
+            found = joined([before, self._with_poses(samples, np.arange(first, end), slow)])
         keep = max(len(samples.stamp) - USUAL - 3, 0)
-        self._samples, self._returned = taken(samples, slice(keep, None)), end - keep
+        self._keep(samples, slice(keep, None), end - keep)
         return found
 
     def _slow(self, samples: OrderedSamples) -> BoolArray:
@@ -89,7 +84,7 @@ class SlowPoses:
         interrupted[measured] = samples.interrupted[rows]
         known = (time - time[0]).astype(np.float64)
         poses = np.column_stack([np.interp((stamps - time[0]).astype(np.float64), known, of) for of in pose.T])
-        return OrderedSamples(stamps, poses, interrupted, samples.clock_set)
+        return OrderedSamples(stamps, poses, interrupted)
 
 
 def _knots(

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from push_predictor.recordings.dropouts import CLOCK_SET
+from push_predictor.recordings.streams import joined, taken
 from push_predictor.types import Array, BoolArray, IntArray
 
 LOOKAHEAD = 8  # samples examined before the first of them is accepted
@@ -34,46 +35,58 @@ IsJump = Callable[[Array, Array, Array], BoolArray]
 
 @dataclass(frozen=True, eq=False)
 class OrderedSamples:
-    """Samples with increasing stamps: stamp (n,) ns, values (n, k).
-
-    interrupted (n,): data before it are missing. clock_set: the samples still waiting have the time of a clock that was
-    set.
-    """
+    """Samples with increasing stamps: stamp (n,) ns, values (n, k). interrupted (n,): data before it are missing."""
 
     stamp: IntArray
     values: Array
     interrupted: BoolArray
-    clock_set: bool
+
+    def __len__(self) -> int:
+        return len(self.stamp)
 
 
-def taken(samples: OrderedSamples, rows: slice | IntArray) -> OrderedSamples:
-    """Some of the samples, by index."""
-    return OrderedSamples(samples.stamp[rows], samples.values[rows], samples.interrupted[rows], samples.clock_set)
+def uninterrupted(stamp: IntArray, values: Array) -> OrderedSamples:
+    """Samples with increasing stamps (n,) ns and values (n, k) of which none are missing."""
+    return OrderedSamples(stamp, values, np.zeros(len(stamp), dtype=np.bool_))
 
 
-def joined(*parts: OrderedSamples) -> OrderedSamples:
-    """One portion of consecutive ones, at least one."""
-    stamp, values, interrupted = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("stamp", "values", "interrupted")
-    )
-    return OrderedSamples(stamp, values, interrupted, parts[-1].clock_set)
+class Portions:
+    """The samples of one stream that arrive in portions: those that wait, after those that are needed to judge them."""
 
+    def __init__(self) -> None:
+        self._samples: OrderedSamples | None = None
+        self._returned = 0  # of these samples
 
-def with_values(samples: OrderedSamples, values: Array) -> OrderedSamples:
-    """The samples with other values (n, k)."""
-    return OrderedSamples(samples.stamp, values, samples.interrupted, samples.clock_set)
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return 0 if self._samples is None else len(self._samples) - self._returned
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        raise NotImplementedError
+
+    def _with(self, new: OrderedSamples) -> OrderedSamples:
+        """The kept samples and further ones."""
+        return new if self._samples is None else joined([self._samples, new])
+
+    def _keep(self, samples: OrderedSamples, rows: slice | IntArray, returned: int) -> None:
+        """Keep some of the samples, of which the first are returned."""
+        self._samples, self._returned = taken(samples, rows), returned
 
 
 class StampOrder:
     """Takes samples as they arrive and returns those that are in order.
 
     is_jump: which values cannot follow others within a time; None accepts all. counts: discarded samples by kind
-    (repeated, late, ahead, jumps). waiting: stamps and values of the samples that are not decided yet.
+    (repeated, late, ahead, jumps). waiting: stamps and values of the samples that are not decided yet. clock_set:
+    whether these have the time of a clock that was set.
     """
 
     def __init__(self, width: int, is_jump: IsJump | None = None) -> None:
         self.counts: Counter[str] = Counter()
         self.waiting: tuple[IntArray, Array] = (np.empty(0, dtype=np.int64), np.empty((0, width)))
+        self.clock_set = False
         self.is_jump = is_jump
         self._last = NO_STAMP
         self._last_values: Array | None = None
@@ -85,21 +98,22 @@ class StampOrder:
         stamp, values = np.concatenate([self.waiting[0], stamp]), np.concatenate([self.waiting[1], values])
         keep, interrupted = np.zeros(len(stamp), dtype=np.bool_), np.zeros(len(stamp), dtype=np.bool_)
         irregular = self._irregular(stamp, values)
-        place, clock_set = 0, False
+        place, self.clock_set = 0, False
         while place < len(stamp) and (final or len(stamp) - place >= LOOKAHEAD):
             accepted = self._regular_run(stamp, values, irregular, place, final)
             if not accepted:
-                chosen, discarded, clock_set = self._decide(stamp[place : place + LOOKAHEAD].tolist(), values[place:])
+                chosen, discarded = self._decide(stamp[place : place + LOOKAHEAD].tolist(), values[place:])
                 place, accepted = place + discarded, int(chosen)
-                if clock_set:
+                if self.clock_set:
                     break
             if accepted:
                 keep[place : place + accepted] = True
                 interrupted[place] = self._late_since_last >= LATE_RUN
-                self._accept(stamp[place : place + accepted], values[place + accepted - 1])
+                self._recent.extend(stamp[place : place + accepted][-REMEMBERED:].tolist())
                 place += accepted
+                self._last, self._last_values, self._late_since_last = int(stamp[place - 1]), values[place - 1], 0
         self.waiting = stamp[place:], values[place:]
-        return OrderedSamples(stamp[keep], values[keep], interrupted[keep], clock_set)
+        return OrderedSamples(stamp[keep], values[keep], interrupted[keep])
 
     def _irregular(self, stamp: IntArray, values: Array) -> list[int]:
         """Indices of samples whose successor does not follow regularly."""
@@ -111,14 +125,12 @@ class StampOrder:
 
     def _regular_run(self, stamp: IntArray, values: Array, irregular: Sequence[int], place: int, final: bool) -> int:
         """Number of samples from `place` on that follow regularly and are followed by LOOKAHEAD - 1 regular ones."""
-        if not self._follows(int(stamp[place]), values[place]):
+        first = int(stamp[place])
+        if not 0 < first - self._last <= ISOLATION or self._jumps_to(values[place], first):
             return 0
         end = irregular[bisect_left(irregular, place)]  # the last sample of the run
         complete = final and end == len(stamp) - 1
         return max(0, end - place + 1 - (0 if complete else LOOKAHEAD - 1))
-
-    def _follows(self, stamp: int, values: Array) -> bool:
-        return 0 < stamp - self._last <= ISOLATION and not self._jumps_to(values, stamp)
 
     def _jumps_to(self, values: Array, stamp: int) -> bool:
         return self._last_values is not None and self._jumps(self._last_values, values, stamp - self._last)
@@ -128,12 +140,8 @@ class StampOrder:
             return False
         return bool(self.is_jump(before[None], after[None], np.array([elapsed * 1e-9]))[0])
 
-    def _decide(self, block: list[int], values: Array) -> tuple[bool, int, bool]:
-        """Decide on the first of some samples.
-
-        Returns the number of samples to discard, whether the one after them is accepted, and whether a clock was set,
-        as (accepted, discarded, clock set).
-        """
+    def _decide(self, block: list[int], values: Array) -> tuple[bool, int]:
+        """How many of the first samples are discarded, after whether the one after them is accepted."""
         sequence = _longest_increasing(block, self._last)
         if not sequence:
             return self._decide_late(block)
@@ -141,15 +149,16 @@ class StampOrder:
             self._discard("ahead" if stamp > self._last else self._kind_of_old(stamp))
         stamp, after = block[sequence[0]], block[sequence[1]] if len(sequence) > 1 else None
         if self._last != NO_STAMP and stamp - self._last > CLOCK_LEAP and after is not None:
-            return False, sequence[0], True
+            self.clock_set = True
+            return False, sequence[0]
         if self._is_isolated(stamp, after):
             self._discard("late" if self._last == NO_STAMP and after is not None else "ahead")
-            return False, sequence[0] + 1, False
+            return False, sequence[0] + 1
         if back := self._return_from_jump(block, values, sequence):
             for _ in range(back - sequence[0]):
                 self._discard("jumps")
-            return False, back, False
-        return True, sequence[0], False
+            return False, back
+        return True, sequence[0]
 
     def _return_from_jump(self, block: list[int], values: Array, sequence: list[int]) -> int:
         """Index of the first sample that jumps back to where the stream was, if the first of `sequence` jumps; else 0.
@@ -169,13 +178,14 @@ class StampOrder:
                     return k
         return 0
 
-    def _decide_late(self, block: list[int]) -> tuple[bool, int, bool]:
+    def _decide_late(self, block: list[int]) -> tuple[bool, int]:
         sequence = _longest_increasing(block, NO_STAMP)
         increasing = len(block) == LOOKAHEAD and 2 * len(sequence) >= LOOKAHEAD
         if increasing and block[sequence[0]] < self._last - CLOCK_SET:
-            return False, 0, True
+            self.clock_set = True
+            return False, 0
         self._discard(self._kind_of_old(block[0]))
-        return False, 1, False
+        return False, 1
 
     def _kind_of_old(self, stamp: int) -> str:
         return "repeated" if stamp in self._recent else "late"
@@ -189,10 +199,6 @@ class StampOrder:
     def _discard(self, kind: str) -> None:
         self.counts[kind] += 1
         self._late_since_last += kind == "late"
-
-    def _accept(self, stamps: IntArray, last_values: Array) -> None:
-        self._last, self._last_values, self._late_since_last = int(stamps[-1]), last_values, 0
-        self._recent.extend(stamps[-REMEMBERED:].tolist())
 
 
 def _longest_increasing(block: Sequence[int], last: int) -> list[int]:

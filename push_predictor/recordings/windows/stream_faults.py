@@ -26,16 +26,7 @@ FAULTS = {
     "outran": f"windows rejected because the slider moved farther than the tip. {_CHECK}",
 }
 # A sound system has none of these. Resets, repeated stamps and short dropouts are normal.
-WARNED = (
-    "late",
-    "ahead",
-    "not_finite",
-    "jumps",
-    "clock_set_back",
-    "inside",
-    "left_behind",
-    "outran",
-)
+WARNED = ("late", "ahead", "not_finite", "jumps", "clock_set_back", "inside", "left_behind", "outran")
 CLOCK_TOLERANCE = 0.25  # s; larger clock offsets between two streams are reported
 
 
@@ -49,8 +40,8 @@ def describe_recording_faults(recording: Recording, counts: Mapping[str, int]) -
     found = describe_faults(counts)
     if recording.wrench is None:
         found.append("no wrench was recorded: contact is found from geometry alone")
-    for name, stream in (("pusher", recording.pusher), ("wrench", recording.wrench)):
-        if stream is not None and abs(offset := clock_offset(stream, recording.slider)) > CLOCK_TOLERANCE:
+    for name, stream in recording.sensors.items():
+        if abs(offset := clock_offset(stream, recording.slider)) > CLOCK_TOLERANCE:
             found.append(describe_clock_offset(name, offset))
     return found
 

@@ -1,18 +1,22 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One stream while samples arrive: stamp order, dropouts, jumps, interpolation."""
+"""One stream while samples arrive: stamp order, repairs, dropouts, jumps, interpolation."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.chain import StreamRepairs
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
+from push_predictor.recordings.windows.regular_stamps import RegularStamps
+from push_predictor.recordings.windows.resolution import Resolution, SmoothedPoses, lengths
+from push_predictor.recordings.windows.slow import SlowPoses
+from push_predictor.recordings.windows.stamp_order import IsJump, OrderedSamples, Portions, StampOrder
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
 from push_predictor.types import Array, BoolArray, IntArray
 
 PERIOD_SAMPLES = 50  # intervals that determine the period: the first ones, so that later samples do not change it
@@ -76,14 +80,12 @@ class Track:
 
     def at(self, time: Array) -> Array:
         """Values (m, width) at times (m,), linear between samples and constant beyond them."""
-        around = self._around(float(time.min()), float(time.max())) if len(time) else slice(None)
+        around = slice(None)
+        if len(time):  # few of a day's samples: from the last at or before the times to the first at or after them
+            begin = int(np.searchsorted(self.time, time.min(), side="right")) - 1
+            around = slice(max(begin, 0), int(np.searchsorted(self.time, time.max())) + 1)
         known = self.time[around]
         return np.column_stack([np.interp(time, known, column) for column in self.values[around].T])
-
-    def _around(self, first: float, last: float) -> slice:
-        """The samples from the last at or before `first` to the first at or after `last`: few of a day's."""
-        begin = int(np.searchsorted(self.time, first, side="right")) - 1
-        return slice(max(begin, 0), int(np.searchsorted(self.time, last)) + 1)
 
     def period_known(self, final: bool) -> bool:
         """Whether the period is known, so that dropouts can be detected.
@@ -102,7 +104,7 @@ class Track:
     @property
     def resolution(self) -> float:
         """The step (m) in which positions were written, 0 if it is fine."""
-        return 0.0 if self.repairs.smoothed is None else self.repairs.smoothed.resolution
+        return self.repairs.smoothed.resolution
 
     def breaks_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
         """For intervals (start, end] (m,): does a break overlap each, and does one extend beyond its end?
@@ -136,3 +138,54 @@ class Track:
         if self._angle is not None:
             jump = jump | (np.abs(wrap_angle(step[:, self._angle])) > JUMP_ANGLE + JUMP_TURN_RATE * elapsed)
         return np.asarray(jump)
+
+
+# --- repairs of a stream in order: poses not measured, jitter of stamps, a coarse resolution, a low rate --------------
+
+
+class StreamRepairs:
+    """Takes the samples of one stream in order and returns them repaired, as soon as they are decided.
+
+    regular, smoothed: the steps that replace stamps, and poses of a coarse resolution. The result does not depend on
+    the portions.
+    """
+
+    def __init__(self, is_jump: IsJump | None, angle: int | None) -> None:
+        """is_jump: of poses whose first two columns are a position, m; None for other streams.
+
+        angle: index of the column with a heading, rad, which is unwrapped; None without one.
+        """
+        self.regular = RegularStamps()
+        self.smoothed = SmoothedPoses(angle)
+        self._steps: list[Portions] = [self.regular]
+        if is_jump is not None:
+            before, after = [ContinuedPoses(angle), HeldPoses(angle)], [self.smoothed, SlowPoses(is_jump, angle)]
+            self._steps = [*before, self.regular, *after]
+        self._resolution = Resolution(2 if angle is None else 3)
+        self._angle = angle
+        self._heading: Array = np.empty(0)  # the last one, rad
+
+    @property
+    def waiting(self) -> int:
+        """How many samples wait."""
+        return sum(step.waiting for step in self._steps)
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        if len(self._steps) == 1:
+            return self.regular.take(new, final)
+        values = self._unwrapped(new.values)
+        # The repair of one must not hide the resolution from the next: they get it as a further column.
+        quantum = np.max(self._resolution.take(lengths(values, self._angle)), axis=1, initial=0.0)
+        new = replace(new, values=np.column_stack([values, quantum]))
+        for step in self._steps:
+            new = step.take(new, final)
+        return replace(new, values=new.values[:, :-1])
+
+    def _unwrapped(self, values: Array) -> Array:
+        if self._angle is None or not len(values):
+            return values
+        values = values.copy()
+        heading = np.unwrap(np.concatenate([self._heading, values[:, self._angle]]))
+        values[:, self._angle], self._heading = heading[len(self._heading) :], heading[-1:]
+        return values

@@ -1,29 +1,27 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
+
 """Regular stamps in place of noisy ones while samples arrive.
 
 A window interpolates single samples, so its outcome gets the error of their stamps. Where the first samples of a stream
 show jitter, each stamp is replaced by that of a line through the samples around it, over their numbers in a regular
 grid. Streams with less jitter, or without a grid, keep their stamps.
+
+Stamps of receipt may be in bursts, of a capture at a regular rate: some samples are held up and arrive together. Most
+arrive soon: their stamps lie on a line over their numbers, the others above it. A low percentile of the deviations
+around a sample finds the line, however long the others were held up.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.windows.repairs.bursts import (
-    LEAST_TOGETHER,
-    TOGETHER,
-    WIDTH,
-    burst_period,
-    low_of,
-    missing_in_bursts,
-)
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, joined, taken
+from push_predictor.recordings.streams import joined, taken
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
 SHARE = 0.05  # of the period: less jitter stays, as a window hardly feels it
@@ -40,6 +38,12 @@ AROUND = 50  # samples before and after one that determine its stamp
 ROWS = 4096  # stamps that are fitted at once: each needs its neighbours' in memory, 1 kB a time
 BURST_PERIODS = 12.0  # in which samples may be held up: a longer interval is a gap
 KEPT = max(AROUND, 5 * MOST_WIDTH)  # samples that are kept before those that were not returned yet
+TOGETHER = 0.25  # of the period: intervals below it are of samples that arrive together
+LEAST_TOGETHER = 0.1  # of the intervals
+SOON = 0.2  # of the period: stamps of samples that were not held up are so near to the line
+LEAST_SOON = 0.5  # of the samples
+LOW = 30.0  # percentile of the deviations on the line: below the share of samples that were not held up
+WIDTH = 21  # samples on either side that show a missing one
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class StampNoise:
     bursts: bool = False
 
 
-class RegularStamps:
+class RegularStamps(Portions):
     """Takes the samples of one stream in order and returns them, with regular stamps where they have jitter.
 
     noise: of the last DECIDING samples before the correction began, or of the last block of them; None until it is
@@ -64,8 +68,8 @@ class RegularStamps:
     """
 
     def __init__(self) -> None:
+        super().__init__()  # keeps those that wait for the first decision
         self.noise: StampNoise | None = None
-        self._held: OrderedSamples | None = None  # samples that wait for the first decision
         self._block = np.empty(0, np.int64)  # stamps since the last decision
         self._segment: _Segment | None = None
         self._last: int | None = None  # stamp (ns) before the next, as it came
@@ -73,8 +77,7 @@ class RegularStamps:
     @property
     def waiting(self) -> int:
         """How many samples wait."""
-        held = 0 if self._held is None else len(self._held.stamp)
-        return held + (0 if self._segment is None else self._segment.waiting)
+        return super().waiting + (0 if self._segment is None else self._segment.waiting)
 
     @property
     def corrected(self) -> bool:
@@ -83,18 +86,17 @@ class RegularStamps:
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose stamps are known; with `final` all are."""
-        if self._held is not None:
-            new, self._held = joined(self._held, new), None
-        if self.noise is None and len(new.stamp) < DECIDING:
+        new, self._samples = self._with(new), None
+        if self.noise is None and len(new) < DECIDING:
             if not final:
-                self._held = new
+                self._keep(new, slice(None), 0)
                 return taken(new, slice(0, 0))
             self.noise = stamp_noise(new.stamp)
         count = 0 if self.corrected else self._undisturbed(new.stamp)
         if self.noise is None or not self.corrected:
             return new
         regular = self._regular(taken(new, slice(count, None)), self.noise, final)
-        return joined(taken(new, slice(0, count)), regular)
+        return joined([taken(new, slice(0, count)), regular])
 
     def _undisturbed(self, stamp: IntArray) -> int:
         """How many of these samples come before jitter shows: that of the first block corrects this block as well."""
@@ -117,47 +119,40 @@ class RegularStamps:
         gap = np.diff(np.concatenate([before, new.stamp])) * NANOSECOND
         longest = BURST_PERIODS * noise.period if noise.bursts else longest_interval(noise.period)
         begins = np.flatnonzero((gap > longest) | new.interrupted)
-        found = []
-        for number, rows in enumerate(np.split(np.arange(len(new.stamp)), begins)):
-            if number or self._segment is None:
-                if self._segment is not None:
-                    found.append(self._segment.take(taken(new, rows[:0]), closed=True))
-                self._segment = _Segment(noise, taken(new, slice(0, 0)))
-            found.append(self._segment.take(taken(new, rows)))
-        if final and self._segment is not None:
-            found.append(self._segment.take(taken(new, np.empty(0, np.int64)), closed=True))
-            self._segment = None
-        self._last = int(new.stamp[-1]) if len(new.stamp) else self._last
-        return joined(*found) if found else new
+        found, segment = list[OrderedSamples](), self._segment or _Segment(noise)
+        for number, rows in enumerate(np.split(np.arange(len(new)), begins)):
+            if number:
+                found.append(segment.take(taken(new, rows[:0]), final=True))
+                segment = _Segment(noise)
+            found.append(segment.take(taken(new, rows)))
+        if final:
+            found.append(segment.take(taken(new, slice(0, 0)), final=True))
+        self._segment = None if final else segment
+        self._last = int(new.stamp[-1]) if len(new) else self._last
+        return joined(found)
 
 
-class _Segment:
+class _Segment(Portions):
     """An uninterrupted run of samples; number: of each in the grid, as far as it is known."""
 
-    def __init__(self, noise: StampNoise, nothing: OrderedSamples) -> None:
+    def __init__(self, noise: StampNoise) -> None:
+        super().__init__()
         self._noise, self._width = noise, WIDTH if noise.bursts else width(noise)
-        self._samples = nothing
         self._number = np.empty(0, np.int64)
-        self._returned = 0  # of the samples that are kept
         self._newest: int | None = None  # regular stamp (ns) that was returned last
 
-    @property
-    def waiting(self) -> int:
-        """How many samples wait."""
-        return len(self._samples.stamp) - self._returned
-
-    def take(self, new: OrderedSamples, closed: bool = False) -> OrderedSamples:
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those whose regular stamps are known."""
-        self._samples = joined(self._samples, new)
-        self._count(closed)
-        begin, end = self._returned, max(len(self._number) - (0 if closed else AROUND), self._returned)
-        found = taken(self._samples, slice(begin, end))
-        stamp = self._samples.stamp[: len(self._number)]
+        samples = self._with(new)
+        self._count(samples.stamp, final)
+        begin, end = self._returned, max(len(self._number) - (0 if final else AROUND), self._returned)
+        stamp = samples.stamp[: len(self._number)]
         parts = [self._line_at(stamp, at, min(at + ROWS, end)) for at in range(begin, end, ROWS)]
         regular = self._increasing(np.concatenate([np.empty(0, np.int64), *parts]))
-        self._returned = end
-        self._forget()
-        return OrderedSamples(regular, found.values, found.interrupted, found.clock_set)
+        count = max(end - KEPT, 0)
+        self._keep(samples, slice(count, None), end - count)
+        self._number = self._number[count:]
+        return replace(taken(samples, slice(begin, end)), stamp=regular)
 
     def _line_at(self, stamp: IntArray, begin: int, end: int) -> IntArray:
         """Stamps (end - begin,) in ns at these samples, of lines through the AROUND samples on either side of each."""
@@ -169,18 +164,14 @@ class _Segment:
         line = low_of(late - period * number, inside) if bursts else _lines_at(number, late, inside)
         return np.asarray(stamp[middle] + np.rint(line).astype(np.int64))
 
-    def _count(self, closed: bool) -> None:
-        """Number the samples, those of the last three widths only if the run is closed: more may be missing there."""
-        known = len(self._number)
-        end = max(len(self._samples.stamp) - (0 if closed else 3 * self._width), known)
-        if end == known:
-            return
-        stamp = self._samples.stamp
-        bursts = self._noise.bursts
-        missing = missing_in_bursts(stamp, self._noise.period) if bursts else missing_before(stamp, self._noise)
-        missing = missing[known:end]
-        last = int(self._number[-1]) if known else -1
-        self._number = np.concatenate([self._number, last + np.cumsum(missing + 1)])
+    def _count(self, stamp: IntArray, final: bool) -> None:
+        """Number the samples, those of the last three widths only if the run has ended: more may be missing there."""
+        known, noise = len(self._number), self._noise
+        end = len(stamp) - (0 if final else 3 * self._width)
+        if end > known:
+            missing = missing_in_bursts(stamp, noise.period) if noise.bursts else missing_before(stamp, noise)
+            last = int(self._number[-1]) if known else -1
+            self._number = np.concatenate([self._number, last + np.cumsum(missing[known:end] + 1)])
 
     def _increasing(self, stamp: IntArray) -> IntArray:
         """The stamps, each at least a nanosecond after the one before."""
@@ -189,12 +180,6 @@ class _Segment:
         found = (np.maximum.accumulate(np.concatenate([before, stamp]) - step) + step)[1:]
         self._newest = int(found[-1]) if len(found) else self._newest
         return found
-
-    def _forget(self) -> None:
-        """Drop the samples before those that the next ones need."""
-        count = max(self._returned - KEPT, 0)
-        self._samples, self._number = taken(self._samples, slice(count, None)), self._number[count:]
-        self._returned -= count
 
 
 def _lines_at(number: IntArray, late: IntArray, inside: BoolArray) -> Array:
@@ -262,3 +247,44 @@ def missing_before(stamp: IntArray, noise: StampNoise) -> IntArray:
     peak = (excess == largest) & (count > 0)
     found[2 * w : 2 * w + len(excess)] = np.where(peak, count, 0)
     return found
+
+
+# --- bursts -----------------------------------------------------------------------------------------------------------
+
+
+def burst_period(stamp: IntArray) -> float | None:
+    """The period (s) of a capture whose stamps (n,) ns are in bursts, None if they are not, or follow no line."""
+    n = len(stamp)
+    if n < 2 * WIDTH:
+        return None
+    half = n // 2
+    period = float(np.median(stamp[half:] - stamp[: n - half])) / half
+    if period <= 0.0 or np.mean(np.diff(stamp) < TOGETHER * period) < LEAST_TOGETHER:
+        return None
+    deviation = (stamp - stamp[0]) - period * np.arange(n)
+    soon = np.abs(deviation - np.percentile(deviation, LOW)) < SOON * period
+    return period * NANOSECOND if np.mean(soon) >= LEAST_SOON else None
+
+
+def missing_in_bursts(stamp: IntArray, period: float) -> IntArray:
+    """How many samples of the grid are missing before each of n samples; zero for the first and last WIDTH."""
+    n = len(stamp)
+    found = np.zeros(n, np.int64)
+    if n < 2 * WIDTH + 1:
+        return found
+    late = (stamp - stamp[0]) * NANOSECOND - period * np.arange(n)
+    low = np.percentile(sliding_window_view(late, WIDTH), LOW, axis=1)
+    step = low[WIDTH:] - low[:-WIDTH]  # at a place WIDTH later
+    largest = sliding_window_view(np.pad(step, WIDTH, constant_values=-np.inf), 2 * WIDTH + 1).max(axis=1)
+    count = np.rint(step / period).astype(np.int64)
+    peak = (step == largest) & (count > 0)
+    peak[1:] &= ~peak[:-1]
+    found[WIDTH : WIDTH + len(step)] = np.where(peak, count, 0)
+    return found
+
+
+def low_of(late: Array, inside: BoolArray) -> Array:
+    """The deviation (m,) of those that arrived soon, among the deviations (m, k) that are inside a run."""
+    late = np.sort(np.where(inside, late, np.inf), axis=1)
+    low = (0.01 * LOW * (inside.sum(axis=1) - 1)).astype(np.int64)
+    return np.asarray(late[np.arange(len(late)), low])

@@ -10,6 +10,7 @@ and ends. Where slider and tip show first touches themselves, the pushes so far 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -37,6 +38,7 @@ EARLIEST = 0.020  # s: a rod bends before the slider moves
 DOUBT = 4.0  # standard deviations; the pushes are judged one after the other
 SAMPLING = 0.006  # s, standard deviation of the delay at one touch, by the sampling of tracker and force
 SPREAD = 1.2533 * 1.4826  # from the median absolute deviation to the sd of a median, times the root of the number
+TARE_SAMPLES = 30
 
 
 class ForceDelay(NamedTuple):
@@ -86,7 +88,6 @@ class ForceTiming:
     def __init__(self) -> None:
         self.touches: list[tuple[float, float]] = []
         self.apart = False
-        self._delays: list[float] = []
         self._samples: ContactSamples | None = None  # of the last SEARCHED, and since a touch that is not judged yet
         self._touch: int | None = None  # its index in these
         self._last_contact = -np.inf
@@ -161,9 +162,9 @@ class ForceTiming:
         reached = min(_reached(time, samples.gap, touch) - begin, 0.0)
         delay = _delay(time - begin, np.hypot(x, y), 1.0 - HIGH * share, reached, least_force)
         self.touches.append((float(time[touch]), delay))
-        self._delays.append(delay)
-        unseen = len(self._delays) >= UNSEEN and all(map(math.isnan, self._delays[-UNSEEN:]))
-        self.apart = unseen or any(force_delay(self._delays[-last:]).apart for last in (0, RECENT))
+        delays = [delay for _, delay in self.touches]
+        unseen = len(delays) >= UNSEEN and all(map(math.isnan, delays[-UNSEEN:]))
+        self.apart = unseen or any(force_delay(delays[-last:]).apart for last in (0, RECENT))
 
 
 def _begin(time: Array, sample: int) -> int:
@@ -215,3 +216,65 @@ def _median(values: Array) -> Array:
     """The medians of values (n, ...) over n; numpy's takes four times as long for few."""
     ordered, middle = np.sort(values, axis=0), len(values) // 2
     return np.asarray(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) / 2.0)
+
+
+# --- what the sensor reads without contact: in free motion, and before any at rest near the slider --------------------
+
+
+class Zero(NamedTuple):
+    """Mean (x, y) N of the readings, None before any, and their noise, N."""
+
+    mean: tuple[float, float] | None
+    noise: float
+
+
+class ForceZero:
+    """Takes the samples in portions; the zero at a sample is that of the last TARE_SAMPLES readings up to it."""
+
+    def __init__(self) -> None:
+        self._free: Array = np.empty((0, 2))  # readings (m, 2) in free motion: the last before the portion, and its own
+        self._count: IntArray = np.empty(0, dtype=np.int64)  # of them up to each sample of the portion
+        self._resting: deque[tuple[float, float]] = deque(maxlen=TARE_SAMPLES)
+        self._known: dict[int, Zero] = {}  # by the number of readings in free motion
+
+    def add(self, force: Array, free: BoolArray) -> BoolArray:
+        """Begin a portion of forces (n, 2); free (n,): those in free motion. Returns whether any came up to each."""
+        before = self._free[-TARE_SAMPLES:]
+        self._free = np.concatenate([before, force[free]])
+        self._count = len(before) + np.cumsum(free)
+        self._known = {}
+        return np.asarray(self._count > 0)
+
+    def rest(self, force: tuple[float, float]) -> None:
+        """Add a reading at rest near the slider, which counts until there is one in free motion."""
+        self._resting.append(force)
+        self._known.pop(0, None)
+
+    def readings(self, sample: int) -> Array:
+        """The readings (m, 2) N in free motion at a sample of the portion."""
+        return self._last(int(self._count[sample]))
+
+    def at(self, sample: int) -> Zero:
+        """The zero at a sample of the portion."""
+        return self._of(int(self._count[sample]))
+
+    def above(self, force: Array, samples: IntArray) -> tuple[Array, Array]:
+        """Sizes (m,) N of forces (n, 2) over the zero at m samples in order, and its noise (m,) there, N."""
+        counts, which = np.unique(self._count[samples], return_inverse=True)
+        zeros = [self._of(count) for count in counts.tolist()]
+        mean = np.array([zero.mean or (0.0, 0.0) for zero in zeros]).reshape(-1, 2)
+        off = force[samples] - mean[which]
+        return np.hypot(off[:, 0], off[:, 1]), np.array([zero.noise for zero in zeros])[which]
+
+    def _last(self, count: int) -> Array:
+        return self._free[max(count - TARE_SAMPLES, 0) : count]
+
+    def _of(self, count: int) -> Zero:
+        if count not in self._known:
+            readings = self._last(count) if count else np.array(self._resting)
+            if len(readings):
+                x, y = readings.mean(axis=0).tolist()
+                self._known[count] = Zero((x, y), float(np.hypot(*readings.std(axis=0))))
+            else:
+                self._known[count] = Zero(None, 0.0)
+        return self._known[count]

@@ -148,28 +148,29 @@ def refit(first: OutlineFit, contacts: Contacts, rig: Rig, further: int, without
 
 def fit_frames(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
     """Fit turn and shift between the world frames of slider and pusher too, from the first fit and from afar."""
-    apart = contacts.poses[:, :2].mean(axis=0) - to_world(contacts.tips, contacts.poses).mean(axis=0)
-
-    def starts(problem: Problem) -> list[Array]:
-        """The first fit, and the best turns with a shift that brings tip and slider together."""
-        if first.spread <= DISTURBED:
-            return [first.estimate]
-        rows = np.zeros((STARTS, len(WEAK)))
-        rows[:, FRAME_YAW] = wrap_angle(np.arange(STARTS) * 2.0 * np.pi / STARTS)
-        rows[:, [FRAME_X, FRAME_Y]] = apart
-        return [first.estimate, *problem.two_best(rows)]
-
-    return _fit(contacts, rig, {*_fitted(first), *FRAMES}, starts)
+    rows = np.zeros((STARTS, len(WEAK)))  # turns with a shift that brings tip and slider together
+    rows[:, FRAME_YAW] = wrap_angle(np.arange(STARTS) * 2.0 * np.pi / STARTS)
+    tips = to_world(contacts.tips, contacts.poses)
+    rows[:, [FRAME_X, FRAME_Y]] = contacts.poses[:, :2].mean(axis=0) - tips.mean(axis=0)
+    return _fit_from_afar(first, contacts, rig, FRAMES, rows)
 
 
 def fit_tool(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
     """Fit the place of the tip along the tool's axes too, from the first fit and from afar; contacts know the tool."""
     assert contacts.tool is not None
-    apart = rotate(contacts.poses[:, :2] - to_world(contacts.tips, contacts.poses), -contacts.tool).mean(axis=0)
-    start = np.zeros(len(WEAK))
-    start[list(TOOL)] = apart
-    starts = [first.estimate] if first.spread <= DISTURBED else [first.estimate, start]
-    return _fit(contacts, rig, {*_fitted(first), *TOOL}, lambda problem: starts)
+    apart = contacts.poses[:, :2] - to_world(contacts.tips, contacts.poses)
+    start = np.zeros((1, len(WEAK)))
+    start[0, list(TOOL)] = rotate(apart, -contacts.tool).mean(axis=0)
+    return _fit_from_afar(first, contacts, rig, TOOL, start)
+
+
+def _fit_from_afar(first: OutlineFit, contacts: Contacts, rig: Rig, further: tuple[int, ...], far: Array) -> OutlineFit:
+    """Fit further parameters from the first fit, and where that leaves much from the best corrections far (n, 13)."""
+
+    def starts(problem: Problem) -> list[Array]:
+        return [first.estimate, *([] if first.spread <= DISTURBED else problem.two_best(far))]
+
+    return _fit(contacts, rig, {*_fitted(first), *further}, starts)
 
 
 def _turned_starts(problem: Problem) -> list[Array]:

@@ -67,8 +67,8 @@ def direction_findings(motion: Motion, used: BoolArray, radius: float) -> list[F
     if motion.tool is not None and np.isfinite(motion.tool).all() and motion.tool.any():  # a heading is recorded
         angles[TIP] = force + motion.tool[used] - moved
     world, *others = (_reading(axes, each, push) for axes, each in angles.items())
-    if len(np.unique(push)) < FEWEST_PUSHES:
-        return _of_few(world)
+    if len(np.unique(push)) < FEWEST_PUSHES:  # they show a wrong sign or a large turn only
+        return [_unrelated(world)] if world.length < RELATED else _turned_axes(world, [], ALLOWED_FEW)
     bent = np.clip(radius * velocity[used, 2] / speed[used], -1.0, 1.0)
     better = [each for each in others if _clearly_better(each, world, push) or _turns(each, world, bent, push)]
     best = max(better, key=lambda each: each.length, default=world)
@@ -116,13 +116,6 @@ def _slope(inputs: Array, values: Array, push: IntArray) -> tuple[float, float]:
         weight = 1.0 / np.sqrt(1.0 + (error / OUTLYING) ** 2)
     scores = sums_by_push(inputs * (weight * error)[:, None], push)
     return float(coefficients[0]), float(np.sqrt((bread @ scores.T @ scores @ bread)[0, 0]))
-
-
-def _of_few(world: Reading) -> list[Finding]:
-    """Few pushes show a wrong sign or a large turn only."""
-    if world.length < RELATED:
-        return [_unrelated(world)]
-    return _turned_axes(world, [], ALLOWED_FEW)
 
 
 def _turned_axes(world: Reading, others: list[Reading], allowed: float = ALLOWED) -> list[Finding]:

@@ -1,19 +1,22 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Poses of two bodies in one stream, and bodies that are exchanged for a while: jumps between two places."""
+"""Jumps of the poses: between two bodies in one stream, between bodies that are exchanged, and of the heading."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.flips import HeadingFlips, flip_steps
 from push_predictor.recordings.windows.track import JUMP_DISTANCE, JUMP_SPEED
-from push_predictor.types import Array, BoolArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 USUAL = 90.0  # percentile of a body's own steps
 LAG = 12  # samples: the next one of a body that has more than 10 % of them is at most about so far
@@ -25,6 +28,15 @@ FEWEST_RETURNS = 5  # to two places
 HALF = 0.12  # share of the samples elsewhere: with more, the window finder cannot know which body is meant
 EXCHANGED = 0.02  # m between a body that was exchanged and the place where the other one was
 SPAN = 100_000_000  # ns around an exchange
+FEWEST = 3
+LARGE = np.radians(42.0)  # below the smallest fixed angle
+FIXED_SHARE = 0.7  # of the large steps; of random ones, as of headings in degrees, a quarter are near a fixed angle
+COMMON = 0.1  # share of the flips by an angle that is listed
+OFTEN = 0.2  # share of the samples: the slider may begin anew with a flipped heading
+SAME = 1e-3  # m between an outline and the same after a turn that is its symmetry
+PLACE = "lace the markers so that no turn of the body maps them onto each other."
+ADVICE = f"The windows undo them. P{PLACE}"
+UNKNOWN = f"The true heading is not known. P{PLACE}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +78,7 @@ def places_of(stream: PoseStream) -> Places:
     return Places(jumps, len(returned), float(np.median(step[begins[back] - 1])), float(share))
 
 
-def two_bodies(name: str, stream: PoseStream, places: Places) -> Finding | None:
+def two_bodies(name: str, places: Places) -> Finding | None:
     """A finding if a stream jumps to and fro between two places."""
     if places.returns < FEWEST_RETURNS:
         return None
@@ -127,3 +139,47 @@ def _usual_step(place: Array) -> float:
     """The step (m) that few exceed, to the nearest of the next samples: the others may be of other bodies."""
     ahead = [np.hypot(*(place[lag:] - place[:-lag]).T)[: max(len(place) - LAG, 0)] for lag in range(1, LAG + 1)]
     return float(np.percentile(np.min(ahead, axis=0), USUAL)) if len(place) > LAG else 0.0
+
+
+# --- flips of the slider's heading by fixed angles --------------------------------------------------------------------
+
+
+def without_flips(recording: Recording, outline: Outline) -> tuple[Finding | None, Recording]:
+    """A finding if the heading flips by fixed angles, and the recording with the headings that the windows use.
+
+    Refused if it flips so often that its true value is not known, and the angles are no symmetry of the outline.
+    """
+    slider = recording.slider
+    pose = np.column_stack([slider.x, slider.y, slider.heading])
+    if not len(pose) or _share_of_fixed(slider.stamp, pose) < FIXED_SHARE:
+        return None, recording
+    turned = HeadingFlips().take(slider.stamp, pose)
+    changes = np.diff(turned, prepend=0.0)
+    flips = np.round(np.degrees(np.abs(wrap_angle(changes[np.abs(changes) > 1e-6]))))
+    if len(flips) < FEWEST:
+        return None, recording
+    angles, counts = np.unique(flips, return_counts=True)
+    listed = " and ".join(f"{angle:.0f}" for angle in angles[counts >= COMMON * len(flips)])
+    share = float(np.mean(turned != 0.0))
+    sentence = (
+        f"The slider's heading flips {len(flips)} times by {listed} degrees while the slider stays in its place "
+        f"({100.0 * share:.1f} % of the samples): the markers look alike after such a turn."
+    )
+    values = {"flips": Value(float(len(flips)), "1"), "share": Value(share, "1")}
+    unknown = share > OFTEN and not all(_symmetric(outline, np.radians(angle)) for angle in angles)
+    advice = UNKNOWN if unknown else ADVICE
+    found = Finding("heading_flips", "refused" if unknown else "warning", sentence, advice, values)
+    return found, replace(recording, slider=replace(slider, heading=wrap_angle(slider.heading - turned)))
+
+
+def _symmetric(outline: Outline, turn: float) -> bool:
+    """Whether a turn (rad) maps the outline onto itself."""
+    turned = rotate(outline.vertices, np.full(len(outline.vertices), turn))
+    return bool(np.max(np.abs(outline.project(turned).distance)) < SAME)
+
+
+def _share_of_fixed(stamp: IntArray, pose: Array) -> float:
+    """Share of the steps by a large angle, of a slider that stays, that are fixed angles; 0 without any."""
+    turn, elsewhere = flip_steps(stamp, pose)
+    large = ~elsewhere & (np.abs(wrap_angle(np.diff(pose[:, 2]))) > LARGE)
+    return float(np.mean(turn[large] != 0.0)) if large.any() else 0.0

@@ -10,21 +10,18 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.geometry.frames import to_body
-from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.force.direction import FEWEST_PUSHES, TOPIC, direction_findings
-from push_predictor.recordings.checks.force.presence import presence_findings
-from push_predictor.recordings.checks.force.timing import (
-    rate_finding,
-    timing_finding,
-    unseen_finding,
-    windows_and_delays,
-)
-from push_predictor.recordings.checks.geometry.stage import MIRRORS
+from push_predictor.recordings.checks.finding import Evidence, Finding, Value
+from push_predictor.recordings.checks.force_direction import FEWEST_PUSHES, TOPIC, direction_findings
+from push_predictor.recordings.checks.geometry import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.recordings.streams import Recording, WrenchStream, taken
+from push_predictor.recordings.windows.contact import SLOWEST
+from push_predictor.recordings.windows.finder import WindowFinder
+from push_predictor.recordings.windows.force import DOUBT, LATEST, force_delay
+from push_predictor.recordings.windows.force import FEWEST as FEWEST_TOUCHES
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array, BoolArray
 
 LEAST_FORCE = 0.3  # N
@@ -44,6 +41,13 @@ FRICTION_FACTOR = 3.0  # the force over that of the known friction, or its inver
 PUSHED = 75.0  # percentile: a noisy tracker takes some rest for contact
 GRAVITY = 9.81  # m/s^2
 UNITS = {"kN": 1e3, "kgf": 9.80665, "lbf": 4.44822, "gf": 9.80665e-3, "mN": 1e-3}  # N
+MISSING = 0.05  # share of the contacts
+STUCK = 1.0  # s at exactly one value, in a contact and away from it
+DRIVER = "Check the sensor's driver and cable."
+BY_GEOMETRY = "Windows there come from the geometry alone and have no force."
+LOWEST_RATE = 1.0 / SLOWEST  # Hz: four samples in a window of 0.2 s
+PARTS = 3  # of a recording, of which the first and the last show a drift
+OF_ANOTHER_TIME = "Windows come from the geometry then, but their forces are those of another time."
 
 
 def force_stage(evidence: Evidence) -> Evidence:
@@ -61,21 +65,19 @@ def force_stage(evidence: Evidence) -> Evidence:
         stamp = kept.wrench.stamp - round(late.values["lag"].value / NANOSECOND)
         kept = replace(kept, wrench=replace(kept.wrench, stamp=stamp))
     if kept is not recording:
-        motion = motion_of(kept, rig)
+        motion = motion_of(kept, rig) or motion
     found += [each for each in (rate_finding(recording.wrench), late) if each is not None]
     directed = not evidence.has(*MIRRORS, "frames_apart")
     found += wrench_findings(motion, rig, outlined, directed)
     return replace(evidence.found(found or [unseen_finding(delays)], kept), windows=windows)
 
 
-def wrench_findings(motion: Motion | None, rig: Rig, outlined: bool = True, directed: bool = True) -> list[Finding]:
+def wrench_findings(motion: Motion, rig: Rig, outlined: bool = True, directed: bool = True) -> list[Finding]:
     """Findings about the zero, unit and axes of the wrench; empty without one.
 
     outlined: whether the outline shows where the tip is in contact. directed: whether slider and tip have one world
     frame, so that directions show axes.
     """
-    if motion is None:
-        return []
     free = _free(motion, rig) if outlined else np.zeros(len(motion.time), dtype=np.bool_)
     zero, spread = _zero(motion.force[free])
     touching = motion.touching & np.isfinite(motion.force[:, 0])
@@ -186,3 +188,115 @@ def _scale(size: Array, rig: Rig) -> Finding | None:
     advice = "Give forces in N" + (f": multiply them {factors}" if fitting else "")
     values = {"force": Value(force, "N"), "weight": Value(weight, "N")}
     return Finding("wrench_units", "warning", sentence, f"{advice}. Give object_mass in kg.", values)
+
+
+# --- whether it is there: a stream that ends, has gaps, or stays at one value -----------------------------------------
+
+
+def presence_findings(recording: Recording, motion: Motion) -> tuple[list[Finding], Recording]:
+    """Findings about a force that is missing or stuck, and the recording without the samples that are stuck."""
+    if (wrench := recording.wrench) is None or not motion.contact.any():
+        return [], recording
+    time = (wrench.stamp - recording.slider.stamp[0]) * NANOSECOND
+    missing, stuck = _missing(motion), _stuck(time, np.column_stack([wrench.fx, wrench.fy]), motion)
+    if stuck.any():
+        recording = replace(recording, wrench=taken(wrench, ~stuck))
+    return [each for each in (missing, _stuck_finding(time, stuck, wrench)) if each is not None], recording
+
+
+def _missing(motion: Motion) -> Finding | None:
+    known = np.isfinite(motion.force[:, 0])
+    share = 1.0 - float(np.mean(known[motion.contact]))
+    if share <= MISSING:
+        return None
+    where, whole = "it has gaps or NaN", motion.time[-1]
+    if known.any():
+        begin, end = motion.time[known][[0, -1]]
+        if begin > MISSING * whole:
+            where = f"it begins {begin:.0f} s after the slider's poses"
+        elif end < (1.0 - MISSING) * whole:
+            where = f"it ends after {end:.0f} s of {whole:.0f} s"
+    sentence = f"The force is missing in {100.0 * share:.0f} % of the contacts: {where}."
+    return Finding("wrench_missing", "warning", sentence, f"{DRIVER} {BY_GEOMETRY}", {"share": Value(share, "1")})
+
+
+def _stuck(time: Array, force: Array, motion: Motion) -> BoolArray:
+    """Which samples (w,) of a force (w, 2) repeat one value for over STUCK, through two pushes; time (w,) s.
+
+    A force of 0 throughout is absent.
+    """
+    if not len(time):
+        return np.zeros(0, dtype=np.bool_)
+    run = np.concatenate([[0], np.cumsum((np.diff(force, axis=0) != 0.0).any(axis=1))])
+    first, last = (np.searchsorted(run, np.arange(run[-1] + 1), side=side) for side in ("left", "right"))
+    found = np.zeros(len(run), dtype=np.bool_)
+    for k in np.flatnonzero(time[last - 1] - time[first] > STUCK):
+        within = motion.contact & (motion.time >= time[first[k]]) & (motion.time <= time[last[k] - 1])
+        if force[first[k]].any() and len(np.unique(motion.push[within])) > 1:
+            found[first[k] : last[k]] = True
+    return found
+
+
+def _stuck_finding(time: Array, stuck: BoolArray, wrench: WrenchStream) -> Finding | None:
+    if not stuck.any():
+        return None
+    first, share = int(np.argmax(stuck)), float(np.mean(stuck))
+    sentence = (
+        f"The force stays at exactly ({wrench.fx[first]:.3g}, {wrench.fy[first]:.3g}) N in and out of contact, in "
+        f"{100.0 * share:.0f} % of its samples, first after {time[first]:.0f} s."
+    )
+    return Finding("wrench_constant", "warning", sentence, f"{DRIVER} {BY_GEOMETRY}", {"share": Value(share, "1")})
+
+
+# --- its clock: when it rises against the touches that slider and tip show --------------------------------------------
+
+
+def windows_and_delays(recording: Recording, rig: Rig) -> tuple[list[PushWindow], list[float]]:
+    """The windows, and how late the force rises at each touch that slider and tip show, s; NaN where it does not."""
+    finder = WindowFinder(rig)
+    return finder.find(recording), [delay for _, delay in finder.force_touches]
+
+
+def timing_finding(delays: list[float]) -> Finding | None:
+    """A finding if the force is late or early, throughout or more and more."""
+    size = len(delays) // PARTS
+    whole, first, last = map(force_delay, (delays, delays[:size], delays[(PARTS - 1) * size : PARTS * size]))
+    doubt = LATEST + DOUBT * float(np.hypot(first.sd, last.sd))
+    changes = min(first.touches, last.touches) >= FEWEST_TOUCHES and abs(last.value - first.value) > doubt
+    if not (whole.shifted or (changes and (first.shifted or last.shifted))):
+        return None
+    side = "after" if whole.value > 0.0 else "before"
+    sentence = (
+        f"The force rises {1e3 * abs(whole.value):.0f} ms {side} the touch that slider and tip show (sd "
+        f"{1e3 * whole.sd:.2g} ms, {whole.touches} touches)."
+    )
+    if changes:
+        sentence += f" Its delay changes from {1e3 * first.value:.0f} to {1e3 * last.value:.0f} ms."
+    advice = f"Synchronise the clocks (chrony, PTP), and record the force without a filter. {OF_ANOTHER_TIME}"
+    return Finding("wrench_lag", "warning", sentence, advice, {"lag": Value(whole.value, "s", whole.sd)})
+
+
+def unseen_finding(delays: list[float]) -> Finding | None:
+    """A finding if the force does not rise at many touches."""
+    delay = force_delay(delays)
+    if not delay.apart:
+        return None
+    sentence = (
+        f"The force does not rise at {100.0 * delay.missing:.0f} % of the {delay.touches} touches that slider and tip "
+        "show. It is probably of another time or body."
+    )
+    return Finding("wrench_unrelated", "warning", sentence, TOPIC, {"missing": Value(delay.missing, "1")})
+
+
+def rate_finding(wrench: WrenchStream) -> Finding | None:
+    """A finding if the force is sampled too seldom to show when a contact begins."""
+    step = np.diff(np.unique(wrench.stamp))
+    rate = 1.0 / (float(np.median(step)) * NANOSECOND) if len(step) else 0.0
+    if rate >= LOWEST_RATE:
+        return None
+    sentence = (
+        f"The force is sampled at {rate:.3g} Hz: below {LOWEST_RATE:g} Hz it shows neither when a contact begins nor "
+        "the mean force of a window."
+    )
+    advice = "Record the wrench at 50 Hz or more, or use `--wrench-topic none`."
+    return Finding("wrench_rate", "warning", sentence, advice, {"rate": Value(rate, "Hz")})

@@ -9,35 +9,31 @@ between tip and outline is named if the streams as recorded leave a large one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.errors import RigError
 from push_predictor.geometry.frames import rotate, to_body, to_world
-from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image
-from push_predictor.recordings.checks.evidence import Evidence
-from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.frames.orientation import orientation_finding
-from push_predictor.recordings.checks.geometry.outline_findings import (
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image, transformed, transformed_points
+from push_predictor.recordings.checks.finding import Evidence, Finding, Value
+from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
     LAG_ALLOWANCE,
+    LARGEST_SIZE_CHANGE,
+    LARGEST_TIP_CHANGE,
+    LENGTH_ALLOWANCE,
     TIP_POSE,
     frames_apart,
     outline_findings,
     tip_offset,
     unchecked,
 )
-from push_predictor.recordings.checks.geometry.outline_fit import (
-    LAG,
-    SIZE,
-    TIE,
-    Contacts,
-    OutlineFit,
-    X,
-    Y,
-    fit_outline,
-)
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
@@ -55,6 +51,8 @@ RIGHT_HANDED = "Use right-handed frames, seen from above."
 FROM_ABOVE = f"{RIGHT_HANDED} If z points down in the slider's frame, `--up=slider=-z` does that."
 IN_ORDER = "Give x before y, in right-handed frames seen from above."
 TOPICS = "Check the topics of slider and pusher, and that they are given in one world frame."
+CORRECTED = ("outline_mirrored", "outline_turned", "outline_shifted", "outline_size", "tip_radius")
+CENTRED_WITHIN = 0.5 * LENGTH_ALLOWANCE
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,7 @@ MIRRORS = {
         (0.0, 1.0), (1.0, 0.0), 1.0, "The slider's x and y positions are exchanged, its heading is not.", IN_ORDER
     ),
 }
+PREVENTS = (*MIRRORS, "outline_unchecked", "outline_misfit", "outline_shape")
 
 
 def geometry_stage(evidence: Evidence) -> Evidence:
@@ -116,9 +115,8 @@ def geometry_findings(recording: Recording, rig: Rig, motion: Motion | None) -> 
     if motion is not None and (pushes := _too_brief(motion, rig)) is not None:
         return [unchecked(pushes)]
     contacts, fit = _fit_on_one_clock(recording, rig, contacts)
-    if rig.outline.rotational_symmetry == 0 and _leads(motion) > AT_REST > 3.0 * _leads(
-        motion_of(swapped(recording), rig)
-    ):
+    round_, leads = rig.outline.rotational_symmetry == 0, _leads(motion)
+    if round_ and leads > AT_REST > 3.0 * _leads(motion_of(swapped(recording), rig)):
         return [_swapped(fit.gap)]
     if fit.pushes < FEWEST_PUSHES and _gap_as_recorded(contacts, rig) < WindowOptions().touch_gap_alone:
         return [unchecked(fit.pushes)]  # so few pushes fit a slider far away as well
@@ -141,16 +139,15 @@ def _findings_of_large_gap(
     if found := _mirror_image_findings(contacts, rig, fit.gap, min(explained, mirrors[best])):
         return found
     if mirrors[best] < explained:
-        return [_mirrored(best, fit.gap, mirrors[best])]
+        mirror = MIRRORS[best]
+        return [_falling(best, f"{mirror.mistake} With it corrected", mirror.advice, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
     if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
-    explained_otherwise = another or {"frames_apart", "tip_offset", "outline_shape"} & {
-        finding.name for finding in found
-    }
-    return found if explained_otherwise else [*found, _unexplained(fit.gap)]
+    otherwise = any(finding.name in ("frames_apart", "tip_offset", "outline_shape") for finding in found)
+    return found if another or otherwise else [*found, _unexplained(fit.gap)]
 
 
 def swapped(recording: Recording) -> Recording:
@@ -257,7 +254,10 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
     fit = fit_outline(contacts, image)
     if fit.gap >= most or _is_implausible(fit, rig):
         return []
-    return [_outline_mirrored(gap, fit.gap), *outline_findings(contacts, image, fit)]
+    mistake = "The outline is the mirror image of the slider. Mirrored at the x axis"
+    advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
+    mirrored = _falling("outline_mirrored", mistake, advice, gap, fit.gap)
+    return [mirrored, *outline_findings(contacts, image, fit)]
 
 
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
@@ -305,24 +305,11 @@ def _another_body(gap: float) -> Finding:
     return Finding("another_body", "refused", sentence, TOPICS, {"gap": Value(gap, "m")})
 
 
-def _mirrored(name: str, gap: float, after: float) -> Finding:
-    mirror = MIRRORS[name]
-    sentence = (
-        f"{mirror.mistake} With it corrected, the median gap in contact falls from {1e3 * gap:.1f} mm to "
-        f"{1e3 * after:.2f} mm."
-    )
+def _falling(name: str, mistake: str, advice: str, gap: float, after: float) -> Finding:
+    """A warning about what explains the gap (m), of which a smaller one is left."""
+    sentence = f"{mistake}, the median gap in contact falls from {1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
     values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding(name, "warning", sentence, mirror.advice, values)
-
-
-def _outline_mirrored(gap: float, after: float) -> Finding:
-    sentence = (
-        f"The outline is the mirror image of the slider. Mirrored at the x axis, the median gap in contact falls from "
-        f"{1e3 * gap:.1f} mm to {1e3 * after:.2f} mm."
-    )
-    advice = "Change the sign of the outline's y, or use right-handed frames for both poses."
-    values = {"gap": Value(gap, "m"), "gap_after": Value(after, "m")}
-    return Finding("outline_mirrored", "warning", sentence, advice, values)
+    return Finding(name, "warning", sentence, advice, values)
 
 
 def _unexplained(gap: float) -> Finding:
@@ -331,3 +318,57 @@ def _unexplained(gap: float) -> Finding:
     )
     advice = "Check the outline's vertices, and the calibration between tracker and robot."
     return Finding("outline_misfit", "warning", sentence, advice, {"gap": Value(gap, "m")})
+
+
+# --- the rig with what was found about its outline and tip corrected --------------------------------------------------
+
+
+def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
+    """The rig whose outline and tip radius are those that the findings of `check_recording` estimate.
+
+    Support points move with the outline. A clock lag and world frames apart are faults of the recording: they change
+    nothing here. Without a finding, the rig is the same. Raises RigError that names the findings with which nothing can
+    be corrected, or for a size or a tip's radius that no mistake of measurement explains.
+    """
+    if prevents := [each for each in findings if each.severity == "refused" or each.name in PREVENTS]:
+        names, sentences = ", ".join(each.name for each in prevents), " ".join(each.sentence for each in prevents)
+        raise RigError(f"no rig can be estimated ({names}): {sentences}")
+    found = {finding.name: finding.values for finding in findings if finding.name in CORRECTED}
+    if not found:
+        return rig
+    outline, points = rig.outline, rig.support_points
+    if "outline_mirrored" in found:
+        outline, points = mirror_image(outline), None if points is None else points * [1.0, -1.0, 1.0]
+    yaw = found["outline_turned"]["yaw"].value if "outline_turned" in found else 0.0
+    shift = found.get("outline_shifted")
+    moved = (0.0, 0.0) if shift is None else _centring(outline, shift["x"].value, shift["y"].value)
+    size = found["outline_size"]["scale"].value if "outline_size" in found else 1.0
+    radius = found["tip_radius"]["radius"].value if "tip_radius" in found else rig.pusher_radius
+    _check_plausible(rig, size, radius)
+    if points is not None:
+        places = transformed_points(outline, points[:, :2], yaw, moved, size)
+        points = np.column_stack([places, points[:, 2]])
+    corrected = transformed(outline, yaw, moved, size)
+    return replace(rig, outline=corrected, pusher_radius=radius, support_points=points)
+
+
+def _check_plausible(rig: Rig, size: float, radius: float) -> None:
+    if not abs(size - 1.0) <= LARGEST_SIZE_CHANGE:
+        raise RigError(
+            f"outline: the contacts fit {size:.3f} times its size, which is not accepted, give sizes within "
+            f"{100.0 * LARGEST_SIZE_CHANGE:.0f} %: measure them, and the tip radius, again"
+        )
+    if not abs(radius - rig.pusher_radius) <= LARGEST_TIP_CHANGE * rig.pusher_radius:
+        raise RigError(
+            f"pusher_radius: the contacts fit {1e3 * radius:.2f} mm in place of {1e3 * rig.pusher_radius:.2f} mm, "
+            f"which is not accepted, give a radius within {100.0 * LARGEST_TIP_CHANGE:.0f} %: measure it again"
+        )
+
+
+def _centring(outline: Outline, x: float, y: float) -> tuple[float, float]:
+    """The shift, exactly to the origin if it ends near it: a symmetric outline must not lose its symmetry to noise."""
+    there = outline.centroid + [x, y]
+    if np.hypot(*there) > CENTRED_WITHIN:
+        return x, y
+    x, y = (-outline.centroid).tolist()
+    return x, y

@@ -1,10 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The benchmark of adaptation on made-up scores: which pushes judge a model, gains, shares and targets."""
+"""The benchmarks of adaptation and of the alarm on made-up scores: gains, shares, targets; what is false or late."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 from benchmarks.adaptation.methods import Scored, Tuesday
 from benchmarks.adaptation.rigs import NOTHING, WEAR
 from benchmarks.adaptation.tables import Record, rows, verdict
+from benchmarks.blind import alarm
+from benchmarks.blind.alarm import Row
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.rig import Rig
@@ -72,3 +75,38 @@ def test_models_are_judged_on_pushes_that_none_has_seen(change: str, tested: ran
     table = PushTable(columns, columns[:, 0], columns, np.array(PUSHES))
     tuesday = Tuesday(cast(PushModel, None), change, LoadedData(table, None, cast(Rig, None)))
     assert tuesday.tested(30).pushes == [PUSHES[k] for k in tested]
+
+
+# --- the table of the alarm's benchmark -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "fired", "false", "delay"),
+    [
+        (None, None, False, None),
+        (None, 7, True, None),
+        (100, None, False, None),
+        (100, 90, True, None),
+        (100, 100, True, None),
+        (100, 101, False, 1),
+        (100, 130, False, 30),
+    ],
+)
+def test_alarm_before_the_change_is_false_and_after_it_has_a_delay(
+    change: int | None, fired: int | None, false: bool, delay: int | None
+) -> None:
+    judged = Row(0, "rect1 on abs", "vhgp", change, fired, "dy" if fired else None)
+    assert (judged.false, judged.delay) == (false, delay)
+
+
+def test_recordings_that_are_there_are_not_judged_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    judged: list[int] = []
+
+    def rows(seed: int, count: int) -> list[Row]:
+        judged.append(seed)
+        return [Row(seed, "hex on pu", "vhgp", None, None, None)] * count
+
+    monkeypatch.setattr(alarm, "rows_without_change", rows)
+    for models in ("2", "3"):
+        alarm.main(["unchanged", "--out", str(tmp_path), "--models", models, "--streams", "4", "--first", "7"])
+    assert judged == [7, 8, 9] and len(list(tmp_path.iterdir())) == 3

@@ -16,7 +16,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
-from push_predictor.recordings.checks.geometry.outline_fit import (
+from push_predictor.recordings.checks.outline_fit import (
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
@@ -75,7 +75,10 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
         found.append(_size(contacts, rig, cause))
     if cause.name == "tip_radius":
         found.append(_tip(cause, rig))
-    return [*found, *_clock_findings(cause.fit, contacts.lag), *_shape_findings(cause.fit, rig)]
+    lag = value_of(cause.fit, LAG, "s", contacts.lag)
+    if abs(lag.value) > DOUBT * (lag.sd or 0.0) + LAG_ALLOWANCE:
+        found.append(clocks_apart(lag))
+    return [*found, *_shape_findings(cause.fit, rig)]
 
 
 def value_of(fit: OutlineFit, parameter: int, unit: str, offset: float = 0.0) -> Value:
@@ -231,12 +234,6 @@ def _tip_offset(fit: OutlineFit) -> Finding:
     return Finding("tip_offset", "warning", sentence, f"{TIP_POSE[0].upper()}{TIP_POSE[1:]}", {"x": x, "y": y})
 
 
-def _clock_findings(fit: OutlineFit, corrected: float) -> list[Finding]:
-    """corrected: the lag (s) that the fitted samples no longer have."""
-    lag = value_of(fit, LAG, "s", corrected)
-    return [clocks_apart(lag)] if abs(lag.value) > DOUBT * (lag.sd or 0.0) + LAG_ALLOWANCE else []
-
-
 def clocks_apart(lag: Value, the: str = "The") -> Finding:
     """The finding that the slider's stamps are late (s), or early."""
     side, sd = "late" if lag.value > 0.0 else "early", 1e3 * (lag.sd or 0.0)
@@ -267,9 +264,7 @@ def cause_of(contacts: Contacts, rig: Rig, fit: OutlineFit) -> Cause:
     """The cause of the gaps between contacts and outline, from the fit of yaw, shift, size and clock lag alone."""
     if fit.spread < FINE and not (_is_resized(fit, rig) or _is_turned(fit) or _is_shifted(fit)):
         return Cause("outline", fit)
-    axes = None
-    if _has_two_sizes(rig) and fit.sd[SIZE] > 0.0:
-        axes = refit(fit, contacts, rig, STRETCH)
+    axes = refit(fit, contacts, rig, STRETCH) if _has_two_sizes(rig) and fit.sd[SIZE] > 0.0 else None
     known: dict[Name, OutlineFit | None] = {
         "tip_radius": _with_tip(contacts, rig, fit),
         "frames_apart": frames_apart(contacts, rig, fit),

@@ -1,0 +1,211 @@
+# Copyright 2026 The push_predictor authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses that were not measured: repeated with new stamps, or continued on a line, while the body moves on.
+
+A tracker that lost the body, or a slower source, repeats the last pose. A repeat is stale if the next change exceeds
+what a body at the speed seen around it moves in one interval. Stale poses of a slow source are replaced by those on the
+line to its next pose, as between any two samples. Where the source is silent for longer than usual they are discarded,
+which makes a dropout. A body at rest repeats its pose, too: nothing is changed there.
+
+A tracker may also continue with the last velocity. Such poses lie exactly on a line, which the next measured pose
+leaves; poses measured with noise never do. A stream without noise, as of a simulation, is left as it is: a body may
+move on a line. So are poses between two measured ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.streams import PoseStream, taken
+from push_predictor.recordings.windows.resolution import LEVER, Resolution, changes, lengths
+from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
+from push_predictor.types import Array, BoolArray, IntArray
+
+HARMLESS = 1e-4  # m: so small a change makes no outcome wrong
+CONTINUES = 5.0  # times the way at the speed after it; a body that was placed elsewhere moves farther
+MARGIN = 1.5  # times the way in one interval: after one missing sample it is 2
+LONGEST_HOLD = 1_000_000_000  # ns: a body that repeats its pose for longer is at rest
+USUAL = 9  # changes whose median interval is the usual one
+EXACT = 1e-8  # m off the line of the two poses before: rounding of a continued pose
+NOISE = 1e-5  # m off it, as the median of the BEFORE poses before a run: less may be a motion without noise
+BEFORE = 20
+SHORTEST = 4  # poses in a run: a coincidence of so many does not happen
+LONGEST = 2_000_000_000  # ns: a tracker gives a body up before
+CORRECTED = 3.0  # times this noise, of the next measured pose off the line: else the body is where the line leads
+LEAST = 1e-5  # m in an interval: a body at rest repeats its pose
+JUDGING = BEFORE + 2  # poses before a run, of which the last BEFORE have two before them
+
+
+class HeldPoses(Portions):
+    """Takes the samples of one stream in order and returns them without stale ones.
+
+    A repeat waits until the body has changed its pose twice, or for LONGEST_HOLD. The result does not depend on the
+    portions. stale: number of stale samples; dropouts: intervals (s) of a source that was silent for longer than usual.
+    """
+
+    def __init__(self, angle: int | None = None) -> None:
+        """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
+        super().__init__()  # keeps the first sample of the pose that waits
+        self.stale = 0
+        self.dropouts: list[float] = []
+        self._angle = angle
+        self._before = np.empty(0, np.int64)  # stamps (ns) at which the poses before the kept ones began
+        self._pose: Array | None = None  # the one before these
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        samples = self._with(new)
+        pose = lengths(samples.values, self._angle)
+        begins = changes(pose)
+        keep, values, decided = self._judge(samples, pose, begins, final)
+        rows = np.arange(self._returned, decided)
+        samples = replace(samples, values=values)
+        self._forget(samples, pose, begins, decided)
+        return taken(samples, rows[keep[rows]])
+
+    def _judge(
+        self, samples: OrderedSamples, pose: Array, begins: IntArray, final: bool
+    ) -> tuple[BoolArray, Array, int]:
+        """Which samples (n,) are kept, their values, and how many are decided; begins: of the runs of one pose."""
+        stamp, ends = samples.stamp, np.append(begins[1:], len(pose))
+        keep, values = np.ones(len(pose), dtype=np.bool_), samples.values.copy()
+        first = np.concatenate([self._before, stamp[begins]])
+        changes = np.append(np.linalg.norm(pose[begins[1:]] - pose[begins[:-1]], axis=1) > HARMLESS, False)
+        for run in np.flatnonzero(ends - begins > 1).tolist():
+            begin, end = int(begins[run]), int(ends[run])
+            if stamp[end - 1] - stamp[begin] > LONGEST_HOLD:
+                continue
+            if not final and not self._decidable(stamp, begins, run):
+                return keep, values, max(begin + 1, self._returned)
+            if changes[run] and self._is_stale(stamp, pose, begins, run, float(values[end, -1])):
+                rows = np.arange(max(begin + 1, self._returned), end)
+                usual = first[: run + len(self._before) + 2][-USUAL - 1 :]
+                interval = float(stamp[end] - stamp[begin]) * NANOSECOND
+                self.stale += len(rows)
+                slow = interval <= longest_interval(float(np.median(np.diff(usual))) * NANOSECOND)
+                if slow:
+                    share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
+                    values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
+                else:
+                    self.dropouts.append(interval)
+                    keep[rows] = False
+        return keep, values, len(pose)
+
+    def _decidable(self, stamp: IntArray, begins: IntArray, run: int) -> bool:
+        """Whether the two poses after that of a run are known, or the first of them lasts."""
+        if run + 2 < len(begins):
+            return True
+        return run + 1 < len(begins) and int(stamp[-1] - stamp[begins[run + 1]]) > LONGEST_HOLD
+
+    def _is_stale(self, stamp: IntArray, pose: Array, begins: IntArray, run: int, quantum: float) -> bool:
+        """Whether the body moved on during a run: the change after it is too large for one interval."""
+        if run + 2 >= len(begins):
+            return False
+        begin, now, later = (int(at) for at in begins[run : run + 3])
+        change = float(np.linalg.norm(pose[now] - pose[begin]))
+        rests = int(stamp[later - 1] - stamp[now]) > LONGEST_HOLD
+        after = (
+            0.0 if rests else float(np.linalg.norm(pose[later] - pose[now])) / int(stamp[later] - stamp[now])
+        )  # m/ns
+        if change > CONTINUES * after * int(stamp[now] - stamp[begin]):
+            return False
+        one = MARGIN * max(after, self._speed_before(stamp, pose, begins, run)) * int(stamp[now] - stamp[now - 1])
+        return change > HARMLESS + MARGIN * quantum + one
+
+    def _speed_before(self, stamp: IntArray, pose: Array, begins: IntArray, run: int) -> float:
+        """From the pose before that of a run to it, m/ns; 0 for the first."""
+        if run:
+            last, since = pose[begins[run - 1]], int(stamp[begins[run - 1]])
+        elif self._pose is not None:
+            last, since = self._pose, int(self._before[-1])
+        else:
+            return 0.0
+        return float(np.linalg.norm(pose[begins[run]] - last)) / int(stamp[begins[run]] - since)
+
+    def _forget(self, samples: OrderedSamples, pose: Array, begins: IntArray, decided: int) -> None:
+        """Keep the samples that wait, and the first and the last one before them that have the same pose."""
+        if not len(pose):
+            return
+        run = int(np.searchsorted(begins, max(decided - 1, 0), side="right")) - 1
+        begin = int(begins[run])
+        if run:
+            self._pose = pose[begins[run - 1]]
+        self._before = np.concatenate([self._before, samples.stamp[begins[:run]]])[-USUAL:]
+        rows = np.unique([begin, decided - 1, *range(decided, len(pose))])
+        self._keep(samples, rows, int(np.sum(rows < decided)))
+
+
+# --- poses continued on a line ----------------------------------------------------------------------------------------
+
+
+class ContinuedPoses(Portions):
+    """Takes the samples of one stream in order and returns them without continued ones.
+
+    A sample waits for the next one, those on a line for its end. The result does not depend on the portions.
+    """
+
+    def __init__(self, angle: int | None) -> None:
+        """Of a stream whose last column is the resolution, m; angle: index of one with an unwrapped heading, rad."""
+        super().__init__()
+        self._angle = angle
+
+    def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
+        """Add samples and return those that are decided; with `final` all are."""
+        samples = self._with(new)
+        pose, first = lengths(samples.values, self._angle), self._returned
+        lost, decided = _judged(samples.stamp, pose, samples.values[:, -1], first)
+        decided = len(lost) if final else max(decided, first)
+        rows = np.arange(first, decided)
+        kept = max(decided - JUDGING, 0)
+        self._keep(samples, slice(kept, None), decided - kept)
+        return taken(samples, rows[~lost[rows]])
+
+
+def continued(stream: PoseStream, angle: bool) -> BoolArray:
+    """Which poses (n,) of a stream are continued, not measured; angle: whether its headings count."""
+    pose = np.column_stack([stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])])
+    return _judged(stream.stamp, pose, np.max(Resolution(pose.shape[1]).take(pose), axis=1, initial=0.0), 0)[0]
+
+
+def _judged(stamp: IntArray, pose: Array, quantum: Array, first: int) -> tuple[BoolArray, int]:
+    """Which poses (n, k) are continued, and how many are decided if more can follow; first: of those that wait."""
+    lost, count = np.zeros(len(pose), dtype=np.bool_), len(pose)
+    off, moves = _off_line(stamp, pose)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], ((off < EXACT) & moves).astype(np.int8), [0]])))
+    for begin, end in edges.reshape(-1, 2).tolist():
+        if begin - 1 < first or stamp[end - 1] - stamp[begin - 1] > LONGEST:
+            continue
+        if (noise := _noise(off, begin - 1)) <= NOISE:  # the first of a run is off the line of those before
+            continue
+        if end == count:
+            return lost, begin - 1
+        if end - begin >= SHORTEST and quantum[end] <= NOISE and off[end] > CORRECTED * noise:
+            lost[begin - 1 : end] = True
+    return lost, count - 1
+
+
+def _off_line(stamp: IntArray, pose: Array) -> tuple[Array, BoolArray]:
+    """The distance (n,) m of each pose (n, k) from the line of the two before, and whether it moves."""
+    off, moves = np.full(len(pose), np.inf), np.zeros(len(pose), dtype=np.bool_)
+    if len(pose) > 2:
+        step, interval = np.diff(pose, axis=0), np.diff(stamp).astype(np.float64)[:, None]
+        ratio = interval[1:] / np.where(interval[:-1] == 0.0, np.nan, interval[:-1])
+        off[2:] = _length(step[1:] - step[:-1] * ratio)
+        moves[2:] = _length(step[1:]) > LEAST
+    return np.where(np.isfinite(off), off, np.inf), moves
+
+
+def _length(steps: Array) -> Array:
+    """The lengths (n,) of steps (n, k): for few columns numpy's norm takes three times as long."""
+    return np.asarray(np.sqrt(sum(column**2 for column in steps.T)))
+
+
+def _noise(off: Array, first: int) -> float:
+    """The median distance (m) from the line of the poses before a run, 0 for too few."""
+    before = off[max(first - BEFORE, 0) : first]
+    before = before[np.isfinite(before)]
+    return float(np.median(before)) if len(before) >= BEFORE // 2 else 0.0
