@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import Bag, RawMessage
@@ -50,42 +50,18 @@ class BagSource:
             self._refused.append(str(error))
 
 
-class ReadAhead:
-    """The next messages, sorted by log time within a window of `size` messages.
+def sorted_within(messages: Iterable[RawMessage], size: int) -> Iterator[RawMessage]:
+    """The messages, sorted by log time within a window of `size` messages.
 
     Recordings are roughly in order. A message that comes later than the window allows is returned as soon as it is
     read.
     """
-
-    def __init__(self, messages: Iterator[RawMessage], size: int) -> None:
-        self._messages = messages
-        self._size = size
-        self._read = 0
-        self._window: list[tuple[int, int, RawMessage]] = []
-        self.fill(lambda: True)
-
-    def peek(self) -> RawMessage | None:
-        """The next message; None after the last."""
-        if not self._window:
-            self._pull()
-        return self._window[0][2] if self._window else None
-
-    def pop(self) -> None:
-        """Remove the next message."""
-        heapq.heappop(self._window)
-
-    def fill(self, has_time: Callable[[], bool]) -> None:
-        """Fill half the window; then read on while there is time."""
-        while len(self._window) < self._size and (2 * len(self._window) < self._size or has_time()):
-            if not self._pull():
-                return
-
-    def _pull(self) -> bool:
-        if (message := next(self._messages, None)) is None:
-            return False
-        self._read += 1
-        heapq.heappush(self._window, (message.log_time, self._read, message))
-        return True
+    window: list[tuple[int, int, RawMessage]] = []
+    for number, message in enumerate(messages):
+        heapq.heappush(window, (message.log_time, number, message))
+        if len(window) >= size:
+            yield heapq.heappop(window)[2]
+    yield from (message for _, _, message in sorted(window))
 
 
 def push_topics(present: Collection[str], topics: Topics) -> frozenset[str]:
