@@ -79,11 +79,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.fixture
-def rig(folder: Path) -> Iterator[Rig]:
+@pytest.fixture(scope="module")
+def following(folder: Path) -> Iterator[Rig]:
     """A server whose default model follows from the start."""
     with hosted_server_of([folder / "monday.pushmodel", folder / "blind.pushmodel"], adapt=True) as server:
         yield Rig(server)
+
+
+@pytest.fixture
+def rig(following: Rig) -> Rig:
+    """That server, whose model has followed no push yet."""
+    assert following.command("start", "monday").success and following.command("reset").success
+    return following
 
 
 def test_the_adapted_model_stands_beside_the_deployed_one_and_follows_the_residuals(rig: Rig, folder: Path) -> None:
