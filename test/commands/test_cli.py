@@ -226,17 +226,6 @@ def test_predict_equals_the_model(place: Place, run):
     assert found["interval"]["high"] == pytest.approx(high[0].tolist(), rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("gp", ("--interval: 'conformal'", "gp has 6")), ("analytical", ("--interval", "analytical has 0"))],
-)
-def test_predict_refuses_conformal_intervals_that_the_training_pushes_do_not_give(
-    name: str, words: Sequence[str], place: Place, run
-):
-    outcome = run("predict", place.path(f"{name}.pushmodel"), *PUSH, "--interval", "conformal")
-    assert_one_line(outcome, "predict", words)
-
-
 def test_predict_prints_a_line_for_each_output(place: Place, run):
     lines = run("predict", place.path("gp.pushmodel"), *PUSH, "--covariate", "dwell_time=3").out.splitlines()
     assert [line.split()[0] for line in lines[:3]] == OUTPUTS
@@ -451,6 +440,8 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (changed(TRAIN, "--out", "{tmp}"), ["{tmp}"]),
         (["predict", "{gp}", *PUSH, "--covariate", "humid"], ["--covariate", "'humid'", "NAME=VALUE"]),
         (["predict", "{gp}", *PUSH, "--json", "{tmp}"], ["{tmp}"]),
+        (["predict", "{gp}", *PUSH, "--interval", "conformal"], ["--interval: 'conformal'", "gp has 6"]),
+        (["predict", "{analytical}", *PUSH, "--interval", "conformal"], ["--interval", "analytical has 0"]),
         (["validate", "{gp}", "{tmp}/test.csv"], ["RECORDING", "{tmp}/test.csv", "push_predictor evaluate"]),
         (["report", "validation", "{gp}", "--out", "{tmp}/r"], ["--recording", "both"]),
         (["info", "{tmp}/absent"], ["{tmp}/absent"]),
@@ -467,6 +458,7 @@ def test_failure_is_one_line_that_names_the_file_or_field(
         "junk": str(tmp_path / "junk"),
         "train": place.path("train"),
         "gp": place.path("gp.pushmodel"),
+        "analytical": place.path("analytical.pushmodel"),
     }
     (tmp_path / "tmp").mkdir()
     filled = [word.format(**names) for word in call]
