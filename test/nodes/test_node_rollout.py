@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import ros_harness as harness
 from geometry_msgs.msg import PoseWithCovariance
-from hosted_nodes import hosted_node
+from server_bench import hosted_server_of
 from synthetic import square_pushes
 
 from msg_adapters.slider_poses import fill_rollout_response, steps_from_request, world_start
@@ -47,10 +47,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def ask(folder: Path) -> Iterator[Ask]:
     """A function from changes of the usual request to the response."""
-    domain = harness.free_domain()
-    running = hosted_node("predict_server", domain=domain, params={"models": [str(folder)]})
-    with running, harness.ros_context(domain) as node:
-        client = node.create_client(RolloutPushes, "rollout_pushes")
+    with hosted_server_of([folder]) as server:
+        client = server.node.create_client(RolloutPushes, "rollout_pushes")
         yield lambda **change: harness.call(client, request(**change))
 
 

@@ -14,9 +14,9 @@ import pytest
 import ros_harness as harness
 from action_bench import ActionGoal
 from action_msgs.msg import GoalStatus
-from hosted_nodes import hosted_node
 from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
+from server_bench import hosted_server_of
 from synthetic import square_pushes
 
 from push_predictor.design.batch import Suggested, suggest_pushes
@@ -43,13 +43,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def begin(folder: Path) -> Iterator[Callable[..., ActionGoal]]:
     """A function from the fields of a goal to the goal."""
-    domain = harness.free_domain()
-    params = {"models": [str(folder)], "default_model": "gp"}
-    running = hosted_node("predict_server", domain=domain, params=params)
-    with running, harness.ros_context(domain) as node:
-        client = ActionClient(node, SuggestPushes, "suggest_pushes", feedback_sub_qos_profile=QoSProfile(depth=100))
-        harness.acquaint(node, "push_predictor")
-        yield lambda **fields: ActionGoal(node, client, SuggestPushes.Goal(**{"count": 2, **fields}))
+    with hosted_server_of([folder], default_model="gp") as server:
+        feedback = QoSProfile(depth=100)
+        client = ActionClient(server.node, SuggestPushes, "suggest_pushes", feedback_sub_qos_profile=feedback)
+        harness.acquaint(server.node, "push_predictor")
+        yield lambda **fields: ActionGoal(server.node, client, SuggestPushes.Goal(**{"count": 2, **fields}))
 
 
 @pytest.fixture
