@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterable, Iterator
+from itertools import islice
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import Bag, RawMessage
 from push_predictor.recordings.decoder.sources import POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.topics import Topics
+
+FIRST = 100  # messages, enough to find the earliest log time
 
 
 class BagSource:
@@ -24,7 +27,8 @@ class BagSource:
         self._bag = bag
         self._topics = topics
         self._refused: list[str] = []
-        self.start = min((m.log_time for m in self._head(None)), default=0)
+        first = islice(self._read(None), FIRST)
+        self.start = min((message.log_time for message in first), default=0)
 
     @property
     def damage(self) -> list[str]:
@@ -33,21 +37,14 @@ class BagSource:
 
     def messages(self, start: int) -> Iterator[RawMessage]:
         """Messages of the chosen topics from a log time on, in file order; unreadable parts are added to damage."""
-        try:
-            yield from (m for m in self._bag.messages(self._topics) if m.log_time >= start)
-        except RecordingError as error:
-            self._refuse(error)
+        return (message for message in self._read(self._topics) if message.log_time >= start)
 
-    def _head(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
-        """The first messages, enough to find the earliest log time."""
+    def _read(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
         try:
-            yield from (message for _, message in zip(range(100), self._bag.messages(topics), strict=False))
+            yield from self._bag.messages(topics)
         except RecordingError as error:
-            self._refuse(error)
-
-    def _refuse(self, error: RecordingError) -> None:
-        if str(error) not in self._refused:
-            self._refused.append(str(error))
+            if str(error) not in self._refused:
+                self._refused.append(str(error))
 
 
 def sorted_within(messages: Iterable[RawMessage], size: int) -> Iterator[RawMessage]:

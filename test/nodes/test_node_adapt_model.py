@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.nodes.server import adaptation
 from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import AdaptModel
@@ -82,7 +84,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def following(folder: Path) -> Iterator[Rig]:
     """A server whose default model follows from the start."""
-    with hosted_server_of([folder / "monday.pushmodel", folder / "blind.pushmodel"], adapt=True) as server:
+    served = [folder / "monday.pushmodel", folder / "blind.pushmodel"]
+    with patch.object(adaptation, "QUIET", 0.3), hosted_server_of(served, adapt=True) as server:
         yield Rig(server)
 
 

@@ -393,13 +393,13 @@ def test_introspection_publishes_requests_when_enabled(server):
 
     def quiet() -> bool:
         before = len(events)
-        time.sleep(0.5)
+        time.sleep(0.3)
         return len(events) == before
 
     assert harness.wait_until(quiet)  # events of the last requests arrive after their responses
     events.clear()
     server.push(push)
-    time.sleep(1.0)
+    time.sleep(0.5)
     assert not events
 
 

@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import itertools
 import json
-import pickle
-import signal
+import re
 import statistics
 import struct
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,14 +24,14 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hosted_nodes import hosted_node
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import ReliabilityPolicy
 from replay_bags import RIG, START, push_messages, write_bag
-from ros_harness import REPOSITORY, acquaint, call, free_domain, node_environment, node_process, ros_context, wait_until
+from ros_harness import acquaint, call, free_domain, node_process, ros_context, wait_until
 from rosgraph_msgs.msg import Clock
 
 from msg_adapters.rigs import rig_from_message
 from push_predictor.nodes import push_replay
-from push_predictor.nodes.qos import CLOCK
+from push_predictor.nodes.qos import CLOCK, LATCHED
 from push_predictor.recordings.rig import Rig, rig_from_record
 from push_predictor_interfaces.msg import PushRig, ReplayStatus
 from push_predictor_interfaces.srv import (
@@ -51,21 +48,8 @@ from push_predictor_interfaces.srv import (
     TogglePaused,
 )
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KINDS = {"slider/pose": PoseStamped, "pusher/pose": PoseStamped, "pusher/wrench": WrenchStamped}
-CONTROLS = {
-    Burst: "burst",
-    GetRate: "get_rate",
-    Pause: "pause",
-    Play: "play",
-    PlayNext: "play_next",
-    Resume: "resume",
-    Seek: "seek",
-    SetRate: "set_rate",
-    Stop: "stop",
-    TogglePaused: "toggle_paused",
-    IsPaused: "is_paused",
-}
+CONTROLS = (Burst, GetRate, Pause, Play, PlayNext, Resume, Seek, SetRate, Stop, TogglePaused, IsPaused)
 
 
 class ReplayClient:
@@ -79,7 +63,8 @@ class ReplayClient:
         self.clock: list[int] = []
         self.reports: list[dict[str, str]] = []
         # All clients at once: when one is answered, the replay has discovered the others, and no answer is lost.
-        self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in CONTROLS.items()}
+        names = {kind: re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower() for kind in CONTROLS}
+        self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in names.items()}
         for topic, kind in KINDS.items():
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
         node.create_subscription(PushRig, "rig", lambda m: self.rig.append(rig_from_message(m, "topic")), LATCHED)
@@ -129,26 +114,6 @@ def replay(
             yield process, client
 
 
-@contextmanager
-def listener(output: Path, domain: int) -> Iterator[Callable[[], dict[str, list[bytes]]]]:
-    """A subscriber in its own process; calling the value ends it and returns the messages that it received."""
-    topics = [f"/{topic}=geometry_msgs/msg/{kind.__name__}" for topic, kind in KINDS.items()]
-    command = [sys.executable, str(REPOSITORY / "test/support/replay_listener.py"), str(output), "0", *topics]
-    process = subprocess.Popen(command, cwd=REPOSITORY, env=node_environment(domain))
-
-    def received() -> dict[str, list[bytes]]:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(60.0) == 0
-        found: dict[str, list[bytes]] = pickle.loads(output.read_bytes())
-        return found
-
-    try:
-        yield received
-    finally:
-        process.kill()
-        process.wait()
-
-
 def nanoseconds(time: Time) -> int:
     return int(time.sec) * 10**9 + int(time.nanosec)
 
@@ -181,19 +146,17 @@ def service(client: ReplayClient, kind: Any, **request: Any) -> Any:
 def test_another_process_receives_every_message_once_in_order_and_unchanged(tmp_path: Path) -> None:
     messages = push_messages(4.0)
     bag = write_bag(tmp_path / "pushes.mcap", messages, rig=None)
-    domain = free_domain()
     waiting = {"wait_for_subscribers": 60.0, "play.wait_acked_timeout": 60.0}
     params = {"recording": bag, "play.rate": 100.0, "exit_when_finished": True, **waiting}
-    with (
-        listener(tmp_path / "received", domain) as received,
-        node_process("push_replay", domain=domain, params=params) as process,
-    ):
-        assert process.wait(180.0) == 0, process.text()
-        printed, found = process.text(), received()
-    assert f"published {len(messages)} messages" in printed
-    assert "lost 0, acknowledged yes" in printed
+    with ros_context(domain := free_domain()) as node:
+        client = ReplayClient(node)
+        with node_process("push_replay", domain=domain, params=params) as process:
+            assert process.wait(180.0) == 0, process.text()
+            printed = process.text()
+        assert wait_until(lambda: client.received == len(messages)), printed
+    assert f"published {len(messages)} messages" in printed and "lost 0, acknowledged yes" in printed
     for topic in KINDS:
-        assert found[f"/{topic}"] == recorded(messages, topic), printed
+        assert client.raw[topic] == recorded(messages, topic), printed
 
 
 def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
