@@ -9,6 +9,7 @@ scale of the slider. So the error is drawn twice: at true scale, and magnified M
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +39,7 @@ DIAL = (1.06, 1.14, 1.02, 1.18)  # radii of the band, then of the observed strok
 LABEL_PLACE, LABEL_HEIGHT = 1.4, 0.005  # above the centre in units of the outline's reach; m
 GREY, BLUE, ORANGE = (0.65, 0.65, 0.65, 0.8), (0.3, 0.6, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0)
 WHITE, RED = (0.9, 0.9, 0.9, 0.8), (1.0, 0.35, 0.3, 1.0)
+ORIGIN = np.zeros(2)
 
 
 @dataclass(frozen=True)
@@ -50,47 +52,30 @@ class Sheet:
     frame_id: str
     stamp_ns: int
 
+    def marker(
+        self,
+        name: str,
+        kind: int,
+        size: float | Sequence[float],
+        colour: tuple[float, ...],
+        *,
+        at: Array = ORIGIN,
+        through: Array | Sequence[Array] = (),
+        text: str = "",
+    ) -> Marker:
+        """A marker of a kind. size: m, one for all axes, or of each. at: its place; through: points (n, 2) of it."""
+        marker = Marker(ns=name, id=0, type=kind, action=Marker.ADD, text=text)
+        marker.header.frame_id, marker.header.stamp = self.frame_id, ns_to_stamp(self.stamp_ns)
+        marker.pose.position.x, marker.pose.position.y = float(at[0]), float(at[1])
+        marker.pose.orientation.w = 1.0
+        marker.scale.x, marker.scale.y, marker.scale.z = np.broadcast_to(size, 3).tolist()
+        marker.color = ColorRGBA(**dict(zip("rgba", colour, strict=True)))
+        marker.points = [Point(x=float(x), y=float(y)) for x, y in through]
+        return marker
+
     def line(self, name: str, points: Array, colour: tuple[float, ...], width: float = LINE_WIDTH) -> Marker:
         """A line through points (n, 2)."""
-        marker = self._marker(name, Marker.LINE_STRIP, width, colour)
-        marker.points = [Point(x=float(x), y=float(y)) for x, y in points]
-        return marker
-
-    def ball(self, name: str, centre: Array, colour: tuple[float, ...], diameter: float = CENTRE_DIAMETER) -> Marker:
-        """A sphere."""
-        return self._at(centre, self._marker(name, Marker.SPHERE, diameter, colour))
-
-    def disc(self, name: str, centre: Array, radius: float, colour: tuple[float, ...]) -> Marker:
-        """A flat cylinder."""
-        marker = self._at(centre, self._marker(name, Marker.CYLINDER, 2.0 * radius, colour))
-        marker.scale.z = DISC_HEIGHT
-        return marker
-
-    def arrow(self, name: str, tail: Array, head: Array, colour: tuple[float, ...]) -> Marker:
-        """An arrow from tail to head."""
-        marker = self._marker(name, Marker.ARROW, 0.0, colour)
-        marker.scale.x, marker.scale.y, marker.scale.z = ARROW_WIDTHS
-        marker.points = [Point(x=float(x), y=float(y)) for x, y in (tail, head)]
-        return marker
-
-    def text(self, name: str, place: Array, text: str, colour: tuple[float, ...]) -> Marker:
-        """Text that faces the viewer."""
-        marker = self._at(place, self._marker(name, Marker.TEXT_VIEW_FACING, LABEL_HEIGHT, colour))
-        marker.text = text
-        return marker
-
-    @staticmethod
-    def _at(place: Array, marker: Marker) -> Marker:
-        marker.pose.position.x, marker.pose.position.y = float(place[0]), float(place[1])
-        return marker
-
-    def _marker(self, name: str, kind: int, size: float, colour: tuple[float, ...]) -> Marker:
-        marker = Marker(ns=name, id=0, type=kind, action=Marker.ADD)
-        marker.header.frame_id, marker.header.stamp = self.frame_id, ns_to_stamp(self.stamp_ns)
-        marker.pose.orientation.w = 1.0
-        marker.scale.x = marker.scale.y = marker.scale.z = size
-        marker.color = ColorRGBA(**dict(zip("rgba", colour, strict=True)))
-        return marker
+        return self.marker(name, Marker.LINE_STRIP, width, colour, through=points)
 
 
 def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
@@ -112,14 +97,15 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
         f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {limit:.1f})\n"
         f"ellipse and dial {MAGNIFICATION:.0f} times enlarged"
     )
-    above = start[:2] + np.array([0.0, LABEL_PLACE * reach])
+    above, colour = start[:2] + np.array([0.0, LABEL_PLACE * reach]), RED if distance > limit else WHITE
+    diameter = 2.0 * rig.pusher_radius
     return MarkerArray(
         markers=[
-            sheet.disc("pusher", tip, rig.pusher_radius, WHITE),
-            sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
+            sheet.marker("pusher", Marker.CYLINDER, (diameter, diameter, DISC_HEIGHT), WHITE, at=tip),
+            sheet.marker("push", Marker.ARROW, ARROW_WIDTHS, WHITE, through=(back - ARROW_LENGTH * ahead, back)),
             *prediction_markers(sheet, rig.outline.vertices, start, predicted, covariance[:2, :2], end),
             *magnified_markers(sheet, predicted, covariance, end, reach, heading),
-            sheet.text("label", above, label, RED if distance > limit else WHITE),
+            sheet.marker("label", Marker.TEXT_VIEW_FACING, LABEL_HEIGHT, colour, at=above, text=label),
         ]
     )
 
@@ -164,7 +150,7 @@ def prediction_markers(
         sheet.line("predicted_outline", to_world(closed, predicted_pose), BLUE),
         sheet.line("predicted_ellipse", ellipse, BLUE, FINE_WIDTH),
         sheet.line("observed_outline", to_world(closed, observed_pose), ORANGE),
-        sheet.ball("observed_centre", observed_pose, ORANGE),
+        sheet.marker("observed_centre", Marker.SPHERE, CENTRE_DIAMETER, ORANGE, at=observed_pose),
     ]
 
 
@@ -187,7 +173,7 @@ def magnified_markers(
     stroke = _polar(centre, np.array([begin, end]), np.array([turned, turned]))
     return [
         sheet.line("magnified_ellipse", ellipse, BLUE),
-        sheet.ball("magnified_observed", observed, ORANGE, MAGNIFIED_DIAMETER),
+        sheet.marker("magnified_observed", Marker.SPHERE, MAGNIFIED_DIAMETER, ORANGE, at=observed),
         sheet.line("magnified_heading", _band(centre, low, high, ahead, spread), BLUE),
         sheet.line("magnified_observed_heading", stroke, ORANGE),
     ]

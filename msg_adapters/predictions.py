@@ -157,25 +157,19 @@ def prediction_from_response(response: Any) -> Prediction:
 
 
 def covariates_of_push(request: Any) -> dict[str, float]:
-    """The covariates of a request for one push. Raises RequestError if values and names do not match."""
-    names: Sequence[str] = request.covariate_names
-    _check_covariates(names, request.covariate_values, 1)
-    return dict(zip(names, map(float, request.covariate_values), strict=True))
+    """The covariates of a request for one push. Raises CovariateError if values and names do not match."""
+    return {name: float(value) for name, (value,) in covariates_of_pushes(request, 1).items()}
 
 
 def covariates_of_pushes(request: Any, count: int) -> dict[str, Array]:
-    """The covariates (count,) of each push by name. Raises RequestError if values and names do not match."""
+    """The covariates (count,) of each push by name. Raises CovariateError if values and names do not match."""
     names: Sequence[str] = request.covariate_names
-    _check_covariates(names, request.covariate_values, count)
-    values = np.array(request.covariate_values, dtype=np.float64).reshape(count, len(names))
-    return dict(zip(names, values.T, strict=True))
-
-
-def _check_covariates(names: Sequence[str], values: Sequence[float], count: int) -> None:
+    values = np.array(request.covariate_values, dtype=np.float64)
     if len(values) != count * len(names):
         raise CovariateError("covariate_values length", len(values), f"{count * len(names)}, one per name and push")
     if repeated := {name for name in names if names.count(name) > 1}:
         raise CovariateError("covariate_names", sorted(repeated), "each name once")
+    return dict(zip(names, values.reshape(count, len(names)).T, strict=True))
 
 
 def doubles(values: Array) -> array[float]:

@@ -22,7 +22,7 @@ from time import perf_counter_ns, sleep
 
 from push_predictor.recordings.bag.messages import RawMessage
 from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.replay.clock import SECOND
+from push_predictor.replay.player import SECOND
 from push_predictor.replay.report import Delays, Lateness
 
 PUSH_TOPICS = ("/slider/pose", "/pusher/pose", "/pusher/wrench")

@@ -43,8 +43,7 @@ from push_predictor.recordings.decoder.sources import TF
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.recordings.topics import Topics, load_topics, topics_of
 from push_predictor.recordings.untyped_topics import tell_types
-from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
-from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
+from push_predictor.replay.player import SECOND, PlayerOutput, PlayRange, ReplayPlayer
 from push_predictor.replay.report import ReplayReport
 from push_predictor.replay.source import BagSource, missing_poses, push_topics
 from push_predictor.resources import share_path
@@ -162,11 +161,10 @@ class PushReplay(Node):
         self._publish_report(self._report())
 
     def _make_player(self) -> ReplayPlayer:
-        wall, values = SystemClock(), self._values
-        clock = PlayerClock(wall, values["play.rate"], values["play.start_paused"])
+        names = {"window": "read_ahead_queue_size", "rate": "rate", "paused": "start_paused", "loop": "loop"}
+        options = {option: self._values[f"play.{name}"] for option, name in names.items()}
         output = PlayerOutput(self._prepare, self._settle, self._announce)
-        window, loop, delay = (values[f"play.{name}"] for name in ("read_ahead_queue_size", "loop", "delay"))
-        return ReplayPlayer(self._source, clock, wall, output, window, loop, _ns(delay))
+        return ReplayPlayer(self._source, output, delay=_ns(self._values["play.delay"]), **options)
 
     def _prepare(self, message: RawMessage) -> Callable[[], bool]:
         self._topics.make_room(message.topic)

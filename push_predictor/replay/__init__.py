@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Replay of a recording without ROS: clock, player, range, options, and a report with the lateness.
+"""Replay of a recording without ROS: source, player, and a report with the lateness.
 
 `nodes.push_replay` and its modules add publishers and services; import anything from here.
 """

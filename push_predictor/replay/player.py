@@ -7,16 +7,63 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.clock import PlayerClock, SystemClock
 from push_predictor.replay.report import Lateness
-from push_predictor.replay.source import BagSource, ReadAhead
+from push_predictor.replay.source import BagSource, sorted_within
 
-_READING = 300_000  # ns: nothing is read ahead in less time than this before a deadline
+SECOND = 1_000_000_000
+COARSE = 20_000_000  # ns: a longer sleep waits on a condition that a control notifies; the rest is one plain sleep
+
+
+class SystemClock:
+    """The machine's steady clock, the one of perf_counter; tests replace it by a fake."""
+
+    def now(self) -> int:
+        """Steady time, ns."""
+        return time.perf_counter_ns()
+
+    def sleep(self, duration: int) -> None:
+        """Sleep for so many ns."""
+        time.sleep(duration / SECOND)
+
+    def wait(self, condition: threading.Condition, duration: int | None) -> None:
+        """Wait on a locked condition, at most so many ns."""
+        condition.wait(None if duration is None else duration / SECOND)
+
+
+class PlayerClock:
+    """Recorded time, ns: it runs at a rate, pauses and jumps.
+
+    Deadlines are absolute: they follow from one pair (recorded time, wall time), which only a control replaces.
+    Lateness therefore never accumulates.
+    """
+
+    def __init__(self, wall: SystemClock, rate: float, paused: bool) -> None:
+        self._wall, self.rate, self.paused = wall, rate, paused
+        self._recorded, self._at = 0, wall.now()
+
+    def now(self) -> int:
+        """Recorded time, ns."""
+        return self._recorded if self.paused else self._recorded + round((self._wall.now() - self._at) * self.rate)
+
+    def deadline(self, recorded: int) -> int:
+        """The wall time of a recorded time, ns, if no control comes before."""
+        return self._at + round((recorded - self._recorded) / self.rate)
+
+    def jump(self, recorded: int) -> None:
+        """Continue from another recorded time."""
+        self._recorded, self._at = recorded, self._wall.now()
+
+    def change(self, rate: float | None = None, paused: bool | None = None) -> None:
+        """Run at another rate, stop or go on, from the present recorded time."""
+        self.jump(self.now())
+        self.rate = self.rate if rate is None else rate
+        self.paused = self.paused if paused is None else paused
 
 
 @dataclass(frozen=True)
@@ -59,26 +106,29 @@ class PlayerOutput:
 class ReplayPlayer:
     """Plays a source by a clock. run() takes a thread; all other methods may be called from any thread.
 
-    Messages are never dropped: a late one is published at once. published and failed count messages. lateness: delay
-    up to the call that publishes a message.
+    window: how many messages are read ahead and sorted. delay: ns before each loop. Messages are never dropped: a late
+    one is published at once. published and failed count messages. lateness: delay up to the call that publishes one.
     """
 
     def __init__(
         self,
         source: BagSource,
-        clock: PlayerClock,
-        wall: SystemClock,
         output: PlayerOutput,
         window: int,
-        loop: bool,
-        delay: int,
+        *,
+        rate: float = 1.0,
+        paused: bool = False,
+        loop: bool = False,
+        delay: int = 0,
+        wall: SystemClock = SystemClock(),
     ) -> None:
-        self._source, self._clock, self._wall, self._output = source, clock, wall, output
-        self._size, self._loop, self._delay = window, loop, delay
-        self._lock = threading.RLock()
-        self._changed = threading.Condition(self._lock)
+        self._source, self._output, self._wall = source, output, wall
+        self._window, self._loop, self._delay = window, loop, delay
+        self._clock = PlayerClock(wall, rate, paused)
+        self._changed = threading.Condition(threading.RLock())
         self._waiting, self._counting = 0, threading.Lock()
-        self._ahead: ReadAhead | None = None
+        self._ahead: Iterator[RawMessage] | None = None
+        self._next: RawMessage | None = None
         self._range = PlayRange()
         self._start_at: int | None = None
         self._stopped = self._closed = False
@@ -105,19 +155,15 @@ class ReplayPlayer:
 
     def pause(self) -> None:
         """Pause the playback."""
-        with self._control():
-            self._clock.pause()
-            self._announce()
+        self._set_paused(True)
 
     def resume(self) -> None:
         """Continue the playback."""
-        with self._control():
-            self._clock.resume()
-            self._announce()
+        self._set_paused(False)
 
     def toggle_paused(self) -> None:
         """Pause or resume."""
-        (self.resume if self._clock.paused else self.pause)()
+        self._set_paused(not self.paused)
 
     @property
     def paused(self) -> bool:
@@ -134,7 +180,7 @@ class ReplayPlayer:
         if not (math.isfinite(rate) and rate > 0.0):
             return False
         with self._control():
-            self._clock.set_rate(rate)
+            self._clock.change(rate=rate)
         return True
 
     def play_next(self) -> bool:
@@ -180,7 +226,6 @@ class ReplayPlayer:
         with self._control():
             self._stopped = True
             self._start_at = None
-            self._clock.interrupt()
 
     def close(self) -> None:
         """Make run() return."""
@@ -201,16 +246,21 @@ class ReplayPlayer:
         """How much the next message is overdue, ns of wall time."""
         with self._control():
             head = None if self._clock.paused else self._head()
-            return 0 if head is None else max(0, self._wall.now() - self._clock.deadline(head.log_time))
+            return 0 if head is None else max(0, -self._remaining(head))
 
     @property
     def _busy(self) -> bool:
         return self._ahead is not None or self._start_at is not None or self.state in ("playing", "paused")
 
     def _now(self) -> int | None:
-        if self._ahead is not None and (head := self._head()) is not None:
+        if (head := self._head()) is not None:
             return min(self._clock.now(), head.log_time)
         return self._time
+
+    def _set_paused(self, paused: bool) -> None:
+        with self._control():
+            self._clock.change(paused=paused)
+            self._announce()
 
     @contextmanager
     def _control(self) -> Iterator[None]:
@@ -255,26 +305,30 @@ class ReplayPlayer:
         return not self._stopped and self.published + self.failed > before
 
     def _step(self) -> bool:
-        """Publish the next message, or only sleep; False at the end."""
-        generation = self._clock.generation
+        """Publish the next message, or only wait; False at the end."""
         with self._changed:
             if self._stopped or (head := self._head()) is None:
                 return False
-            deadline = self._clock.deadline(head.log_time)
-            assert self._ahead is not None
-            self._ahead.fill(lambda: deadline - self._wall.now() > _READING)
+            remaining = None if self._clock.paused else self._remaining(head)
+            if remaining is None or remaining > COARSE:
+                self._wall.wait(self._changed, None if remaining is None else remaining - COARSE // 2)
+                return True
         publish = self._output.prepare(head)
-        if self._clock.sleep_until(head.log_time, generation):
-            self._send_at(head, publish, generation, deadline)
+        with self._changed:
+            remaining = self._remaining(head)
+        if remaining > 0:
+            self._wall.sleep(min(remaining, COARSE))
+        with self._changed:
+            # A control may have come meanwhile: another message may be the next, or this one may be due later.
+            late, playing = -self._remaining(head), not (self._stopped or self._clock.paused)
+            if self._head() is head and playing and late >= 0:
+                self._send(head, publish)
+                self.lateness.add(late)
         return True
 
-    def _send_at(self, head: RawMessage, publish: Callable[[], bool], generation: int, deadline: int) -> None:
-        with self._lock:
-            # A control may have come between the sleep and the lock: the head may have changed.
-            if generation == self._clock.generation and not self._stopped:
-                begin = self._wall.now()
-                self._send(head, publish)
-                self.lateness.add(begin - deadline)
+    def _remaining(self, message: RawMessage) -> int:
+        """Wall time until a message is due, ns."""
+        return self._clock.deadline(message.log_time) - self._wall.now()
 
     def _send(self, message: RawMessage, publish: Callable[[], bool]) -> None:
         ahead, self._time = self._ahead, message.log_time
@@ -282,18 +336,22 @@ class ReplayPlayer:
             self.published += 1
         else:
             self.failed += 1
-        assert ahead is not None
-        ahead.pop()
+        if self._ahead is ahead:  # no seek came from within the call
+            self._read()
 
     def _head(self) -> RawMessage | None:
-        head = self._ahead.peek() if self._ahead else None
         last = self._range.last(self._source.start)
-        return None if head is None or (last is not None and head.log_time > last) else head
+        return None if self._next is None or (last is not None and self._next.log_time > last) else self._next
 
     def _go_to(self, time: int) -> None:
-        self._ahead = ReadAhead(self._source.messages(time), self._size)
+        self._ahead = sorted_within(self._source.messages(time), self._window)
+        self._read()
         self._time = time
         self._clock.jump(time)
+
+    def _read(self) -> None:
+        assert self._ahead is not None
+        self._next = next(self._ahead, None)
 
     def _announce(self) -> None:
         if self._ahead is not None:
@@ -301,7 +359,7 @@ class ReplayPlayer:
 
     def _finish(self) -> None:
         with self._changed:
-            self._ahead = None
+            self._ahead = self._next = None
         if not self._closed:
             self._output.settle()
             with self._changed:

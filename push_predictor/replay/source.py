@@ -6,12 +6,15 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from itertools import islice
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.reader import Bag, RawMessage
 from push_predictor.recordings.decoder.sources import POSES, STATIC, STREAMS, sources_of
 from push_predictor.recordings.topics import Topics
+
+FIRST = 100  # messages, enough to find the earliest log time
 
 
 class BagSource:
@@ -24,7 +27,8 @@ class BagSource:
         self._bag = bag
         self._topics = topics
         self._refused: list[str] = []
-        self.start = min((m.log_time for m in self._head(None)), default=0)
+        first = islice(self._read(None), FIRST)
+        self.start = min((message.log_time for message in first), default=0)
 
     @property
     def damage(self) -> list[str]:
@@ -33,59 +37,28 @@ class BagSource:
 
     def messages(self, start: int) -> Iterator[RawMessage]:
         """Messages of the chosen topics from a log time on, in file order; unreadable parts are added to damage."""
+        return (message for message in self._read(self._topics) if message.log_time >= start)
+
+    def _read(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
         try:
-            yield from (m for m in self._bag.messages(self._topics) if m.log_time >= start)
+            yield from self._bag.messages(topics)
         except RecordingError as error:
-            self._refuse(error)
-
-    def _head(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
-        """The first messages, enough to find the earliest log time."""
-        try:
-            yield from (message for _, message in zip(range(100), self._bag.messages(topics), strict=False))
-        except RecordingError as error:
-            self._refuse(error)
-
-    def _refuse(self, error: RecordingError) -> None:
-        if str(error) not in self._refused:
-            self._refused.append(str(error))
+            if str(error) not in self._refused:
+                self._refused.append(str(error))
 
 
-class ReadAhead:
-    """The next messages, sorted by log time within a window of `size` messages.
+def sorted_within(messages: Iterable[RawMessage], size: int) -> Iterator[RawMessage]:
+    """The messages, sorted by log time within a window of `size` messages.
 
     Recordings are roughly in order. A message that comes later than the window allows is returned as soon as it is
     read.
     """
-
-    def __init__(self, messages: Iterator[RawMessage], size: int) -> None:
-        self._messages = messages
-        self._size = size
-        self._read = 0
-        self._window: list[tuple[int, int, RawMessage]] = []
-        self.fill(lambda: True)
-
-    def peek(self) -> RawMessage | None:
-        """The next message; None after the last."""
-        if not self._window:
-            self._pull()
-        return self._window[0][2] if self._window else None
-
-    def pop(self) -> None:
-        """Remove the next message."""
-        heapq.heappop(self._window)
-
-    def fill(self, has_time: Callable[[], bool]) -> None:
-        """Fill half the window; then read on while there is time."""
-        while len(self._window) < self._size and (2 * len(self._window) < self._size or has_time()):
-            if not self._pull():
-                return
-
-    def _pull(self) -> bool:
-        if (message := next(self._messages, None)) is None:
-            return False
-        self._read += 1
-        heapq.heappush(self._window, (message.log_time, self._read, message))
-        return True
+    window: list[tuple[int, int, RawMessage]] = []
+    for number, message in enumerate(messages):
+        heapq.heappush(window, (message.log_time, number, message))
+        if len(window) >= size:
+            yield heapq.heappop(window)[2]
+    yield from (message for _, _, message in sorted(window))
 
 
 def push_topics(present: Collection[str], topics: Topics) -> frozenset[str]:

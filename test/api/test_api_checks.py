@@ -99,16 +99,12 @@ def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel, load
     assert warned(lambda: loaded_only(model, HEXAGON, strict=True)) == []
 
 
-def test_a_learnt_model_of_few_pushes_warns_and_an_analytical_one_does_not(tmp_path: Path) -> None:
+def test_a_learnt_model_of_few_pushes_warns(tmp_path: Path) -> None:
+    """test_data_checks has for which models, and when it is an error."""
     table, rig = load_data([HEXAGON]), read_recording(HEXAGON).rig
-    assert rig is not None
     write_table(tmp_path / "few.csv", table.take(np.isin(table.push_id, table.pushes[:5])))
-    few: dict[str, Any] = {"data": tmp_path / "few.csv", "rig": rig, "watch": quiet}
-    (text,) = warned(lambda: train(**few, kind="gp", mean="zero"))
+    (text,) = warned(lambda: train(tmp_path / "few.csv", rig=rig, watch=quiet, kind="gp", mean="zero"))
     assert text.startswith(f"{tmp_path / 'few.csv'}: The data contain 5 pushes")
-    assert warned(lambda: train(**few, kind="analytical", strict=True)) == []
-    with pytest.raises(RecordingError, match="The data contain 5 pushes"):
-        train(**few, kind="gp", strict=True)
 
 
 def test_a_validation_warns_of_training_pushes_and_of_another_slider(model: PushModel) -> None:

@@ -24,7 +24,6 @@ from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 
-SOUND = REPOSITORY / "bags" / "circle_pu"
 SMALL = REPOSITORY / "bags" / "hexagon_delrin"
 REFUSED, WARNED = "both in mm", "wrench of the wrong sign"  # test_checks makes every mistake
 COMMANDS: dict[str, Callable[[Path, Path, str], list[str | Path]]] = {
@@ -102,13 +101,6 @@ def test_a_warning_is_shown_once_however_often_the_data_are_read(altered: dict[s
     for _ in range(2):
         checks(altered[WARNED], recording, None)
     assert len(shown) == 1
-
-
-def test_a_sound_recording_trains_with_strict_and_without_a_word(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert train(tmp_path, SOUND, "--strict") == 0
-    assert lines_of(capsys) == []
 
 
 def test_a_table_in_millimetres_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

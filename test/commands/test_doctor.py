@@ -60,7 +60,7 @@ def test_hanging_or_crashing_middleware_is_a_finding(
     code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hide(tmp_path, "rclpy", code, monkeypatch)
-    monkeypatch.setattr(doctor_command, "PATIENCE", 2.0 if "sleep" in code else 60.0)
+    monkeypatch.setattr(doctor_command, "PATIENCE", 0.5 if "sleep" in code else 60.0)
     finding = ros_node()
     assert (finding.name, finding.state) == ("ROS", "missing") and words in finding.found and finding.remedy
 

@@ -25,6 +25,7 @@ CALLS = [  # {old} exists; the inputs are absent or damaged, so that nothing is 
     ["train", "{data}", "--kind", "gp", "--out", "{old}"],
     ["train", "{data}", "--kind", "analytical", "--fit", "--out", "{folder}/new.pushmodel"],
     ["suggest", "absent", "--out", "{old}"],
+    ["rig", "--square", "90", "--tip-radius", "0.005", "--surface", "abs", "--out", "{old}"],
     ["validate", "absent", "absent", "--windows", "{old}"],
     ["trace", "absent", "absent", "--report", "{old}"],
     ["trace", "absent", "absent", "--save-model", "{old}"],

@@ -65,55 +65,37 @@ def topic(monkeypatch: pytest.MonkeyPatch) -> Topic:
     return found
 
 
-def test_missing_numbers_of_one_publisher_are_lost_messages(topic: Topic) -> None:
-    topic.send(7, 8, 11, 12)
-    assert topic.lost() == 2
-    topic.look(1)
-    topic.send(14)
-    assert topic.lost() == 3, "also from one look to the next"
-    topic.send(3, 4)
-    assert topic.lost() == 3, "a publisher that begins anew"
+Step = int | tuple[int, ...] | str  # the publishers at a look; numbers of messages; publishers between two looks
 
 
-def test_two_publishers_number_their_messages_independently(topic: Topic) -> None:
-    topic.look(2)
-    topic.send(7, 90, 8, 91, 200)
-    assert topic.lost() == 0
-
-
-def test_no_message_is_lost_when_one_of_two_publishers_leaves(topic: Topic) -> None:
-    topic.look(2)
-    topic.send(7, 8, 3)
-    assert topic.lost() == 0
-    topic.look(1)
-    topic.send(9, 10)
-    assert topic.lost() == 0
-    topic.send(13)
-    assert topic.lost() == 2, "the one that stays is counted again"
-
-
-def test_messages_of_a_publisher_that_has_left_may_still_wait(topic: Topic) -> None:
-    topic.look(2)
-    topic.send(7, 3)
-    topic.look(1)
-    assert topic.lost() == 0
-    topic.send(200, 201, 203)
-    assert topic.lost() == 1
-
-
-def test_no_message_is_lost_when_a_publisher_leaves_between_two_looks(topic: Topic) -> None:
-    topic.look(2)
-    topic.send(7, 3)
-    topic.publishers = 1
-    topic.send(200)
-    assert topic.lost() == 0
-
-
-def test_no_message_is_lost_when_another_publisher_comes_between_two_looks(topic: Topic) -> None:
-    topic.send(7)
-    topic.publishers = 2
-    topic.send(200)
-    assert topic.lost() == 0
+@pytest.mark.parametrize(
+    ("steps", "lost"),
+    [
+        ([(7, 8, 11, 12), 1, (14,)], 3),  # also from one look to the next
+        ([(7, 8), (3, 4)], 0),  # a publisher that begins anew
+        ([2, (7, 90, 8, 91, 200)], 0),  # two number their messages independently
+        ([2, (7, 8, 3), 1, (9, 10), (13,)], 2),  # one has left: the one that stays is counted again
+        ([2, "wait", (7, 3), 1, "take", (200, 201, 203)], 1),  # messages of the one that has left may still wait
+        ([2, "wait", (7, 3), "1", (200,), "take"], 0),  # it leaves between two looks
+        (["wait", (7,), "2", (200,), "take"], 0),  # another one comes between two looks
+    ],
+)
+def test_missing_numbers_are_lost_messages_if_they_are_of_one_publisher(
+    topic: Topic, steps: list[Step], lost: int
+) -> None:
+    waits = False
+    for step in steps:
+        if isinstance(step, tuple):
+            topic.send(*step)
+        elif isinstance(step, int):
+            topic.look(step)
+        elif step in ("wait", "take"):
+            waits = step == "wait"
+        else:
+            topic.publishers = int(step)
+        if not waits:
+            topic.lost()
+    assert topic.lost() == lost
 
 
 def test_a_topic_was_heard_with_its_last_message_or_publisher(topic: Topic, monkeypatch: pytest.MonkeyPatch) -> None:

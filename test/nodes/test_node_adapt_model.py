@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.nodes.server import adaptation
 from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import AdaptModel
@@ -79,11 +81,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.fixture
-def rig(folder: Path) -> Iterator[Rig]:
+@pytest.fixture(scope="module")
+def following(folder: Path) -> Iterator[Rig]:
     """A server whose default model follows from the start."""
-    with hosted_server_of([folder / "monday.pushmodel", folder / "blind.pushmodel"], adapt=True) as server:
+    served = [folder / "monday.pushmodel", folder / "blind.pushmodel"]
+    with patch.object(adaptation, "QUIET", 0.3), hosted_server_of(served, adapt=True) as server:
         yield Rig(server)
+
+
+@pytest.fixture
+def rig(following: Rig) -> Rig:
+    """That server, whose model has followed no push yet."""
+    assert following.command("start", "monday").success and following.command("reset").success
+    return following
 
 
 def test_the_adapted_model_stands_beside_the_deployed_one_and_follows_the_residuals(rig: Rig, folder: Path) -> None:

@@ -13,14 +13,12 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
-from diagnostic_msgs.msg import DiagnosticStatus
 from hosted_nodes import hosted_node
-from lab_bags import LABORATORY, Lab, laboratory, pose_rows, robot_in_tf, short_recording, write_db3
-from ros_harness import free_domain, node_process, ros_context, wait_until
-from sensor_msgs.msg import JointState
+from lab_bags import Lab, pose_rows, robot_in_tf, short_recording
+from ros_harness import free_domain, ros_context
 from standard_interfaces import provide_interfaces
 from turning_sensor import MOUNT, add_tip, add_wrench, measured_at
-from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator, replaying
+from validator_bench import WRITTEN, Status, assert_same_as_offline, hosting_replay, hosting_validator
 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -32,7 +30,6 @@ from push_predictor.recordings.windows.finder import find_windows
 pytestmark = pytest.mark.slow
 
 SECONDS = 6.0  # of the recording: three pushes
-TRANSFORM = "geometry_msgs/msg/TransformStamped"
 FORCE = "/force_torque_sensor_broadcaster/wrench"
 IN_TF = Topics("/tracker/block", "/tf:tip", FORCE, world="world", wrench_frame="ft")
 BASE = normalised(np.array([[-0.6, 0.1, 0.05, 0.1, -0.05, 0.5, 0.8]]))  # of the robot in the world
@@ -81,56 +78,6 @@ def parameters(rig: Rig, output: Path) -> dict[str, object]:
 def tf_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """tf2_msgs for the nodes: installed, or in the folder PUSH_PREDICTOR_TF2_MSGS (scripts/install_tf2_msgs.sh)."""
     provide_interfaces("tf2_msgs", monkeypatch)
-
-
-@pytest.mark.long
-def test_a_vicon_and_a_robot_in_tf_give_the_windows_of_the_recording(tmp_path: Path, tf_installed: None) -> None:
-    """From .db3 with the topics saved next to it, then from MCAP with the topics as parameters; after a wrong type."""
-    rig, domain, output = (
-        recorded(tmp_path, laboratory(short_recording(SECONDS)), LABORATORY),
-        free_domain(),
-        tmp_path / "out",
-    )
-    db3 = write_db3(laboratory(short_recording(SECONDS)), tmp_path / "sqlite", short_recording(SECONDS).rig)
-    save_topics(db3, LABORATORY)
-    saved = save_topics(rig.bag, LABORATORY)
-    with (
-        ros_context(domain) as node,
-        node_process("predict_server", domain=domain, params={"models": [str(rig.model)]}),
-        node_process("push_validator", domain=domain, params=parameters(rig, output)) as process,
-    ):
-        status, replay = Status(node), Status(node, "push_replay")
-        status.wait_for_first()
-        wrong = node.create_publisher(JointState, LABORATORY.slider, 10)
-        message = status.wait_for_message("is of type 'sensor_msgs/msg/JointState', which has no pose")
-        assert f"slider_topic '{LABORATORY.slider}'" in message and status.all[-1][0] == DiagnosticStatus.ERROR
-        node.destroy_publisher(wrong)
-        status.wait_for_server()
-        played = {"rate": 2.0}
-        with replaying(domain, recording=db3, **played):
-            process.wait_for_text(WRITTEN, 60.0)
-            replay.wait_for("data_check", "sound")
-        assert_same_as_offline(output, rig.model, db3)
-        assert_windows_of_the_poses(output)
-        saved.unlink()
-        for path in output.glob("*.json"):
-            path.unlink()
-        named = {f"{name}_topic": getattr(LABORATORY, name) for name in STREAMS}
-        with replaying(domain, recording=rig.bag, **played, **named):
-            assert wait_until(lambda: process.text().count(WRITTEN) == 2), process.text()
-            replay.wait_for("recording", str(rig.bag))
-            replay.wait_for("data_check", "sound")
-        assert f"slider: {LABORATORY.slider}, {TRANSFORM}, reliable, frame_id 'world', 1" in process.text()
-        lines = [line for line in process.text().splitlines() if "JointState" in line]
-        assert len(lines) == 1 and "[ERROR]" in lines[0], "logged once"
-        assert f"pusher: {LABORATORY.pusher}, tf2_msgs/msg/TFMessage, reliable, frame_id 'world'" in process.text()
-        assert f"wrench: {LABORATORY.wrench}, geometry_msgs/msg/WrenchStamped, reliable" in process.text()
-        status.wait_for("coverage check", "limited")  # six seconds
-        assert "only for the part of the domain that was pushed" in status.message
-        assert process.stop() == 0, process.text()
-    save_topics(rig.bag, LABORATORY)
-    assert_same_as_offline(output, rig.model, rig.bag)
-    assert_windows_of_the_poses(output)
 
 
 def test_a_bag_its_validation_and_its_copy_by_the_recorder_have_equal_windows(

@@ -8,23 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from threading import Event
-from time import sleep, thread_time
-from typing import Any
+from time import sleep
 
-import numpy as np
 import pytest
 import ros_harness as harness
 from action_bench import ActionGoal
 from lifecycle_msgs.msg import Transition
 from rclpy.action import ActionClient
-from server_bench import GOOD, hosted_server_of
+from server_bench import hosted_server_of
 from synthetic import square_pushes
 
-from msg_adapters.predictions import PushQuery, query_to_batch_request
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
-from push_predictor.nodes.server import services
 from push_predictor_interfaces.action import SuggestPushes
 from push_predictor_interfaces.srv import PredictPushBatch, RolloutPushes
 
@@ -74,32 +70,3 @@ def test_parameters_lifecycle_loading_and_single_pushes_do_not_wait_for_long_req
         assert harness.wait_until(lambda: all(each.done() for each in waiting))
         assert {each.result().message for each in waiting} == {"the node is inactive"}
         assert suggested.end()[1].message == "the node is inactive"
-
-
-def test_a_batch_of_50_000_keeps_nothing_else_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parameters, lifecycle, cancelling and single predictions, while it is computed: half a minute at the least."""
-    learning, exact = tmp_path / "gp.model", services._check_finite
-
-    def slow(*arguments: Any) -> None:
-        begin = thread_time()
-        while thread_time() - begin < 0.06:
-            exact(*arguments)
-
-    monkeypatch.setattr(services, "CHUNK", 100)
-    save_model(train_model(*square_pushes(60), "gp", name="gp", options=TrainingOptions(mean="zero")), learning)
-    with hosted_server_of([learning]) as server:
-        assert server.push().success
-        monkeypatch.setattr(services, "_check_finite", slow)
-        batch = PushQuery("", np.tile(GOOD, (50_000, 1)), 0.2, {})
-        client = server.node.create_client(PredictPushBatch, "predict_push_batch")
-        assert client.wait_for_service(10.0)
-        suggest = ActionClient(server.node, SuggestPushes, "suggest_pushes")
-        waiting = client.call_async(query_to_batch_request(batch))
-        goal = ActionGoal(server.node, suggest, SuggestPushes.Goal(count=200))
-        assert server.push().success and server.set("trace_alpha", 0.02).successful
-        goal.handle.cancel_goal_async()
-        assert goal.end()[1].error_code == SuggestPushes.Result.CANCELLED
-        assert server.state() == "active" and not waiting.done()
-        assert server.change(Transition.TRANSITION_DEACTIVATE)
-        assert harness.wait_until(waiting.done)
-        assert waiting.result().message == "the node is inactive"

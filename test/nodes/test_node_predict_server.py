@@ -12,14 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import rclpy
 import ros_harness as harness
 from hosted_nodes import hosted_node
 from lifecycle_msgs.msg import Transition
 from rclpy.action import ActionClient
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from server_bench import GOOD, MANY, hosted_server_of, server_of
 from service_msgs.msg import ServiceEventInfo
 from synthetic import square_pushes, square_rig
@@ -37,7 +34,7 @@ from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import Persistence
 from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.action import TraceResidual
-from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
+from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
@@ -132,23 +129,6 @@ def answered(registry, residual):
     return prediction_from_response(response)
 
 
-def test_single_push_is_answered_during_a_long_batch(server):
-    # If pushes waited for the batches, one or two would be answered after each. A busy machine may need another try.
-    assert any(_pushes_during_batches(server) > 5 for _ in range(5))
-
-
-def _pushes_during_batches(server) -> int:
-    """Number of single pushes that are answered before two long batches are."""
-    many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (1000, 1)), 0.2, {}))
-    batches = [server._clients["predict_push_batch"].call_async(many) for _ in range(2)]
-    answered = 0
-    while not all(batch.done() for batch in batches) and answered < 100_000:
-        assert server.push().success
-        answered += 1
-    assert all(len(batch.result().in_domain) == 20_000 for batch in batches)
-    return answered
-
-
 def test_unneeded_covariates_change_nothing(server):
     assert list(server.push(covariates={"temperature": 300.0}).mean) == list(server.push().mean)
     response = server.push(covariates={"temperature": np.nan})
@@ -156,27 +136,17 @@ def test_unneeded_covariates_change_nothing(server):
     assert response.message.startswith("covariate temperature: nan")
 
 
-def test_unexpected_exception_becomes_a_logged_refusal(folder, monkeypatch, capfd):
+def test_unexpected_exception_becomes_a_logged_refusal(folder, monkeypatch):
     def broken(registry, request, response):
         response.mean[0] = 1.0
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setattr(predict_server, "handle_predict_push", broken)
-    arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']"]
-    rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = predict_server.PredictServer()
-        node.start()
-        response = node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response())
-        assert not response.success
-        assert not np.any(response.mean)
-        assert "internal error" in response.message
-        assert "a bug" in response.message
-        assert 'in broken\n    raise ZeroDivisionError("a bug")' in capfd.readouterr().err
-        node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
+    with hosted_server_of([folder / "gp.model"]) as server:
+        response = server.push()
+        assert not response.success and not np.any(response.mean)
+        assert "internal error" in response.message and "a bug" in response.message
+        assert 'in broken\n    raise ZeroDivisionError("a bug")' in server.process.text()
 
 
 def test_first_request_after_start_gets_a_prediction_and_a_signal_ends_the_node(folder):
@@ -368,28 +338,15 @@ def _goal_client(server):
     return accepted
 
 
-def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']", "-p", "default_model:=gp"]
-    rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = predict_server.PredictServer()
-        node.start()
-        wanted = LoadModel.Request(path=str(folder / "analytical.model"), make_default=True)
-        assert node._on_load(wanted, LoadModel.Response()).success
-        assert node.value("default_model") == "analytical"
-        node.trigger_deactivate()
-        node.trigger_cleanup()
-        assert node.value("default_model") == "gp"
-        node.trigger_configure()
-        node.trigger_activate()
-        listed = node._on_list(ListModels.Request(), ListModels.Response())
+def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder):
+    with hosted_server_of([folder / "gp.model"], default_model="gp") as server:
+        assert server.load(folder / "analytical.model", make_default=True).success
+        assert server.list().default_model == "analytical"
+        for step in ("DEACTIVATE", "CLEANUP", "CONFIGURE", "ACTIVATE"):
+            assert server.change(getattr(Transition, f"TRANSITION_{step}"))
+        listed = server.list()
         assert (list(listed.names), listed.default_model) == (["gp"], "gp")
-        assert node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response()).success
-        assert not node.set_parameters([Parameter("default_model", value="analytical")])[0].successful
-        node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
+        assert server.push().success and not server.set("default_model", "analytical").successful
 
 
 def test_what_is_read_only_or_no_model_is_refused_with_a_reason(server):
@@ -436,13 +393,13 @@ def test_introspection_publishes_requests_when_enabled(server):
 
     def quiet() -> bool:
         before = len(events)
-        time.sleep(0.5)
+        time.sleep(0.3)
         return len(events) == before
 
     assert harness.wait_until(quiet)  # events of the last requests arrive after their responses
     events.clear()
     server.push(push)
-    time.sleep(1.0)
+    time.sleep(0.5)
     assert not events
 
 

@@ -39,6 +39,7 @@ from ros_harness import (
 )
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
 from synthetic import rows, square_rig, wrench_rows
 from validator_bench import (
     CIRCLE,
@@ -414,6 +415,7 @@ def named(
         with hosting_replay(domain, *CELL, "-r", "__ns:=/cell", recording=hexagon) as replay:
             replay.wait_for_text("finished: published", 60.0)
         before["status"] = bench.status.wait_for_message("hexagon")
+        assert bench.status.identity == ("/cell/push_validator: validation", "hex")
         before["answer"] = finish(node)
         before["written"] = (output / "validation.json").exists()
         request = LoadModel.Request(path=str(models["analytical"]), name="hexagon")
@@ -583,10 +585,16 @@ def test_unusable_messages_are_counted_by_kind(domain: int, models):
         assert process.stop() == 0, process.text()
 
 
-def test_a_validator_without_samples_states_at_its_end_what_was_missing(domain: int, models):
+def test_a_validator_without_samples_refuses_a_wrong_type_and_states_at_its_end_what_was_missing(domain: int, models):
     with ros_context(domain) as node, hosted(domain, model=models["gp"]) as process:
-        Status(node).wait_for_first()
+        status, wrong = Status(node), node.create_publisher(JointState, "slider/pose", 10)
+        status.wait_for_message("is of type 'sensor_msgs/msg/JointState', which has no pose")
+        assert status.all[-1][0] == DiagnosticStatus.ERROR
+        node.destroy_publisher(wrong)
+        status.wait_for_message("/slider/pose: No publisher.")
         assert process.stop() == 0, process.text()
+        lines = [line for line in process.text().splitlines() if "JointState" in line and "slider:" in line]
+        assert len(lines) == 1 and "[ERROR]" in lines[0], "logged once"
         ending = process.text().rpartition("Nothing was validated. ")[2]
     assert "No rig yet" in ending and "/slider/pose" in ending and "/pusher/pose" in ending
 

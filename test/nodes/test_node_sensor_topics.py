@@ -28,7 +28,7 @@ from visualization_msgs.msg import Marker
 from msg_adapters import ns_to_stamp
 from push_predictor.errors import RequestError
 from push_predictor.nodes.validator import sensor_subscriber
-from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber, check_sources
 from push_predictor.recordings.topics import Topics
 
 pytestmark = pytest.mark.slow
@@ -262,11 +262,20 @@ def test_no_sample_is_lost_when_one_of_two_publishers_leaves(listener: Node, tal
 
 
 @pytest.mark.parametrize(
-    "topics", [Topics(slider="1 pose"), Topics(pusher="~/pose"), Topics(wrench="/tf:tool0"), Topics(slider="/tf:")]
+    ("topics", "named"),
+    [
+        (Topics(slider="1 pose"), "slider_topic: '1 pose'"),
+        (Topics(pusher="~/pose"), "pusher_topic: '~/pose'"),
+        (Topics(wrench="/tf:tool0"), "wrench_topic: '/tf:tool0'"),
+        (Topics(slider="/tf:"), "slider_topic: '/tf:'"),
+        *((Topics(covariates=(name,)), f"covariate_topics: '{name}'") for name in ("~/x", "1 x", "/tf:x", "x.")),
+        (Topics(covariates=("x", "/x")), "covariate_topics: '/x'"),
+    ],
 )
-def test_rejects_what_is_no_source(listener: Node, topics: Topics) -> None:
-    with pytest.raises(RequestError, match=r"_topic: .* is not accepted, give a topic"):
-        SensorSubscriber(listener, topics)
+def test_rejects_what_is_no_source(topics: Topics, named: str) -> None:
+    with pytest.raises(RequestError, match="is not accepted, give") as raised:
+        check_sources(topics)
+    assert str(raised.value).startswith(named)
 
 
 def test_tf_without_its_package_is_refused_by_name(

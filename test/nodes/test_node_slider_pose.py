@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import ros_harness as harness
 import yaml
-from hosted_nodes import hosted_node
+from server_bench import hosted_server_of
 from synthetic import square_pushes
 
 from push_predictor.models.store.model_file import load_model, save_model
@@ -43,11 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextlib.contextmanager
 def server_of(folder: Path, **params: Any) -> Iterator[Any]:
     """Run the server; yield a function from changes of EXAMPLE to the response."""
-    domain = harness.free_domain()
-    params = {"models": [str(folder)], "default_model": "gp", **params}
-    running = hosted_node("predict_server", domain=domain, params=params)
-    with running, harness.ros_context(domain) as node:
-        client = node.create_client(PredictSliderPose, "predict_slider_pose")
+    with hosted_server_of([folder], **params) as server:
+        client = server.node.create_client(PredictSliderPose, "predict_slider_pose")
 
         def ask(**change: Any) -> PredictSliderPose.Response:
             return harness.call(client, filled(PredictSliderPose.Request(), {**yaml.safe_load(EXAMPLE), **change}))

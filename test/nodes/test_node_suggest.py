@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -15,21 +14,16 @@ import pytest
 import ros_harness as harness
 from action_bench import ActionGoal
 from action_msgs.msg import GoalStatus
-from hosted_nodes import hosted_node
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
+from server_bench import hosted_server_of
 from synthetic import square_pushes
 
 from push_predictor.design.batch import Suggested, suggest_pushes
 from push_predictor.design.limits import Limits
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import predict_server
-from push_predictor.nodes.server.services import handle_suggest_pushes
 from push_predictor_interfaces.action import SuggestPushes
-from push_predictor_interfaces.srv import ListModels
 
 Ask = Callable[..., SuggestPushes.Result]
 ARRAYS = ("velocity", "contact", "angle", "duration", "variance_left")
@@ -49,12 +43,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def begin(folder: Path) -> Iterator[Callable[..., ActionGoal]]:
     """A function from the fields of a goal to the goal."""
-    domain = harness.free_domain()
-    params = {"models": [str(folder)], "default_model": "gp"}
-    running = hosted_node("predict_server", domain=domain, params=params)
-    with running, harness.ros_context(domain) as node:
-        client = ActionClient(node, SuggestPushes, "suggest_pushes")
-        yield lambda **fields: ActionGoal(node, client, SuggestPushes.Goal(**{"count": 2, **fields}))
+    with hosted_server_of([folder], default_model="gp") as server:
+        feedback = QoSProfile(depth=100)
+        client = ActionClient(server.node, SuggestPushes, "suggest_pushes", feedback_sub_qos_profile=feedback)
+        harness.acquaint(server.node, "push_predictor")
+        yield lambda **fields: ActionGoal(server.node, client, SuggestPushes.Goal(**{"count": 2, **fields}))
 
 
 @pytest.fixture
@@ -88,37 +81,15 @@ def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> Non
     assert list(response.contact) != list(ask(model="other", seed=2**63, **LIMITS).contact)
 
 
-def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+def test_one_goal_at_a_time_tells_its_progress_until_it_is_cancelled(
+    begin: Callable[..., ActionGoal], ask: Ask
 ) -> None:
-    begun, domain = Event(), harness.free_domain()
-
-    def noted(*arguments: Any) -> None:
-        begun.set()
-        handle_suggest_pushes(*arguments)
-
-    monkeypatch.setattr(predict_server, "handle_suggest_pushes", noted)
-    running = hosted_node("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
-    with running, harness.ros_context(domain) as node:
-        suggest = ActionClient(node, SuggestPushes, "suggest_pushes", feedback_sub_qos_profile=QoSProfile(depth=100))
-        change = node.create_client(ChangeState, "push_predictor/change_state")
-        harness.acquaint(node, "push_predictor")
-        long = ActionGoal(node, suggest, SuggestPushes.Goal(count=200))
-        assert harness.call(node.create_client(ListModels, "list_models"), ListModels.Request()).names == ["gp"]
-        assert begun.wait(harness.START_TIMEOUT) and not long.ended
-        _, refused = ActionGoal(node, suggest, SuggestPushes.Goal(count=1)).end()
-        assert refused.error_code == refused.BUSY and "one at a time" in refused.message
-        assert harness.wait_until(lambda: len(long.feedback) > 1)
-        assert [each.chosen for each in long.feedback] == list(range(1, len(long.feedback) + 1))
-        stop = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
-        assert harness.call(change, stop).success
-        status, result = long.end()
-        assert (status, result.message) == (GoalStatus.STATUS_ABORTED, "the node is inactive")
-        assert not ActionGoal(node, suggest, SuggestPushes.Goal(count=1)).accepted
-
-
-def test_a_cancelled_goal_ends_and_the_next_is_answered(begin: Callable[..., ActionGoal], ask: Ask) -> None:
+    """test_node_long_requests has what else the server does meanwhile."""
     goal = begin(count=200)
+    refused = ask(count=1)
+    assert refused.error_code == refused.BUSY and "one at a time" in refused.message and not goal.ended
+    assert harness.wait_until(lambda: len(goal.feedback) > 1)
+    assert [each.chosen for each in goal.feedback] == list(range(1, len(goal.feedback) + 1))
     goal.handle.cancel_goal_async()
     status, result = goal.end()
     assert (status, result.error_code) == (GoalStatus.STATUS_CANCELED, result.CANCELLED)

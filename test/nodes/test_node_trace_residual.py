@@ -21,16 +21,14 @@ import ros_harness as harness
 from action_msgs.msg import GoalStatus
 from hosted_nodes import hosted_node, refused_start
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from made_up_traces import made_up_trace, pushes, slippery
-from trace_bench import RIG, Server, drifting_folder, server_of
+from trace_bench import RIG, SLIDING, TraceServer, drifting_folder, trace_server_of
 
 from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import predict_server
 from push_predictor.online import trace_process
 from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, Failed, TraceTask, evidence_in
 from push_predictor.recordings.table_file import read_table, write_table
-from push_predictor_interfaces.srv import LoadModel
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +44,9 @@ def drifting(place: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(place: Path) -> Iterator[Server]:
+def server(place: Path) -> Iterator[TraceServer]:
     """One server for all tests that do not change it."""
-    with server_of(place / "deployed.pushmodel") as running:
+    with trace_server_of(place / "deployed.pushmodel") as running:
         yield running
 
 
@@ -57,7 +55,7 @@ def names(folder: Path) -> list[str]:
 
 
 def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
-    server: Server, drifting: Path, tmp_path: Path
+    server: TraceServer, drifting: Path, tmp_path: Path
 ) -> None:
     """Of data in another place than the result, to which a validator is writing."""
     last = (drifting / "pushes.csv").read_text().splitlines()[-1]
@@ -85,16 +83,17 @@ def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
     assert result.extended_model == str(output / EXTENDED) and "its requests need no covariates" in result.message
     assert list(load_model(output / EXTENDED).defaults) == ["elapsed_time"]
 
-    loaded = harness.call(server.load, LoadModel.Request(path=result.extended_model, name="extended"))
-    assert loaded.success, loaded.message
-    early, end = (server.push({"elapsed_time": at}, "extended") for at in (0.0, 1000.2))  # after the last window
-    alone = server.push(model="extended")
+    assert server.load(result.extended_model, "extended").success
+    early, end, alone = (
+        server.push(SLIDING, model="extended", covariates=given)
+        for given in ({"elapsed_time": 0.0}, {"elapsed_time": 1000.2}, {})  # the second after the last window
+    )
     assert early.success and end.success and list(alone.mean) == list(end.mean) != list(early.mean)
     assert server.push().success  # the deployed model still predicts
 
 
 def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
-    server: Server, drifting: Path, tmp_path: Path
+    server: TraceServer, drifting: Path, tmp_path: Path
 ) -> None:
     before = names(drifting)
     first = server.trace(drifting, covariates=[])
@@ -114,7 +113,7 @@ def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
     assert server.push().success
 
 
-def test_killed_process_aborts_the_goal_and_the_server_continues(server: Server, drifting: Path) -> None:
+def test_killed_process_aborts_the_goal_and_the_server_continues(server: TraceServer, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
     os.kill(server.held(), signal.SIGKILL)
@@ -143,7 +142,7 @@ BAD_DATA = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_goal_is_aborted_with_the_reason(case: str, server: Server, drifting: Path) -> None:
+def test_bad_goal_is_aborted_with_the_reason(case: str, server: TraceServer, drifting: Path) -> None:
     given, words = BAD[case]
     request: dict[str, Any] = {"output": drifting, **given}
     change = request.pop("change", lambda folder: None)
@@ -192,10 +191,10 @@ def test_process_of_a_trace_adds_the_warnings_of_the_checks_to_its_message(
 
 def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:
     before = names(drifting)
-    with server_of(place / "deployed.pushmodel", hosted_node, trace_alpha=0.05) as server:
-        harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE)))
+    with trace_server_of(place / "deployed.pushmodel", hosted_node, trace_alpha=0.05) as server:
+        assert server.change(Transition.TRANSITION_DEACTIVATE)
         assert not server.trace(drifting).accepted
-        harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE)))
+        assert server.change(Transition.TRANSITION_ACTIVATE)
         goal = server.trace(drifting, covariates=[])
         worker = server.held()
         assert server.process.stop() == 0

@@ -9,10 +9,13 @@ import sys
 from collections.abc import Callable
 from types import ModuleType, SimpleNamespace
 from typing import Any
+from unittest.mock import create_autospec
 
 import pytest
+from builtin_interfaces.msg import Duration, Time
 
 from push_predictor.nodes.replay_controls import ReplayControls
+from push_predictor.replay.player import PlayRange, ReplayPlayer
 from push_predictor_interfaces import srv
 
 NAMES = {
@@ -30,12 +33,17 @@ NAMES = {
 }
 
 
-class FakeNode:
-    """Records the services that are created on it, and what is logged."""
+class Desk:
+    """Controls of a paused player with nothing left to play, that plays already; what the node logged."""
 
     def __init__(self) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
         self.logged: list[str] = []
+        self.player = create_autospec(ReplayPlayer, instance=True, paused=True, rate=1.0)
+        for refused in ("play", "set_rate", "play_next"):
+            getattr(self.player, refused).return_value = False
+        self.player.burst.return_value = 0
+        ReplayControls(self, self.player)  # type: ignore[arg-type]  # in place of a node
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any], **_: object) -> None:
         self.services[name] = (kind, callback)
@@ -43,67 +51,9 @@ class FakeNode:
     def get_logger(self) -> Any:
         return SimpleNamespace(warning=lambda text, **_: self.logged.append(text), error=self.logged.append)
 
-
-class FakePlayer:
-    """A paused player with three messages left, that plays already."""
-
-    def __init__(self) -> None:
-        self.paused, self.rate, self.left, self.sought = True, 1.0, 3, 0
-
-    def play(self, what: Any) -> bool:
-        return False
-
-    def pause(self) -> None:
-        self.paused = True
-
-    def resume(self) -> None:
-        self.paused = False
-
-    def set_rate(self, rate: float) -> bool:
-        self.rate = rate if rate > 0.0 else self.rate
-        return rate > 0.0
-
-    def play_next(self) -> bool:
-        return self.burst(1) == 1
-
-    def burst(self, count: int) -> int:
-        done = min(count or self.left, self.left) if self.paused else 0
-        self.left -= done
-        return done
-
-    def seek(self, time: int) -> None:
-        if time < 0:
-            raise OSError("disk")
-        self.sought = time
-
-    def toggle_paused(self) -> None:
-        self.paused = not self.paused
-
-    def stop(self) -> None:
-        raise ZeroDivisionError
-
-
-class BrokenPlayer(FakePlayer):
-    """Whatever is asked of it fails."""
-
-    def __getattribute__(self, name: str) -> Any:
-        raise ZeroDivisionError
-
-
-class Desk:
-    """Controls of a fake player, and a function that calls them."""
-
-    def __init__(self, player: FakePlayer | None = None) -> None:
-        self.node, self.player = FakeNode(), player or FakePlayer()
-        ReplayControls(self.node, self.player)  # type: ignore[arg-type]  # fakes
-
     def call(self, name: str, **fields: Any) -> Any:
-        return answer(self.node, name, **fields)
-
-
-def answer(node: FakeNode, name: str, **fields: Any) -> Any:
-    kind, callback = node.services[f"~/{name}"]
-    return callback(kind.Request(**fields), kind.Response())
+        kind, callback = self.services[f"~/{name}"]
+        return callback(kind.Request(**fields), kind.Response())
 
 
 @pytest.fixture(autouse=True)
@@ -112,53 +62,64 @@ def without_rosbag2(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", None)
 
 
-def test_every_service_has_a_private_name() -> None:
-    services = Desk().node.services
-    assert {name: kind for name, (kind, _) in services.items()} == {f"~/{name}": kind for name, kind in NAMES.items()}
-
-
-def test_an_accepted_control_has_no_error() -> None:
+def test_every_service_has_a_private_name_and_asks_the_player() -> None:
     desk = Desk()
-    for response in (desk.call("set_rate", rate=2.0), desk.call("play_next"), desk.call("seek")):
-        assert response.success and response.error_code == response.NONE and response.message == ""
-    assert desk.call("get_rate").rate == 2.0 and desk.call("is_paused").paused
-    for name in ("pause", "resume", "toggle_paused", "is_paused", "get_rate"):
-        assert desk.call(name).error_code == response.NONE and desk.call(name).message == ""
-    desk.call("pause")
-    response = desk.call("burst", num_messages=2)
-    assert response.actually_burst == 2 and response.error_code == response.NONE
+    assert {name: kind for name, (kind, _) in desk.services.items()} == {
+        f"~/{name}": kind for name, kind in NAMES.items()
+    }
+    for accepted in ("play", "set_rate", "play_next"):
+        getattr(desk.player, accepted).return_value = True
+    desk.player.burst.return_value = 2
+    responses = {name: desk.call(name) for name in NAMES}
+    for name, response in responses.items():
+        assert (response.error_code, response.message, getattr(response, "success", True)) == (response.NONE, "", True)
+        assert name in ("is_paused", "get_rate") or getattr(desk.player, name).call_count == 1
+    assert responses["get_rate"].rate == 1.0 and responses["is_paused"].paused
+    assert responses["burst"].actually_burst == 2 and not desk.logged
 
 
-def test_a_bad_rate_is_refused_with_its_reason() -> None:
+def test_requests_are_passed_on() -> None:
     desk = Desk()
-    response = desk.call("set_rate", rate=-1.0)
-    assert not response.success and response.error_code == response.INVALID_REQUEST
-    assert response.message == "rate: -1.0 is not accepted, give a finite number above 0"
-    assert desk.player.rate == 1.0 and desk.node.logged == [response.message]
+    desk.call("set_rate", rate=2.0)
+    desk.call("burst", num_messages=7)
+    desk.call("seek", time=Time(sec=3, nanosec=4))
+    desk.call("play", start_offset=Time(sec=1), playback_duration=Duration(sec=2))
+    player = desk.player
+    player.set_rate.assert_called_with(2.0)
+    player.burst.assert_called_with(7)
+    player.seek.assert_called_with(3_000_000_004)
+    player.play.assert_called_with(PlayRange(10**9, 2 * 10**9, None))
 
 
-def test_a_second_playback_is_busy() -> None:
-    response = Desk().call("play")
-    assert not response.success and response.error_code == response.BUSY and "~/stop" in response.message
-
-
-def test_the_code_of_an_empty_burst_states_whether_pause_would_help() -> None:
+@pytest.mark.parametrize(
+    ("name", "paused", "code", "words"),
+    [
+        ("set_rate", True, "INVALID_REQUEST", "rate: 0.0 is not accepted, give a finite number above 0"),
+        ("play", True, "BUSY", "~/stop"),
+        ("play_next", True, "NOTHING_LEFT", "no message is left"),
+        ("burst", True, "NOTHING_LEFT", "no message is left"),
+        ("play_next", False, "NOT_PAUSED", "~/pause"),
+        ("burst", False, "NOT_PAUSED", "~/pause"),
+    ],
+)
+def test_a_refusal_has_its_reason_and_code(name: str, paused: bool, code: str, words: str) -> None:
     desk = Desk()
-    assert desk.call("burst").actually_burst == 3
-    for response in (desk.call("play_next"), desk.call("burst")):
-        assert response.error_code == response.NOTHING_LEFT
-    desk.call("resume")
-    for response in (desk.call("play_next"), desk.call("burst")):
-        assert response.error_code == response.NOT_PAUSED and "pause" in response.message
+    desk.player.paused = paused
+    response = desk.call(name)
+    assert not getattr(response, "success", False) and response.error_code == getattr(response, code)
+    assert words in response.message and desk.logged == [response.message]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_unforeseen_failure_does_not_leave_the_callback_and_the_client_sees_it(name: str) -> None:
-    desk = Desk(player=BrokenPlayer())
+    desk = Desk()
+    for method in NAMES.keys() - {"is_paused", "get_rate"}:
+        getattr(desk.player, method).side_effect = ZeroDivisionError
+    del desk.player.paused, desk.player.rate
     response = desk.call(name)
-    assert response.error_code == response.INTERNAL_ERROR and "ZeroDivisionError" in response.message
+    error = "AttributeError" if name in ("is_paused", "get_rate") else "ZeroDivisionError"
+    assert response.error_code == response.INTERNAL_ERROR and error in response.message and error in desk.logged[-1]
     assert not any(getattr(response, field, False) for field in ("success", "paused", "rate", "actually_burst"))
-    assert "ZeroDivisionError" in desk.node.logged[-1]
 
 
 # --- rosbag2's types ----------------------------------------------------------------------------------------------
@@ -197,18 +158,12 @@ def rosbag2(without_rosbag2: None, monkeypatch: pytest.MonkeyPatch) -> Desk:
     return Desk()
 
 
-def test_the_services_have_rosbag2s_types_where_these_are_installed(rosbag2: Desk) -> None:
+def test_where_rosbag2s_types_are_installed_the_services_have_them_and_need_only_their_fields(rosbag2: Desk) -> None:
     types = sys.modules["rosbag2_interfaces.srv"]
-    assert all(rosbag2.node.services[f"~/{name}"][0] is getattr(types, kind.__name__) for name, kind in NAMES.items())
-    assert rosbag2.call("set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
-    assert rosbag2.call("burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
-    assert rosbag2.call("play_next").success
-
-
-def test_a_refusal_needs_only_the_fields_of_rosbag2(rosbag2: Desk) -> None:
-    assert rosbag2.call("set_rate", rate=-1.0).success is False
-    assert rosbag2.call("play").success is False
-    rosbag2.call("resume")
+    assert all(rosbag2.services[f"~/{name}"][0] is getattr(types, kind.__name__) for name, kind in NAMES.items())
+    assert rosbag2.call("seek").success is True
+    assert rosbag2.call("set_rate", rate=-1.0).success is rosbag2.call("play").success is False
     assert rosbag2.call("burst").actually_burst == 0
+    rosbag2.player.stop.side_effect = ZeroDivisionError
     rosbag2.call("stop")  # fails, and is logged
-    assert "ZeroDivisionError" in rosbag2.node.logged[-1]
+    assert "ZeroDivisionError" in rosbag2.logged[-1]

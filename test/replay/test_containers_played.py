@@ -17,7 +17,7 @@ from lab_bags import Lab, pose_rows, short_recording, write_db3, write_ros1
 from test_replay_player import Stage
 
 from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.replay.clock import SECOND
+from push_predictor.replay.player import SECOND
 from push_predictor.replay.source import BagSource
 
 POSE, WRENCH = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"

@@ -15,9 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock
-from push_predictor.replay.player import PlayerOutput, PlayRange, ReplayPlayer
-from push_predictor.replay.source import ReadAhead
+from push_predictor.replay.player import COARSE, SECOND, PlayerOutput, PlayRange, ReplayPlayer
 
 START = 1000 * SECOND
 
@@ -47,18 +45,18 @@ class Stage:
         self.prepared: list[tuple[float, RawMessage]] = []
         self.states: list[str] = []
         self.settled: list[int] = []
+        self.slept: list[int] = []
         self.cost = 0
         self.refused: set[RawMessage] = set()
-        self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
         output = PlayerOutput(self.prepare, lambda: self.settled.append(len(self.log)), self.states.append)
         source = options.pop("source", ListSource(messages))
-        settings = {"window": 10, "loop": False, "delay": 0, **options}
-        self.player = ReplayPlayer(source, self.clock, self, output, **settings)
+        self.player = ReplayPlayer(source, output, **{"window": 10, "wall": self, **options})
 
     def now(self) -> int:
         return self.time
 
     def sleep(self, duration: int) -> None:
+        self.slept.append(duration)
         self.time += duration
 
     def wait(self, condition: Condition, duration: int | None) -> None:
@@ -116,6 +114,14 @@ def test_every_message_is_published_at_its_recorded_time_over_the_rate(rate: flo
     assert stage.player.lateness.maximum <= 1
 
 
+def test_publishing_takes_time_and_lateness_does_not_accumulate() -> None:
+    stage = Stage(TEN)
+    stage.cost = round(0.03 * SECOND)
+    stage.run()
+    assert stage.times == TENTHS
+    assert len(stage.slept) == 9 and max(stage.slept) <= COARSE, "the last part of a wait is one plain sleep"
+
+
 def test_slow_publisher_delays_messages_and_loses_none() -> None:
     stage = Stage(TEN)
     stage.cost = round(0.15 * SECOND)
@@ -124,7 +130,7 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     assert stage.player.published == 10
 
 
-def test_each_message_is_prepared_while_the_player_waits_for_it() -> None:
+def test_each_message_is_prepared_before_its_time() -> None:
     stage = Stage(TEN, rate=10.0)
     stage.run()
     assert [m for _, m in stage.prepared] == TEN
@@ -213,6 +219,13 @@ def test_start_paused_waits_for_play_next_and_burst() -> None:
     assert stage.states == ["paused", "finished"]
 
 
+def test_a_seek_keeps_a_pause() -> None:
+    stage = Stage(TEN, paused=True)
+    stage.when_stuck = [("seek", START + 8 * SECOND // 10), ("burst", 0)]
+    assert stage.run() == [0.8, 0.9]
+    assert stage.states == ["paused", "finished"]
+
+
 def test_messages_after_a_burst_keep_their_pace() -> None:
     stage = Stage(TEN, paused=True)
     stage.when_stuck = [("burst", 5), "resume"]
@@ -247,14 +260,14 @@ def test_a_burst_goes_on_where_a_seek_leads_while_it_waits(
         return prepare(message)
 
     output = PlayerOutput(prepare_and_seek, lambda: None, lambda state: None)
-    stage.player = ReplayPlayer(ListSource(TEN), stage.clock, stage, output, 10, False, 0)
+    stage.player = ReplayPlayer(ListSource(TEN), output, 10, paused=True, wall=stage)
     stage.when_stuck = [("burst", 0)]
     assert stage.run() == published
     assert stage.answers[0] == expected
 
 
 def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None:
-    wall, waits, hung, published = SystemClock(), Event(), Event(), []
+    waits, hung, published = Event(), Event(), []
 
     def prepare(message: RawMessage) -> Callable[[], bool]:
         if message is TEN[2] and not hung.is_set():
@@ -263,7 +276,7 @@ def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None
         return lambda: not published.append(message)
 
     output = PlayerOutput(prepare, lambda: None, lambda state: None)
-    player = ReplayPlayer(ListSource(TEN), PlayerClock(wall, 1e6, True), wall, output, 10, False, 0)
+    player = ReplayPlayer(ListSource(TEN), output, 10, rate=1e6, paused=True)
     playing, answers = Thread(target=player.run, daemon=True), []
     playing.start()
     player.play(PlayRange())
@@ -295,21 +308,24 @@ def test_seek_goes_forward_and_back_without_waiting() -> None:
 
 
 @pytest.mark.parametrize(
-    ("control", "published"), [(("seek", START + 8 * SECOND // 10), [0.0, 0.1, 0.8, 0.9]), ("stop", [0.0, 0.1])]
+    ("control", "published"),
+    [(("seek", START + 8 * SECOND // 10), [0.0, 0.1, 0.8, 0.9]), ("stop", [0.0, 0.1]), ("pause", [0.0, 0.1])],
 )
 def test_a_control_just_after_the_sleep_keeps_the_message_back(
     control: str | tuple[str, object], published: list[float]
 ) -> None:
     stage = Stage(TEN)
-    sleep_until = stage.clock.sleep_until
 
-    def sleep_then_control(recorded: int, generation: int) -> bool:
-        slept = sleep_until(recorded, generation)
-        if slept and recorded == TEN[2].log_time:
-            stage.do(control)
-        return slept
+    class Wall:
+        now, wait = stage.now, stage.wait
 
-    stage.clock.sleep_until = sleep_then_control
+        def sleep(self, duration: int) -> None:
+            stage.sleep(duration)
+            if len(stage.log) == 2 and len(stage.slept) == 2:
+                stage.do(control)
+
+    output = PlayerOutput(stage.prepare, lambda: None, lambda state: None)
+    stage.player = ReplayPlayer(ListSource(TEN), output, 10, wall=Wall())
     assert stage.run() == published
 
 
@@ -376,19 +392,17 @@ def test_clock_never_passes_the_next_message() -> None:
     assert seen == [*(m.log_time for m in TEN), TEN[-1].log_time]
 
 
-def test_half_the_window_is_read_without_time_and_all_of_it_with_time() -> None:
-    read: list[RawMessage] = []
-
-    def source() -> Iterator[RawMessage]:
-        for one in TEN:
-            read.append(one)
-            yield one
-
-    ahead = ReadAhead(source(), 4)
-    assert len(read) == 4
-    for _ in range(3):
-        ahead.pop()
-    ahead.fill(lambda: False)
-    assert len(read) == 5
-    ahead.fill(lambda: True)
-    assert len(read) == 7
+@pytest.mark.parametrize("options", [{}, {"delay": 60 * SECOND}])
+def test_the_end_wakes_a_long_sleep(options: dict[str, int]) -> None:
+    published: list[RawMessage] = []
+    output = PlayerOutput(lambda m: lambda: not published.append(m), lambda: None, lambda state: None)
+    player = ReplayPlayer(ListSource([message(0.0), message(60.0)]), output, 10, **options)
+    playing = Thread(target=player.run, daemon=True)
+    playing.start()
+    player.play(PlayRange())
+    while not (published or options):
+        sleep(0.01)
+    sleep(0.05)
+    player.close()
+    playing.join(10.0)
+    assert not playing.is_alive() and len(published) == (0 if options else 1)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import runpy
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -20,7 +19,7 @@ import pytest
 
 NAMES = {
     "launch": ("LaunchContext", "LaunchDescription"),
-    "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable", "Shutdown", "TimerAction"),
+    "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable", "Shutdown"),
     "launch_ros": (),
     "launch_ros.actions": ("Node",),
 }
@@ -52,20 +51,12 @@ def actions(launch_file: dict[str, Any]) -> list[FakeAction]:
     return list(launch_file["generate_launch_description"]().args[0])
 
 
-def started(launch_file: dict[str, Any], given: dict[str, str], words: Sequence[str] = ()) -> list[FakeAction]:
-    """The actions that its function returns for these launch arguments; words: of the command line."""
+def started(launch_file: dict[str, Any], given: dict[str, str]) -> list[FakeAction]:
+    """The actions that its function returns for these launch arguments."""
     (opaque,) = (action for action in actions(launch_file) if type(action).__name__ == "OpaqueFunction")
     defaults = {name: value for name, value, _ in launch_file["ARGUMENTS"]}
-    context = SimpleNamespace(launch_configurations={**defaults, **given}, argv=list(words))
+    context = SimpleNamespace(launch_configurations={**defaults, **given})
     return list(opaque.kwargs["function"](context))
-
-
-def install_fake_rviz(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A prefix that contains a package rviz2 with its executable."""
-    for folder in ("share/ament_index/resource_index/packages", "lib/rviz2"):
-        (prefix / folder).mkdir(parents=True)
-        (prefix / folder / "rviz2").touch()
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
 
 
 def _fake_action(name: str) -> type[FakeAction]:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 
 import numpy as np
 import ros_harness as harness
@@ -95,27 +96,17 @@ class Server:
 
 
 @contextlib.contextmanager
-def server_of(models, **params):
-    """A server in a process of its own."""
-    with _server_of(harness.node_process, models, params) as server:
-        yield server
-
-
-@contextlib.contextmanager
-def hosted_server_of(models, **params):
-    """A server in this process, which starts and ends in a tenth of the processor time."""
-    with _server_of(hosted_node, models, params) as server:
-        yield server
-
-
-@contextlib.contextmanager
-def _server_of(start, models, params):
+def server_of(models, start=harness.node_process, client=Server, **params):
+    """A server in a process of its own, and a client of it."""
     params = {"models": [str(path) for path in models], "diagnostics_period": 0.2, **params}
     with (
         harness.reserved_domain() as domain,
         start("predict_server", domain=domain, params=params) as process,
         harness.ros_context(domain) as node,
     ):
-        server = Server(process, node)
+        server = client(process, node)
         server.state()  # the node answers
         yield server
+
+
+hosted_server_of = functools.partial(server_of, start=hosted_node)  # which starts and ends in a tenth of the time

@@ -5,34 +5,30 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import ros_harness as harness
 from action_bench import ActionGoal
-from lifecycle_msgs.srv import ChangeState
 from made_up_traces import pushes, slippery
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from server_bench import Server, server_of
 from synthetic import square_rig
 
-from msg_adapters.predictions import query_to_request
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor_interfaces.action import TraceResidual
-from push_predictor_interfaces.srv import LoadModel, PredictPush
 
 DRIVERS = ["elapsed_time"]
+SLIDING = [0.02, 0.1, 0.8]  # a push along the side, where contact friction matters
 RIG = "pushes.rig.yaml"
 
 
@@ -51,27 +47,19 @@ def drifting_folder(folder: Path) -> Path:
     return folder
 
 
-class Server:
-    """A running predict_server, and a client of its action."""
+class TraceServer(Server):
+    """A running predict_server, and a client of it and of its action."""
 
-    def __init__(self, process: harness.NodeProcess, node: Node, domain: int) -> None:
-        self.process, self.node, self.domain = process, node, domain
-        self.load = node.create_client(LoadModel, "load_model")
-        self.change = node.create_client(ChangeState, "push_predictor/change_state")
-        self._action = ActionClient(
-            node, TraceResidual, "trace_residual", feedback_sub_qos_profile=QoSProfile(depth=100)
-        )
-        self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
+    def __init__(self, process: harness.NodeProcess, node: Node) -> None:
+        feedback = QoSProfile(depth=100)
+        self._action = ActionClient(node, TraceResidual, "trace_residual", feedback_sub_qos_profile=feedback)
+        super().__init__(process, node)
 
     def trace(
         self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "", data: Path | str = ""
     ) -> Goal:
         goal = TraceResidual.Goal(model=model, covariates=covariates, output=str(output), data=str(data))
         return Goal(self.node, self._action, goal)
-
-    def push(self, covariates: dict[str, float] | None = None, model: str = "") -> PredictPush.Response:
-        """A push that slides along the side, so that contact friction matters."""
-        return harness.call(self.predict, query_to_request(model, np.array([0.02, 0.1, 0.8]), 0.2, covariates))
 
     def workers(self) -> list[int]:
         """The processes of traces: children of the node that run what multiprocessing starts."""
@@ -95,15 +83,6 @@ class Goal(ActionGoal):
         return [(each.stage, each.progress) for each in self.feedback]
 
 
-@contextlib.contextmanager
-def server_of(model: Path, start: Any = partial(harness.node_process, coarse=True), **params: Any) -> Iterator[Server]:
+def trace_server_of(model: Path, start: Any = partial(harness.node_process, coarse=True), **params: Any) -> Any:
     """A running server; start: `hosted_node` for one in this process."""
-    params = {"models": [str(model)], **params}
-    with (
-        harness.reserved_domain() as domain,
-        start("predict_server", domain=domain, params=params) as process,
-        harness.ros_context(domain) as node,
-    ):
-        server = Server(process, node, domain)
-        assert server.push().success
-        yield server
+    return server_of([model], start, TraceServer, **params)
