@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from likelihoods import log_marginal_likelihood
@@ -19,6 +21,8 @@ from push_predictor.models.gaussian_process.gp import (
     log_likelihood_and_gradient,
     some_rows,
 )
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.types import Array
 
 PARAMETERS = GpParameters(np.array([0.2, -0.3]), 0.1, -1.2)
@@ -65,14 +69,6 @@ def test_gradient_equals_finite_differences(n: int) -> None:
         assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
 
 
-def test_fit_recovers_noise_and_relevant_input() -> None:
-    inputs, outputs = rows(300, noise=0.2)
-    fitted = fit_gp(inputs, outputs)
-    assert np.exp(fitted.parameters.log_noise_sd) == pytest.approx(0.2, rel=0.15)
-    relevant, irrelevant = fitted.parameters.log_lengthscales
-    assert irrelevant > relevant + 2.0
-
-
 def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
     fitted = fit_gp(*rows(100))
     _, gradient = log_likelihood_and_gradient(fitted.inputs, fitted.outputs, fitted.parameters)
@@ -80,6 +76,7 @@ def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
     assert np.abs(gradient[inside]).max() < 0.05
 
 
+@pytest.mark.parametrize("fit", [fit_gp, fit_vhgp, fit_sparse_vhgp])
 @pytest.mark.parametrize(
     ("inputs", "outputs", "complaint"),
     [
@@ -90,9 +87,9 @@ def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
         (np.full((5, 2), np.inf), np.zeros(5), "infinity"),
     ],
 )
-def test_rejects_unusable_rows(inputs: Array, outputs: Array, complaint: str) -> None:
+def test_unusable_rows_are_refused(fit: Callable[..., object], inputs: Array, outputs: Array, complaint: str) -> None:
     with pytest.raises(TrainingError, match=complaint):
-        fit_gp(inputs, outputs)
+        fit(inputs, outputs)
 
 
 def test_jumps_are_learnt_from_part_of_the_rows() -> None:
