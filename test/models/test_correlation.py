@@ -26,7 +26,6 @@ from push_predictor.models.predictors.correlation import (
     LONGEST,
     Correlation,
     correlated,
-    correlations,
     covariances,
     fit_correlation,
 )
@@ -262,7 +261,3 @@ def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
     assert process == pytest.approx(correlated(sd, correlation.held_out(correlation.features, block)), rel=1e-9)
     assert np.all(np.linalg.eigvalsh(total - process) > 0.0)
     assert np.abs(total[:, 0, 2]).max() > 0.0
-
-
-def test_sums_of_no_rows_give_independence() -> None:
-    assert np.array_equal(correlations(np.zeros((2, 6)), 3.0), np.broadcast_to(np.eye(3), (2, 3, 3)))

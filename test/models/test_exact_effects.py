@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting_models import DRIFT, extended, pushes, slippery
+from drifting_models import DRIFT, pushes, slippery
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -21,7 +21,6 @@ from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellips
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, mechanism_named
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
@@ -62,13 +61,6 @@ def size_of(shift: np.ndarray) -> float:
 
 
 # --- the shift -----------------------------------------------------------------------------------------------------
-
-
-def test_a_large_change_of_friction_shifts_as_a_model_with_that_friction() -> None:
-    push = made(100)
-    slick, rough = (square(mu).displacement(push.inputs, push.duration) for mu in (0.25, 0.75))
-    shift = joint_shift(square(0.25), [effect("contact_friction", 0.5)], push)
-    assert size_of(shift - (rough - slick)) < 5e-3 * size_of(rough - slick)
 
 
 def test_two_effects_together_are_both_changes_at_once() -> None:
@@ -157,44 +149,7 @@ def test_a_parameter_stays_within_its_plausible_range() -> None:
     np.testing.assert_array_equal(far, end)
 
 
-def test_a_spread_pressure_is_a_larger_surface() -> None:
-    push, on = made(60), square()
-    wide = square(length=np.exp(0.3))
-    expected = wide.displacement(push.inputs, push.duration) - on.displacement(push.inputs, push.duration)
-    assert size_of(joint_shift(on, [effect("pressure_spread", 0.3)], push) - expected) < 5e-3 * size_of(expected)
-    rougher = [effect("friction_gradient", 8.0, 0.0)]  # shifts the centre by the mean square of the pressure
-    slope = joint_shift(on, rougher, push)
-    both = joint_shift(on, [*rougher, effect("pressure_spread", 0.3)], push)
-    assert size_of(both - expected - joint_shift(wide, rougher, push)) < 0.02 * size_of(slope)
-
-
-def test_the_heading_of_the_slider_turns_effects_of_the_table() -> None:
-    """A grain along world x under a slider that is turned by a quarter is a grain along y under one that is not."""
-    push, on = made(60, duration=0.004), square()  # so short that the slider hardly turns
-    ahead, aside = (replace(push, covariates={"slider_heading": np.full(60, turn)}) for turn in (0.0, 0.5 * np.pi))
-    one = joint_shift(on, [effect("anisotropic_friction", 0.4, 0.0)], ahead)
-    other = joint_shift(on, [effect("anisotropic_friction", -0.4, 0.0)], aside)
-    np.testing.assert_allclose(one, other, atol=1e-9)
-    body = joint_shift(on, [effect("body_anisotropy", 0.4, 0.0)], ahead)
-    assert size_of(one - body) < 0.02 * size_of(body)
-
-
 # --- in a model ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("name", "size"), [("contact_friction", [0.3]), ("pressure_spread", [0.2]),
-                                            ("tilted_surface", [0.1, -0.1])])  # fmt: skip
-def test_a_push_alone_gets_the_same_shift_as_among_others(name: str, size: list[float]) -> None:
-    model = extended(train_model(pushes(20), square_rig(), "analytical", name="m"), effect(name, *size))
-    table = pushes(6, 3)
-    push = Push.of(table)
-    among = model.predictor.moments(push)
-    scalar = tabulate(model)
-    for k in range(len(table)):
-        covariates = {key: column[k : k + 1] for key, column in table.covariates.items()}
-        alone = scalar.predict_rows(table.inputs[k : k + 1], table.duration[k : k + 1], covariates)
-        np.testing.assert_allclose(alone.mean[0], among.mean[k], atol=2e-7)
-        np.testing.assert_allclose(alone.covariance[0], among.covariance[k], rtol=0.02, atol=1e-9)
 
 
 # --- estimation ----------------------------------------------------------------------------------------------------

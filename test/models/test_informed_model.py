@@ -14,8 +14,6 @@ from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models import train, train_learnt
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process import vhgp
 from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GpParameters, fit_gp
@@ -24,11 +22,8 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, bes
 from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Push
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
@@ -155,39 +150,6 @@ def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(inform
         assert not informed.predict_rows(later.inputs, later.duration).in_domain.any()
 
 
-def test_covariates_of_the_mechanics_bound_the_domain_of_the_table_too() -> None:
-    table = pushes(40, 1)
-    heading = np.linspace(0.0, 0.5, len(table))
-    mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.15, "grain_x": 0.3})
-    options = TrainingOptions(about=mechanics)
-    model = train_model(replace(table, covariates={"push_heading": heading}), RIG, "gp", name="m", options=options)
-    served, given = tabulate(model), np.array([0.2, 2.0])
-    assert served.tabulated, served.how
-    for predicts in (model, served):
-        both = predicts.predict_rows(table.inputs[:2], table.duration[:2], {"push_heading": given})
-        assert both.in_domain.tolist() == [True, False]
-        for k in range(2):
-            rows = slice(k, k + 1)
-            one = predicts.predict_rows(table.inputs[rows], table.duration[rows], {"push_heading": given[rows]})
-            assert one.in_domain.tolist() == [k == 0]
-
-
-def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel, tmp_path: Path) -> None:
-    basis = DriverBasis("constant", (), (), (), 0.0, ())
-    effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
-    base, table = learnt(with_function), pushes(5, 11)
-    extended = replace(with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0])))
-    expected = extended.predict_rows(table.inputs, table.duration)
-    shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))
-    alone = with_function.predict_rows(table.inputs, table.duration)
-    np.testing.assert_allclose(expected.mean, alone.mean + shift, rtol=1e-9)
-    save_model(extended, tmp_path / "m")
-    for found in (load_model(tmp_path / "m"), tabulate(extended)):
-        again = found.predict_rows(table.inputs, table.duration)
-        assert np.max(np.abs(again.mean - expected.mean) / expected.std) < 1e-3
-        np.testing.assert_allclose(again.std, expected.std, rtol=5e-3)
-
-
 def test_it_needs_no_covariate_that_requests_lack() -> None:
     table = pushes(12, 13)
     headed = replace(table, covariates={"push_heading": np.linspace(-3.0, 3.0, 12)})
@@ -231,13 +193,6 @@ def test_a_vhgp_is_retrained_from_its_own_hyperparameters_where_it_is_near(monke
         assert start.log_signal_sd == found.log_signal_sd
         noise = np.exp(found.noise_mean + 0.5 * (found.noise.variance + found.nugget))  # the mean of a log-normal
         assert start.noise_variance == pytest.approx(noise)
-
-
-def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:
-    rows = with_function.training
-    held, seen = with_function.held_out_moments(), with_function.predict_rows(rows.inputs, rows.duration)
-    assert np.all(np.diagonal(held.covariance - seen.covariance, axis1=1, axis2=2)[:, 0] > 0.0)
-    assert np.abs(held.mean - seen.mean).max() < 3e-3
 
 
 def test_constant_noise_follows_the_tails_of_the_residuals() -> None:

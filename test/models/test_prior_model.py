@@ -204,21 +204,6 @@ def test_mirrored_pushes_get_mirrored_predictions(untrained: PushModel) -> None:
     np.testing.assert_allclose(other.covariance, one.covariance * np.outer(sign, sign), rtol=1e-3, atol=1e-10)
 
 
-def test_sides_of_a_square_differ_by_much_less_than_the_width(untrained: PushModel) -> None:
-    inputs = np.array([[0.02, 0.1 + 0.25 * k, 0.3] for k in range(4)])
-    found = untrained.predict_rows(inputs, np.full(4, 0.2))
-    assert np.all(np.ptp(found.mean, axis=0) < 0.2 * found.std.min(axis=0))
-
-
-def test_twice_the_path_moves_the_slider_further_and_is_less_certain(untrained: PushModel) -> None:
-    near, far = (
-        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).mean,
-        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).std,
-    )
-    assert 1.7 < near[1, 0] / near[0, 0] < 2.3
-    assert np.all(far[1] > 1.5 * far[0])
-
-
 def test_the_same_seed_gives_the_same_model(untrained: PushModel) -> None:
     again = train_model(empty_table(), RIG, "prior", name="again")
     np.testing.assert_array_equal(predictor_of(again).draws, predictor_of(untrained).draws)
@@ -269,10 +254,6 @@ def test_priors_use_what_the_rig_knows() -> None:
     assert predictor_of(on_points).fitted.values["contact_friction"] == 0.6
     assert abs(predictor_of(on_points).draws[:, 0].mean() - 0.6) < 0.02
     assert "rim_exponent" not in predictor_of(on_points).fitted.values
-
-
-def test_needs_no_covariates(untrained: PushModel, after_ten: PushModel) -> None:
-    assert untrained.needs == after_ten.needs == ()
 
 
 def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel, after_ten: PushModel) -> None:

@@ -23,7 +23,6 @@ from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
@@ -162,13 +161,6 @@ def test_table_is_accurate(shape: str, kind: str) -> None:
     assert_true_to_the_model(tabulated(shape, kind))
 
 
-def test_simulated_correlation_is_strong_and_of_both_signs() -> None:
-    answers = tabulated("square", "coupled vhgp")
-    covariance = of(answers, inside(answers.model, 200)).process_covariance
-    correlation = covariance[:, 0, 2] / np.sqrt(covariance[:, 0, 0] * covariance[:, 2, 2])
-    assert correlation.max() > 0.7 and correlation.min() < -0.7
-
-
 def test_independent_outputs_have_no_covariance() -> None:
     for count in (1, 50):
         table = of(tabulated("square", "vhgp"), inside(tabulated("square", "vhgp").model, count))
@@ -246,21 +238,6 @@ def test_single_push_gets_the_prediction_it_has_in_a_batch(
     assert_close(alone, among, 10, precision)
 
 
-@given(fraction=st.floats(0.02, 0.95), angle=st.floats(-0.9, 0.9))
-def test_sides_that_symmetry_folds_share_predictions(fraction: float, angle: float) -> None:
-    for shape, order, kind in (("square", 4, "gp"), ("square", 4, "coupled vhgp"), ("ellipse", 2, "coupled vhgp")):
-        turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
-        prediction = of(tabulated(shape, kind), turned)
-        for k in range(1, order):
-            assert_close(of(tabulated(shape, kind), turned[k : k + 1]), prediction, 0, 1e-9)
-
-
-def test_contact_does_not_matter_on_a_circle() -> None:
-    contact = np.linspace(0.0, 0.999, 7)
-    inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
-    assert np.ptp(of(tabulated("circle", "gp"), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
-
-
 @pytest.mark.parametrize(("shape", "kind"), KNOWN)
 def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: str, kind: str) -> None:
     answers = tabulated(shape, kind)
@@ -326,14 +303,6 @@ def test_boundary_of_the_domain_is_inside() -> None:
         assert table.mean == pytest.approx(exact.mean, abs=1e-5)
 
 
-def test_covariances_are_symmetric_and_positive_definite() -> None:
-    for shape, kind in EACH:
-        prediction = of(tabulated(shape, kind), inside(tabulated(shape, kind).model, 300))
-        assert np.array_equal(prediction.covariance, prediction.covariance.transpose(0, 2, 1))
-        assert np.all(np.linalg.eigvalsh(prediction.process_covariance) > 0.0)
-        assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > 0.0)
-
-
 def test_no_rows_give_no_predictions() -> None:
     prediction = of(tabulated("square", "vhgp"), np.empty((0, 3)))
     assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
@@ -369,36 +338,3 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 # --- services ------------------------------------------------------------------------------------
-
-
-def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> None:
-    pytest.importorskip("rclpy")
-    from msg_adapters.predictions import (
-        PushQuery,
-        prediction_from_response,
-        query_to_batch_request,
-        query_to_request,
-    )
-    from push_predictor.models.store.model_registry import ModelRegistry
-    from push_predictor.nodes.server.services import (
-        handle_load_model,
-        handle_predict_push,
-        handle_predict_push_batch,
-    )
-    from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
-
-    model = coupled(trained_widely("square", "vhgp"))
-    save_model(model, tmp_path / "m.model")
-    registry, loaded = ModelRegistry(), LoadModel.Response()
-    handle_load_model(registry, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
-    expected = tabulated("square", "coupled vhgp")
-    assert expected.tabulated and expected.how in loaded.message and registry.answering == [f"a vhgp: {expected.how}"]
-    inputs = inside(model, 40)
-    inputs[0, 0] = 0.2  # outside the domain
-    together, batch = of(expected, inputs), PredictPushBatch.Response()
-    handle_predict_push_batch(lambda: None, registry, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
-    for k, push in enumerate(inputs):
-        handle_predict_push(registry, query_to_request("", push, 0.2), single := PredictPush.Response())
-        assert_close(prediction_from_response(single), together, k, 1e-12 if k else 1e-8)
-    for name in FIELDS:
-        assert np.array_equal(getattr(prediction_from_response(batch), name), getattr(together, name))

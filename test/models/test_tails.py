@@ -324,11 +324,6 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
     assert own is not None and np.prod(tails_of(model).factor) > 1.01 * np.prod(own.factor)
 
 
-def test_training_without_tails_takes_windows_for_independent() -> None:
-    options = TrainingOptions(tails=False, mean="zero")
-    assert train_model(shared_errors(12, 0), square_rig(), "gp", name="a", options=options).predictor.tails is None
-
-
 def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
     model, test = trained("gp"), shared_errors(20, 3)
     table, answer = tabulate(model), predicted(model, test)
