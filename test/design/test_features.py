@@ -93,15 +93,6 @@ def test_pushes_far_apart_share_little_and_equal_pushes_all() -> None:
     np.testing.assert_allclose(covariance[:40, :40], covariance[:40, 40:], atol=2 * NEGLIGIBLE)
 
 
-def test_a_sparse_model_has_nearly_the_features_of_a_dense_one() -> None:
-    table = noisy_pushes(75)
-    push = some()
-    dense, sparse = (features_of(trained("vhgp", table, inducing=m), push) for m in (None, 60))
-    np.testing.assert_allclose(
-        np.sum(sparse.values**2, axis=2).mean(axis=0), np.sum(dense.values**2, axis=2).mean(axis=0), rtol=0.3
-    )
-
-
 @pytest.mark.long
 def test_a_prior_model_has_about_the_variance_of_its_draws() -> None:
     model, push = trained("prior", empty_table()), some()

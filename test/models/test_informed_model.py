@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,11 +18,9 @@ from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GpParameters, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
-from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
@@ -83,20 +80,6 @@ def test_without_a_function_to_learn_the_residual_is_constant_noise(informed: Pu
 def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> None:
     assert not isinstance(learnt(with_function).regressions[0], ConstantNoise)
     assert replace(learnt(with_function), tails=None).gaussian
-
-
-@pytest.mark.long
-def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: PushModel, tmp_path: Path) -> None:
-    rows, later = with_function.training, pushes(50, 6)
-    sparse, dense = trained(rows, inducing=30), trained(rows)
-    assert isinstance(learnt(sparse).regressions[0], SparseVHGP) and learnt(sparse).mean is not None
-    found, wanted = (model.predict_rows(later.inputs, later.duration) for model in (sparse, dense))
-    sd = np.sqrt(np.diagonal(wanted.covariance, axis1=1, axis2=2))
-    assert np.max(np.abs(found.mean - wanted.mean) / sd) < 0.5
-    save_model(sparse, tmp_path / "sparse.pushmodel")
-    again = load_model(tmp_path / "sparse.pushmodel").predict_rows(later.inputs, later.duration)
-    np.testing.assert_allclose(again.mean, found.mean, rtol=0.0, atol=1e-9)
-    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-6)
 
 
 def test_a_tie_goes_to_mechanics_and_so_does_what_pushes_cannot_decide() -> None:

@@ -63,13 +63,6 @@ def test_straight_way_takes_the_fewest_pushes():
     assert plan.samples[-1].std(axis=0)[:2] == pytest.approx([0.002, 0.002], rel=0.15)
 
 
-def test_obstacle_far_away_changes_nothing():
-    free = plan_around_obstacles(compass(0.002), Scene(SQUARE, TABLE), START, region(0.08, 0.05))
-    scene = Scene(SQUARE, TABLE, [box(-0.3, -0.28, 0.15, 0.2)])
-    far = plan_around_obstacles(compass(0.002), scene, START, region(0.08, 0.05))
-    assert labels(far) == labels(free) and far.probability == free.probability
-
-
 def test_plan_leads_around_an_obstacle():
     scene = Scene(SQUARE, TABLE, [box(-0.01, 0.01, -0.03, 0.2)])
     plan = plan_around_obstacles(compass(0.0005), scene, START, region(0.1, 0.0))
@@ -94,14 +87,6 @@ def test_risk_is_the_probability_to_fall():
     )
     assert plan.risk[0] == pytest.approx(norm.cdf(-0.02 / 0.015), abs=0.03)
     assert plan.probability == pytest.approx(1.0 - plan.risk[0])
-
-
-def test_risk_is_the_probability_to_touch():
-    """One push towards a wall whose near side is 15 mm from the mean outline; the sd is 10 mm."""
-    scene = Scene(SQUARE, TABLE, [box(0.1, 0.15, -0.2, 0.2)])
-    one = made_up([[0.05, 0.0, 0.0]], [0.01, 0.0, 0.0])
-    plan = plan_around_obstacles(one, scene, np.array([-0.01, 0.0, 0.0]), region(0.04, 0.0, 0.1), 0.3, most_pushes=1)
-    assert plan.risk[0] == pytest.approx(norm.cdf(-1.5), abs=0.03)
 
 
 def test_noise_adds_up_unless_the_slider_is_observed():
@@ -188,21 +173,6 @@ def test_margin_keeps_the_slider_away_but_not_farther_than_it_is():
     assert plan_around_obstacles(straight, scene, START, target, margin=0.0035) is not None
     assert plan_around_obstacles(straight, scene, START, target, margin=0.0045) is None
     assert plan_around_obstacles(away, scene, START, target, margin=0.02) is not None
-
-
-def test_mirrored_problem_has_the_mirrored_plan():
-    rng = np.random.default_rng(3)
-    means = rng.normal(size=(150, 3)) * [0.03, 0.03, 0.2]
-    sds = rng.uniform(0.0005, 0.002, (150, 1)) * [1.0, 1.0, 10.0]
-    mirror = np.array([1.0, -1.0, -1.0])
-    walls = [box(0.0, 0.02, -0.2, -0.05), box(0.0, 0.02, 0.08, 0.2)]
-    mirrored = [box(0.0, 0.02, 0.05, 0.2), box(0.0, 0.02, -0.2, -0.08)]
-    here = plan_around_obstacles(made_up(means, sds), Scene(SQUARE, TABLE, walls), START, region(0.1, 0.01, 0.02), 0.2)
-    there = plan_around_obstacles(
-        made_up(means * mirror, sds), Scene(SQUARE, TABLE, mirrored), START, region(0.1, -0.01, 0.02), 0.2
-    )
-    assert here.probability == pytest.approx(there.probability, abs=0.06)
-    assert len(here.pushes) == len(there.pushes)
 
 
 def test_slider_is_brought_over_the_edge():

@@ -19,10 +19,8 @@ from push_predictor.errors import CovariateError, RequestError
 from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import ANALYTICAL_ACCURACY, analytical_mechanics
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
+from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
@@ -264,16 +262,6 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
     np.testing.assert_array_equal(fit_persistence(*pushes_with(given, 30, 1)).correlation(np.array([4e-3])), 0.0)
 
 
-@pytest.mark.slow
-def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
-    persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
-    turned = [
-        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.05, 0.0, 3.0]], 1000, persistence=each).covariance[0]
-        for each in (INDEPENDENT, persistent_fraction)
-    ]
-    assert turned[1][2, 2] > 2.0 * turned[0][2, 2]
-
-
 # --- windows and refusals -------------------------------------------------------------------------------------------
 
 
@@ -389,29 +377,6 @@ def test_pose_covariates_are_those_of_each_sample() -> None:
     np.testing.assert_allclose(first["push_heading"], wrap_angle(np.array(3.1 + heading_of(0.125, 0.3, model))))
     np.testing.assert_allclose(second["slider_x"], rolled.mean[0, 0])
     np.testing.assert_allclose(second["slider_heading"], 3.2 - 2.0 * np.pi)
-
-
-def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
-    table = rows(100)
-    table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
-    base = train_model(table, square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
-    form, size = DriverBasis("constant"), np.array([0.4, 0.2])
-    effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
-    model = replace(base, predictor=ExtendedPredictor(base.predictor.base, (effect,), np.ones(3)))
-    assert model.needs == ("slider_heading",)
-    moved = []
-    for heading in (0.0, 0.8):
-        start = np.array([0.0, 0.0, heading])
-        rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.0, 0.2]], 4000)
-        heading_of_push = np.array([heading_of(0.125, 0.0, model)])
-        covariates = {"slider_heading": np.array([heading])}
-        expected = model.predict_rows(np.array([[0.02, 0.125, 0.0]]), np.array([0.2]), covariates)
-        along = displaced(AT_REST[None], heading_of_push, expected.mean)[0]
-        back = rotate(rolled.mean[0, :2], np.array(-heading))
-        error = 4.0 * np.sqrt(np.diagonal(expected.covariance[0]).max() / 4000)
-        np.testing.assert_allclose(back, along[:2], atol=error)
-        moved.append(rolled.mean[0, 2] - heading)
-    assert moved[0] != pytest.approx(moved[1], abs=1e-5)
 
 
 def test_given_covariates_apply_to_all_windows_of_their_step() -> None:

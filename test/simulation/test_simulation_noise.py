@@ -47,12 +47,6 @@ def test_noise_of_repeated_pushes_is_a_tenth_to_some_tenths_and_depends_on_the_p
     assert np.all(np.max(deviation, axis=0) > 4.0 * np.min(deviation, axis=0))
 
 
-@pytest.mark.long
-def test_surfaces_differ_in_their_noise() -> None:
-    smooth, rough = (np.median(spread(first_windows(name))[0], axis=0) for name in ("delrin", "pu"))
-    assert np.all(rough > 1.4 * smooth)
-
-
 @pytest.mark.slow
 def test_table_and_pushes_depend_only_on_their_own_seeds() -> None:
     one, same, other = (friction_field(SURFACES["abs"], seed).values for seed in (0, 0, 1))
@@ -103,13 +97,3 @@ def test_pressure_noise_has_unit_variance_along_the_whole_push() -> None:
     )
     assert near > 0.8
     assert far == pytest.approx(PERSISTENT_SHARE, abs=0.05)
-
-
-@pytest.mark.long
-def test_noise_along_a_push_is_partly_persistent() -> None:
-    plan = grid_pushes([0.125], [0.0], 80, travel=0.02)
-    table = push_outcomes(SimulationSpec("rect1", "abs", plan, seed=2, place_spread=0.0, turn_spread=0.0))
-    push = table.push_id.astype(int)
-    turn = np.array([table.outcomes[push == k][:4, 2] for k in np.unique(push)])
-    correlation = np.corrcoef(turn.T)[0, 1:]
-    assert np.all(np.abs(correlation) < 0.8)
