@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The forces on pushed sliders: weight, friction at each support point, friction at the rod.
+"""The forces on pushed sliders: weight, friction at each support point, friction at the rod, and their noise.
 
 All are explicit per push. They change with the position on the table and with the distance travelled by the tip.
 """
@@ -15,11 +15,52 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.simulation.changes import PLAIN, Changes, Conditions, Moment
-from push_predictor.simulation.noise import PushNoise
 from push_predictor.simulation.surface import FrictionField
 from push_predictor.types import Array
 
 GRAVITY = 9.81  # m/s^2
+KNOT_SPACING = 0.004  # m travelled by the tip between two independent draws
+PERSISTENT_SHARE = 0.2  # of the variance: stays the same for a whole push
+
+
+@dataclass(frozen=True, eq=False)
+class PushNoise:
+    """Deviations of n pushes.
+
+    persistent (n, k): constant over each push; knots (n, m, k): one every KNOT_SPACING metres.
+    """
+
+    persistent: Array
+    knots: Array
+
+    def at(self, travelled: Array) -> Array:
+        """Deviations (n, k) after the tips travelled (n,) m.
+
+        Their variance is the same between knots as at knots.
+        """
+        position = np.minimum(np.maximum(travelled / KNOT_SPACING, 0.0), self.knots.shape[1] - 1.001)
+        index = position.astype(np.intp)
+        phase = (np.pi / 2.0) * (position - index)[:, None]
+        rows = np.arange(len(travelled))
+        changing = np.cos(phase) * self.knots[rows, index] + np.sin(phase) * self.knots[rows, index + 1]
+        return np.asarray(self.persistent + changing)
+
+    def take(self, rows: np.ndarray) -> PushNoise:
+        """The given pushes."""
+        return PushNoise(self.persistent[rows], self.knots[rows])
+
+
+def knot_count(length: float) -> int:
+    """Number of knots for a path of `length` m."""
+    return int(np.ceil(length / KNOT_SPACING)) + 2
+
+
+def noise_from_draws(draws: Array) -> PushNoise:
+    """Noise with the variance of independent draws (n, m + 1, k).
+
+    The first draw is persistent, the others are the knots.
+    """
+    return PushNoise(np.sqrt(PERSISTENT_SHARE) * draws[:, 0], np.sqrt(1.0 - PERSISTENT_SHARE) * draws[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from push_predictor.design.greedy import greedy
-from push_predictor.design.information import Information
+from push_predictor.design.information import Information, greedy
 from push_predictor.types import Array
 
 C, K, Q, M = 6, 4, 5, 7

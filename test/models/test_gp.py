@@ -21,9 +21,10 @@ from push_predictor.models.gaussian_process.gp import (
     log_likelihood_and_gradient,
     some_rows,
 )
+from push_predictor.models.gaussian_process.prediction import MOST_ROWS, Remembered
 from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 PARAMETERS = GpParameters(np.array([0.2, -0.3]), 0.1, -1.2)
 
@@ -118,3 +119,36 @@ def test_a_rough_fit_has_the_hyperparameters_of_some_rows_and_a_whole_one_those_
         np.abs(log_likelihood_and_gradient(inputs, outputs, fit.parameters)[1]).max() for fit in (rough, whole)
     )
     assert of_whole < 0.1 * of_rough
+
+
+# --- results that are remembered ---
+
+
+def test_predictions_are_computed_again_for_other_rows_only() -> None:
+    asked = []
+
+    def asked_for(rows: IntArray) -> Array:
+        def predicted() -> Array:
+            asked.append(rows.tolist())
+            return rows.astype(np.float64)
+
+        return remembered.of(predicted, rows)
+
+    remembered: Remembered[Array] = Remembered()
+    rows = np.array([0, 0, 1])
+    first = asked_for(rows)
+    assert asked_for(rows.copy()) is first
+    rows[0] = 1  # the caller's array may change
+    assert asked_for(rows).tolist() == [1.0, 0.0, 1.0]
+    assert asked_for(np.array([0, 0, 1])) is first
+    assert asked == [[0, 0, 1], [1, 0, 1]]
+    for other in range(2, 6):  # the first is forgotten
+        asked_for(np.array([other, other]))
+    assert asked_for(np.array([0, 0, 1])) is not first
+
+
+@pytest.mark.parametrize("rows", [1, MOST_ROWS + 1])
+def test_a_planners_single_pushes_and_huge_batches_are_not_remembered(rows: int) -> None:
+    remembered: Remembered[Array] = Remembered()
+    first, again = (remembered.of(lambda: np.zeros(rows), np.zeros(rows)) for _ in range(2))
+    assert first is not again

@@ -24,9 +24,8 @@ from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.planning.particles import Deviations
+from push_predictor.planning.particles import Deviations, windows_of
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, pose_moments, rollout
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.recordings.rig import Rig

@@ -12,7 +12,7 @@ import pytest
 from even_physics import uniform_field
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.simulation.noise import KNOT_SPACING, PERSISTENT_SHARE, noise_from_draws
+from push_predictor.simulation.physics import KNOT_SPACING, PERSISTENT_SHARE, noise_from_draws
 from push_predictor.simulation.pushes import grid_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes
 from push_predictor.simulation.slider import built_shares, pressure_patterns, slider_named, support_points
