@@ -38,7 +38,6 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 PER_PUSH = 4
-EVERY_KIND = pytest.mark.parametrize("kind", ["gp", pytest.param("vhgp", marks=pytest.mark.long)])
 
 
 def pushes(n: int, seed: int, strength: float) -> PushTable:
@@ -167,16 +166,14 @@ def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
 # --- fit -------------------------------------------------------------------------------------------------
 
 
-@EVERY_KIND
-def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
-    model, angles = trained_once(kind), np.array([-0.8, -0.5, 0.5, 0.8])
+def test_a_correlation_that_changes_its_sign_is_found(model: PushModel) -> None:
+    angles = np.array([-0.8, -0.5, 0.5, 0.8])
     inputs = np.column_stack([np.full(4, 0.02), np.full(4, 0.12), angles])
     assert of(model, inputs) == pytest.approx(0.8 * np.sign(angles), abs=0.25)
 
 
-@EVERY_KIND
-def test_correlation_increases_likelihood_of_new_pushes(kind: str) -> None:
-    model, new = trained_once(kind), pushes(400, 1, 0.8)
+def test_correlation_increases_likelihood_of_new_pushes(model: PushModel) -> None:
+    new = pushes(400, 1, 0.8)
     with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
         with_it.mean, with_it.covariance, new.outcomes

@@ -16,8 +16,6 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, Mechanism, mechanism_named
 from push_predictor.models.pushes import Push
-from push_predictor.recordings.table import PushTable
-from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
 from push_predictor.types import Array
 
 EVERY = (*LIBRARY, *REFINEMENTS)
@@ -153,40 +151,6 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
     push = pushes(40)
     here, there = (mechanism_named(name).response(mechanics_of("hex"), p) for p in (push, altered(push, turn=np.pi)))
     assert there == pytest.approx(sign * here, abs=1e-9)
-
-
-# --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------
-
-
-def share_explained(difference: Array, response: Array) -> tuple[float, float]:
-    """R^2 of a difference (n, 3) by a response (n, 3, 1), and the coefficient."""
-    y, x = (difference * IN_METRES).ravel(), (response[:, :, 0] * IN_METRES).ravel()
-    coefficient = float(x @ y / (x @ x))
-    return 1.0 - float(np.sum((y - coefficient * x) ** 2) / np.sum(y**2)), coefficient
-
-
-@pytest.mark.slow
-def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_response_to_it() -> None:
-    before, after = (_first_windows("delrin", 0.02, friction) for friction in (0.25, 0.3))
-    both = np.intersect1d(before.push_id, after.push_id)
-    before, after = (table.take(np.searchsorted(table.push_id, both)) for table in (before, after))
-    difference = after.outcomes - before.outcomes
-    push = Push(before.inputs, before.duration, {"slider_heading": np.zeros(len(before))})
-    explained = {
-        m.name: share_explained(difference, m.response(mechanics_of("rect1"), push))
-        for m in LIBRARY
-        if len(m.parameters) == 1
-    }
-    share, coefficient = explained.pop("contact_friction")
-    assert share > 0.7
-    assert coefficient == pytest.approx(0.05, rel=0.15)
-    assert max(other for other, _ in explained.values()) < share - 0.1
-
-
-def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
-    plan = random_pushes(80, (speed,), travel=0.005, rng=np.random.default_rng(3))
-    table = push_outcomes(SimulationSpec("rect1", surface, plan, contact_friction=friction))
-    return table.take(np.unique(table.push_id, return_index=True)[1])
 
 
 # --- the docs --------------------------------------------------------------------------------------------------------

@@ -202,14 +202,6 @@ def test_joint_region_is_fitted_under_the_correlation() -> None:
     assert np.mean(away <= tails.joint_radius(0.95)) == pytest.approx(0.95, abs=0.015)
 
 
-def test_hyperparameters_widen_few_pushes_more_than_many() -> None:
-    for windows in (1, 6):
-        few, many = (residuals_of(pushes, windows) for pushes in (40, 2000))
-        of_few, of_many = (fitted(*r, counts=(7, 2, 0)).factor / fitted(*r).factor for r in (few, many))
-        assert of_few[0] > of_few[1] > 1.02 and of_few[2] == pytest.approx(1.0)
-        assert np.all(of_many < 1.01)
-
-
 def test_final_prediction_error_of_independent_windows() -> None:
     sample = residuals_of(50, 1)
     factor = fitted(*sample, counts=(10, 2, 0)).factor / fitted(*sample).factor

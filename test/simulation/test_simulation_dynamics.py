@@ -195,18 +195,6 @@ def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
 
 
-@pytest.mark.long
-def test_outcome_converges_with_smaller_time_steps() -> None:
-    plan = random_pushes(12, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7)).take(np.tile(np.arange(12), 3))
-    physics, start = even_physics(slider_named("ellip2"), 36), np.zeros((36, 3))
-    path = pusher_path(plan, physics.outline, RADIUS, start, ACCELERATION)
-    steps = np.repeat([8e-5, 4e-5, 1e-5], 12) / path.speed
-    ends = np.split(travelled(run(physics, path, start, path.push_time + 0.08, time_step=steps)), 3)
-    coarse, usual = (relative(end - ends[-1], ends[-1]) for end in ends[:2])
-    assert np.all(usual < 0.005)
-    assert np.all(usual < coarse)
-
-
 def test_surface_friction_changes_the_force_but_not_the_motion_of_a_slow_push() -> None:
     plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.01), np.full(2, 0.008))
     light, heavy = (
