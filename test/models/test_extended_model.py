@@ -375,7 +375,7 @@ def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[
     assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 
-# --- the command line, the registry, the service -------------------------------------------------------------------
+# --- the command line -------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -396,9 +396,6 @@ def test_predict_command_accepts_and_requires_the_covariate(
         assert main([*push, "--covariate", f"elapsed_time={time}", "--json", "-"]) == 0
         means.append(json.loads(capsys.readouterr().out)["mean"])
     assert means[0] != means[1]
-
-
-def test_info_lists_needed_covariates_and_their_ranges(model_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(model_file), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}

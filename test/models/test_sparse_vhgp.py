@@ -195,19 +195,7 @@ def test_held_out_predictions_equal_those_of_a_dense_model() -> None:
     of_dense, of_sparse = dense.held_out(block), sparse.held_out(block)
     for name in ("mean", "variance", "log_noise_mean", "log_noise_variance"):
         np.testing.assert_allclose(getattr(of_sparse, name), getattr(of_dense, name), atol=1e-4, err_msg=name)
-
-
-def test_held_out_prediction_does_not_depend_on_the_row_itself() -> None:
-    """A wrong value moves the prediction at its row, but not the held-out one."""
-    _, sparse = dense_and_sparse(300)
-    wrong = sparse.outputs.copy()
-    wrong[7] += 3.0
-    chosen = sparse.inducing_signal, sparse.inducing_noise
-    shifted = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
-    one, other = (model.held_out(np.arange(300)).mean[7] for model in (sparse, shifted))
-    assert one == pytest.approx(other, abs=1e-9)
-    assert "solved" not in vars(shifted)  # (n, m) matrices
-    assert shifted.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
+    assert "solved" not in vars(sparse)  # (n, m) matrices
 
 
 def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:

@@ -81,16 +81,6 @@ def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
     assert found == pytest.approx(cubic(*points.T), abs=1e-5)  # coefficients have single precision
 
 
-def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
-    points = np.linspace(0.0, 1.0, 997)[:, None]
-    errors = []
-    for cells in (20, 40):
-        values = np.exp(np.sin(6.0 * np.linspace(0.0, 1.0, cells + 1)))
-        found = through([Axis(0.0, 1.0, cells)], values[:, None])(points, np.zeros(len(points), np.intp))
-        errors.append(np.max(np.abs(found[:, 0] - np.exp(np.sin(6.0 * points[:, 0])))[200:-200]))
-    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.25)
-
-
 def test_few_nodes_resolve_a_smooth_function() -> None:
     axis = Axis(0.2, 3.0, 10)
     for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):

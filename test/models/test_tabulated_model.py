@@ -161,13 +161,6 @@ def test_table_is_accurate(shape: str, kind: str) -> None:
     assert_true_to_the_model(tabulated(shape, kind))
 
 
-def test_independent_outputs_have_no_covariance() -> None:
-    for count in (1, 50):
-        table = of(tabulated("square", "vhgp"), inside(tabulated("square", "vhgp").model, count))
-        for covariance in (table.covariance, table.process_covariance):
-            assert np.all(covariance - variances(covariance)[:, :, None] * np.eye(3) == 0.0)
-
-
 def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
     exact = np.array([[1.0, 0.0, 0.99], [0.0, 1.0, 0.0], [0.99, 0.0, 1.0]])
     found = exact.copy()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -121,18 +122,17 @@ def test_joint_region_has_its_probability() -> None:
     assert joint_radius(None, 0.95, 2) == pytest.approx(np.sqrt(-2.0 * np.log(0.05)))
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0, float("nan")])
-@pytest.mark.parametrize("tails", [None, made_up()])
-def test_level_outside_zero_and_one_is_refused(level: float, tails: Tails | None) -> None:
-    with pytest.raises(RequestError, match="level"):
-        half_widths(tails, level)
-
-
-def test_unknown_kind_and_conformal_without_tails_are_refused() -> None:
-    with pytest.raises(RequestError, match=r"interval.*bayes.*student or conformal"):
-        made_up().half_width(0.9, "bayes")  # type: ignore[arg-type]  # the point of the test
-    with pytest.raises(RequestError, match=r"interval.*conformal"):
-        half_widths(None, 0.9, "conformal")
+@pytest.mark.parametrize(
+    ("tails", "level", "kind", "message"),
+    [
+        *((tails, level, "student", "level") for tails in (None, made_up()) for level in (0.0, 1.0, float("nan"))),
+        (made_up(), 0.9, "bayes", r"interval.*bayes.*student or conformal"),
+        (None, 0.9, "conformal", r"interval.*conformal"),
+    ],
+)
+def test_other_levels_and_kinds_are_refused(tails: Tails | None, level: float, kind: Any, message: str) -> None:
+    with pytest.raises(RequestError, match=message):
+        half_widths(tails, level, kind)
 
 
 # Conformal intervals

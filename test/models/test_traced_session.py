@@ -63,22 +63,19 @@ def counted(began: int, session: TracedSession = SESSION) -> list[list[float]]:
 # --- later recordings ------------------------------------------------------------------------------------------------
 
 
-def test_recording_after_the_end_goes_on_from_it() -> None:
-    assert counted(TUESDAY + DAY) == [[86_405.0, 86_409.0], [90.0, 91.0], [0.9, 0.908]]
-
-
-@pytest.mark.parametrize("after", [1000.0, 1500.0, 1998.0])  # s; the last goes on beyond the end
-def test_recording_within_the_session_has_the_counts_of_the_part_that_it_lies_in(after: float) -> None:
-    began = TUESDAY + int(after * SECOND)
-    assert counted(began) == [[after + 5.0, after + 9.0], [50.0, 51.0], [0.5, 0.508]]
-
-
-def test_recording_that_was_traced_first_keeps_its_counts() -> None:
-    assert counted(TUESDAY) == [[5.0, 9.0], [0.0, 1.0], [0.0, 0.008]]
-
-
-def test_recording_from_before_keeps_its_counts_and_has_a_time_before_zero() -> None:
-    assert counted(TUESDAY - DAY) == [[-86_395.0, -86_391.0], [0.0, 1.0], [0.0, 0.008]]
+@pytest.mark.parametrize(
+    ("began", "counts"),
+    [
+        (86_400.0, [[86_405.0, 86_409.0], [90.0, 91.0], [0.9, 0.908]]),  # after the end: goes on from it
+        (0.0, [[5.0, 9.0], [0.0, 1.0], [0.0, 0.008]]),  # the recording that was traced first
+        (-86_400.0, [[-86_395.0, -86_391.0], [0.0, 1.0], [0.0, 0.008]]),  # from before: a time before zero
+        *(  # within the session: the counts of the part that it lies in; the last goes on beyond the end
+            (after, [[after + 5.0, after + 9.0], [50.0, 51.0], [0.5, 0.508]]) for after in (1000.0, 1500.0, 1998.0)
+        ),
+    ],
+)
+def test_a_later_recording_has_the_counts_of_its_place_in_the_session(began: float, counts: list[list[float]]) -> None:
+    assert counted(TUESDAY + int(began * SECOND)) == counts
 
 
 def test_recordings_of_one_table_are_each_placed_by_their_own_stamps() -> None:

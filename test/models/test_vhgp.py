@@ -151,15 +151,6 @@ def test_fit_recovers_input_dependent_noise(fitted: VHGP) -> None:
     assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.1
 
 
-def test_homoscedastic_data_get_nearly_one_noise_level() -> None:
-    rng = np.random.default_rng(2)
-    inputs = rng.normal(size=(150, 2))
-    outputs = np.sin(inputs[:, 0]) + 0.3 * rng.normal(size=150)
-    noise = np.sqrt(fit_vhgp(inputs, outputs).predict(inputs).process_variance)
-    assert np.median(noise) == pytest.approx(0.3, rel=0.2)
-    assert noise.std() < 0.1
-
-
 def test_prediction_far_from_data_is_the_prior(fitted: VHGP) -> None:
     far = fitted.predict(np.array([[1e6, 1e6]]))
     parameters = fitted.parameters

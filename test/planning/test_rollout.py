@@ -123,14 +123,6 @@ def test_covariance_root_is_that_of_an_eigendecomposition(correlation: Array, ac
     np.testing.assert_allclose(found[0] / SD[:, None], expected, rtol=0.0, atol=accuracy)
 
 
-def test_covariance_root_is_independent_of_units() -> None:
-    covariance, units = np.diag(SD) @ CORRELATED @ np.diag(SD), np.diag([1e3, 1e3, 180.0 / np.pi])
-    root = root_of(covariance[None])[0]
-    np.testing.assert_allclose(root @ root.T, covariance, rtol=1e-12)
-    np.testing.assert_allclose(root_of((units @ covariance @ units)[None])[0], units @ root, rtol=1e-9)
-    np.testing.assert_allclose(root / SD[:, None], (root / SD[:, None]).T, rtol=1e-9)
-
-
 def test_rollout_is_equivariant_under_translation_and_rotation() -> None:
     model, where = model_with(NOISY), np.array([0.3, -0.1, 2.0])
     here, there = (rollout(model, pose, CERTAIN, [PUSH, PUSH], 50) for pose in (AT_REST, where))
