@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models of fitted mechanics: what they need, how they are saved, extended and retrained."""
+"""Models of fitted mechanics: what they need, their supports, how they are saved, extended and retrained."""
 
 from __future__ import annotations
 

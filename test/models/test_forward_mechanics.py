@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The forward model obeys its own physics: symmetries, limits and supports."""
+"""The forward model obeys its own physics, and every parameter has the effect that its meaning states."""
 
 from __future__ import annotations
 

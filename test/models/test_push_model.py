@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Push models: training, symmetry, domain, requests and files."""
+"""Push models: training, symmetry, domain, requests, files, and what they state about themselves."""
 
 from __future__ import annotations
 
