@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The simulated slider obeys Newton and Coulomb, in slow pushes quasi-static mechanics; the noise of repeated pushes."""
+"""The simulated slider obeys Newton and Coulomb, and quasi-static mechanics if slow; the noise of repeated pushes."""
 
 from __future__ import annotations
 
