@@ -8,7 +8,7 @@ All are explicit per push. They change with the position on the table and with t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -105,14 +105,6 @@ class Physics:
         """Mass (twice) and moment of inertia (n, 3) of each slider."""
         return np.stack([self.mass, self.mass, self.inertia], axis=1)
 
-    def grip(self, x: Array, y: Array, travelled: Array) -> Array:
-        """Coulomb friction (n, k) in N at support points x, y (n, k) m, after the tips travelled (n,) m."""
-        return self._grip(self.load_noise.at(travelled), x, y)
-
-    def friction_at_rod(self, travelled: Array) -> Array:
-        """Contact friction coefficients (n,) after the tips travelled (n,) m."""
-        return np.asarray(self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0]))
-
     def acting(
         self, pose: Array, velocity: Array, nearest: Projection, travelled: Array, points: tuple[Array, Array]
     ) -> ActingForces:
@@ -120,15 +112,15 @@ class Physics:
 
         nearest: the tips on the outline, points: world x, y (n, k) of the support, m; the others as in Moment.
         """
-        if self.changes == PLAIN:
-            return ActingForces(self.grip(*points, travelled), self.friction_at_rod(travelled))
         changes, moment = self.changes, Moment(self.conditions, pose, velocity, nearest.contact, travelled)
         load = self.load_noise.at(travelled)
         grip = self._grip(load if changes.load is None else load + changes.load(moment), *points)
-        friction = self.friction_at_rod(travelled)
+        friction = self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0])
+        if changes.contact_friction is not None:
+            friction = np.maximum(friction + changes.contact_friction(moment), 0.0)
         return ActingForces(
             grip if changes.grip is None else grip * changes.grip(moment)[:, None],
-            friction if changes.contact_friction is None else _added(friction, changes.contact_friction(moment)),
+            friction,
             None if changes.grain is None else changes.grain(moment),
             None if changes.viscosity is None else changes.viscosity(moment),
             None if changes.pull is None else changes.pull(moment),
@@ -141,21 +133,13 @@ class Physics:
 
     def take(self, rows: np.ndarray) -> Physics:
         """The given pushes."""
-        return Physics(
-            self.outline,
-            self.radius,
-            self.mass[rows],
-            self.inertia[rows],
-            self.support,
-            self.shares[rows],
-            self.contact_friction[rows],
-            self.surface,
-            self.load_noise.take(rows),
-            self.contact_noise.take(rows),
-            self.changes,
-            self.conditions.take(rows) if len(self.conditions.row) else self.conditions,
+        return replace(
+            self,
+            mass=self.mass[rows],
+            inertia=self.inertia[rows],
+            shares=self.shares[rows],
+            contact_friction=self.contact_friction[rows],
+            load_noise=self.load_noise.take(rows),
+            contact_noise=self.contact_noise.take(rows),
+            conditions=self.conditions.take(rows) if len(self.conditions.row) else self.conditions,
         )
-
-
-def _added(friction: Array, change: Array) -> Array:
-    return np.asarray(np.maximum(friction + change, 0.0))

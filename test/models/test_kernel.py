@@ -179,11 +179,6 @@ def test_a_slider_sent_to_another_process_moves_alike() -> None:
     assert np.array_equal(sent.displacement(pushes[:, :3], pushes[:, 3]), expected)
 
 
-def test_no_pushes_have_no_displacements() -> None:
-    assert displaced(mechanics(), np.zeros((0, 28)), np.zeros((0, 5))).shape == (0, 3)
-    assert displaced(mechanics(), TEXTBOOK[None], np.zeros((0, 5))).shape == (0, 3)
-
-
 # --- what other files know of the kernel -----------------------------------------------------------------------------
 
 

@@ -23,7 +23,6 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.mechanics.prior import (
     DRAWS,
-    MIRRORED,
     ProcessNoise,
     normal_draws,
     prior_draws,
@@ -234,13 +233,6 @@ def test_draws_of_a_posterior_have_its_mean_and_its_correlations(after_ten: Push
     for row, column in ((one, one), (other, other), (one, other)):
         scale = spread[row] * spread[column]
         np.testing.assert_allclose(drawn[row, column] / scale, true[row, column] / scale, atol=0.1)
-
-
-def test_mirror_images_of_prior_draws_are_draws(untrained: PushModel) -> None:
-    predictor = predictor_of(untrained)
-    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in predictor.fitted.values])
-    distance = np.abs((predictor.draws * sign)[:, None] - predictor.draws).max(axis=2)
-    assert distance.min(axis=1).max() < 1e-12
 
 
 def test_squares_of_deviates_vary_over_the_draws(untrained: PushModel) -> None:
