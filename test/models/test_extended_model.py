@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
+from learnt_models import learnt
 from made_up_traces import gain
 from synthetic import square_rig, translating_push
 
@@ -118,15 +119,22 @@ def test_effect_on_mechanics_with_a_grain_follows_the_heading_of_the_slider(base
     assert not np.allclose(after, before, rtol=0.01, atol=0.0)
 
 
-def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
-    base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
+@pytest.fixture(params=["with tails", "without tails"])
+def vhgp(bases: dict[str, PushModel], request: pytest.FixtureRequest) -> PushModel:
+    """A VHGP whose exact predictive is a t distribution, or the VHGP's own."""
+    base = bases["vhgp"]
+    return base if request.param == "with tails" else replace(base, predictor=replace(learnt(base), tails=None))
+
+
+def test_exact_density_is_that_of_the_base_shifted_by_the_effect(vhgp: PushModel) -> None:
+    base, table, effect = vhgp, pushes(20, 1), slippery(0.2)
     shift = joint_shift(mechanics(), [effect], Push.of(table))
     moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
     np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
 
 
-def test_exact_density_has_the_predicted_variance(bases: dict[str, PushModel]) -> None:
-    model, one = extended(bases["vhgp"], slippery(0.2, sd=0.3), scale=(0.5, 1.0, 2.0)), pushes(3, 1).take([0])
+def test_exact_density_has_the_predicted_variance(vhgp: PushModel) -> None:
+    model, one = extended(vhgp, slippery(0.2, sd=0.3), scale=(0.5, 1.0, 2.0)), pushes(3, 1).take([0])
     prediction = predicted(model, one)
     sd = np.sqrt(np.diagonal(prediction.covariance[0]))
     steps = 100.0 * np.linspace(-1.0, 1.0, 8001) ** 3  # dense at the centre, wide for the tails
