@@ -18,7 +18,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.simulation.changes import Changes, Conditions, Moment
-from push_predictor.simulation.noise import PushNoise, knot_count, noise_from_draws
+from push_predictor.simulation.physics import PushNoise, knot_count, noise_from_draws
 from push_predictor.simulation.sensors import Faults
 from push_predictor.simulation.slider import pressure_patterns, support_points
 from push_predictor.types import Array

@@ -41,8 +41,8 @@ from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.planning.particles import windows_of
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import rollout
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.types import Array

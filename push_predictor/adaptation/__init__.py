@@ -3,7 +3,7 @@
 
 """Live adaptation: after each push the parameters of a model's mechanics follow the rig.
 
-Import `Adaptation` from here; `walk` is its filter, `hypotheses` what may have changed.
+Import `Adaptation` from here; `walk` is its filter, `followed` a recording that a model follows.
 """
 
 from push_predictor.adaptation.adaptation import Adaptation, AdaptedParameter

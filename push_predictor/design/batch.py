@@ -3,7 +3,7 @@
 
 """The batch of pushes that a model learns most from.
 
-Greedy selection by what each push would add to the model's knowledge (information.py, greedy.py). Where the criterion
+Greedy selection by what each push would add to the model's knowledge (information.py). Where the criterion
 is no better than that, pushes are spread evenly: those up to the tenth of a learnt model without mechanics, whose
 hyperparameters are not yet known well enough to choose by; and those from the sixth on of a prior model, whose
 mechanics are known by then but for what they cannot express.
@@ -19,8 +19,7 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.design.candidates import Courses, candidate_pushes, courses
 from push_predictor.design.features import features_of
-from push_predictor.design.greedy import greedy
-from push_predictor.design.information import Information
+from push_predictor.design.information import Information, greedy
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.prior import CORRELATION

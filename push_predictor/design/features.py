@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from push_predictor.errors import RequestError
-from push_predictor.models.effects.exact import joint
+from push_predictor.models.effects.exact import covariance_of, joint
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors import (
     ExtendedPredictor,
@@ -103,11 +103,8 @@ def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:
     """Features (n, 3, q) in m, m, rad of the effects' uncertain coefficients."""
     completed = extended.completed(push)
     designs = joint(extended.mechanics, extended.effects, completed).designs
-    covariance = scipy.linalg.block_diag(*(effect.covariance for effect in extended.effects))
-    begin = np.cumsum([0, *(len(effect.coefficients) for effect in extended.effects)])
-    for (i, j), shared in extended.cross.items():
-        covariance[begin[j] : begin[j + 1], begin[i] : begin[i + 1]] = shared.T  # i < j: eigh reads this triangle
-    return np.asarray(np.concatenate(designs, axis=2) @ _symmetric_root(covariance))
+    root = _symmetric_root(covariance_of(extended.effects, extended.cross))
+    return np.asarray(np.concatenate(designs, axis=2) @ root)
 
 
 def _root(covariance: Array) -> Array:

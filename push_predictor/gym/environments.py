@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -18,12 +18,18 @@ from gymnasium.vector.utils import batch_space
 
 from push_predictor.errors import RequestError
 from push_predictor.gym import MOST_STEPS
-from push_predictor.gym.picture import frame
 from push_predictor.gym.pushed_sliders import PushedSliders
 from push_predictor.gym.task import push_task
+from push_predictor.planning.straight_drive import start_drive
+from push_predictor.reporting.canvas import NEARBY, OBSERVED, pixels
+from push_predictor.reporting.slider_picture import OBSTACLE_COLOUR, paint_circle, paint_goal, paint_outline, paint_push
 from push_predictor.types import Array, BoolArray, ByteArray
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Info = dict[str, Any]
+SIZE = (4.0, 4.0)  # inches: 640 x 640 pixels
 
 
 class PushEnv(gymnasium.Env[Array, Array]):
@@ -152,3 +158,27 @@ class PushVectorEnv(VectorEnv[Array, Array, Array]):
 def _first(infos: Info) -> Info:
     """The info of the only slider."""
     return {name: bool(value[0]) if value.ndim == 1 else value[0] for name, value in infos.items()}
+
+
+def frame(sliders: PushedSliders, row: int) -> ByteArray:
+    """Pixels (height, width, 3) of one slider. Raises PushPredictorError if matplotlib is not installed."""
+    return pixels("render", SIZE, lambda figure: _paint(figure, sliders, row))
+
+
+def _paint(figure: Figure, sliders: PushedSliders, row: int) -> None:
+    task, axes = sliders.task, figure.subplots()
+    scene, goal, inputs = task.scene, task.goal, sliders.inputs[row]
+    axes.fill(*(1e3 * scene.table.vertices.T), facecolor="none", edgecolor=NEARBY)
+    for obstacle in scene.obstacles:
+        axes.fill(*(1e3 * obstacle.vertices.T), color=OBSTACLE_COLOUR)
+    paint_goal(axes, scene.outline, goal.pose, goal.distance)
+    if np.isfinite(inputs).all():
+        before, radius = sliders.before[row], task.model.model.rig.pusher_radius
+        paint_outline(axes, scene.outline, before, color=NEARBY, linewidth=0.9)
+        tip = start_drive(scene.outline, radius, before[None], inputs[None])[0].start[0]
+        paint_circle(axes, tip, radius, color="black", linewidth=1.2)
+        paint_push(axes, scene.outline, before, inputs, inputs[0] * task.model.model.usual_duration)
+    paint_outline(axes, scene.outline, sliders.poses[row], color=OBSERVED)
+    left, bottom = 1e3 * (scene.table.vertices.min(axis=0) - scene.outline.reach)
+    right, top = 1e3 * (scene.table.vertices.max(axis=0) + scene.outline.reach)
+    axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)", xlim=(left, right), ylim=(bottom, top))

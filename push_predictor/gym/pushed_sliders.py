@@ -14,9 +14,8 @@ import numpy as np
 
 from push_predictor.geometry.touch import displaced
 from push_predictor.gym.task import FLAGS, PushTask
-from push_predictor.planning.particles import sampled_displacements
+from push_predictor.planning.particles import sampled_displacements, windows_of
 from push_predictor.planning.persistence import persistence_of
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.types import Array, BoolArray, IntArray
 

@@ -75,11 +75,8 @@ def sharpened(before: PriorPredictor, rows: PushTable, seed: int = 0) -> PriorPr
     """The predictor `before` the first push, updated by the pushes of a table with any number of rows."""
     if not len(rows):
         return before
-    mechanics, names = before.fitted.mechanics, tuple(before.fitted.values)
-    values = np.array(list(before.fitted.values.values()))
-    found = updated(mechanics, names, values, fit_rows(rows), before.fitted.ellipsoid.length)
-    fitted = FittedMechanics(mechanics, dict(zip(names, found.values.tolist(), strict=True)), found.covariance)
-    return PriorPredictor(fitted, normal_draws(fitted, seed), found.noise)
+    fitted, noise = updated(before.fitted, fit_rows(rows))
+    return PriorPredictor(fitted, normal_draws(fitted, seed), noise)
 
 
 def on_supports(model: PushModel, rig: Rig | None, supports: Mapping[int, Array]) -> PushModel:

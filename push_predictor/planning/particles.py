@@ -4,7 +4,8 @@
 """Simulate one push on many samples of the slider's pose, window by window.
 
 The pusher starts at the commanded contact of every sample and moves in a straight line in the world. In later windows
-the contact follows from the positions of the pusher and of the sample.
+the contact follows from the positions of the pusher and of the sample. The windows have the duration that the model was
+trained on.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from push_predictor.errors import RequestError, TooLargeError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.persistence import Persistence, root_of
-from push_predictor.planning.push_windows import PushWindows, windows_of
 from push_predictor.planning.straight_drive import TipContact, start_drive
 from push_predictor.types import Array, BoolArray
 
@@ -123,3 +124,42 @@ class Deviations:
         deviation = self._persistence.deviates(self._persistent, self._decaying, fresh)
         self._decaying = self._persistence.decayed(self._decaying, self._step, change)
         return deviation
+
+
+MOST_WINDOWS = 10_000
+
+
+@dataclass(frozen=True)
+class PushWindows:
+    """Equal windows of a push.
+
+    duration (s): of each window; asked (s): the duration passed to the model; scale: factor on its displacements.
+    """
+
+    count: int
+    duration: float
+    asked: float
+    scale: float
+
+
+def windows_of(model: PushModel, duration: float) -> PushWindows:
+    """Divide a push of that duration (s) into windows. Raises RequestError if no number of windows suits the model.
+
+    A learnt model predicts its training duration; displacements are scaled in proportion within its tolerance. The
+    analytical model predicts any duration; it gets windows of about its training duration, to which its covariance
+    applies.
+    """
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise RequestError("duration", duration, "a finite number above 0, in s")
+    usual = model.usual_duration
+    if duration > MOST_WINDOWS * usual:
+        raise TooLargeError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
+    if not model.predictor.learnt:
+        count = max(1, round(duration / usual))
+        return PushWindows(count, duration / count, duration / count, 1.0)
+    low, high = model.duration_range
+    fewest, most = int(np.ceil(duration / high * (1.0 - 1e-12))), int(duration / low * (1.0 + 1e-12))
+    if fewest > most:
+        raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, or a multiple of such a duration")
+    count = min(max(round(duration / usual), fewest), most)
+    return PushWindows(count, duration / count, usual, duration / count / usual)

@@ -22,9 +22,8 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest, check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.planning.particles import POSE_COVARIATES, model_of, push_particles
+from push_predictor.planning.particles import POSE_COVARIATES, model_of, push_particles, windows_of
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.types import Array
 
 PARTICLES = 1000

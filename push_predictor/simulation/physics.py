@@ -1,25 +1,66 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The forces on pushed sliders: weight, friction at each support point, friction at the rod.
+"""The forces on pushed sliders: weight, friction at each support point, friction at the rod, and their noise.
 
 All are explicit per push. They change with the position on the table and with the distance travelled by the tip.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.simulation.changes import PLAIN, Changes, Conditions, Moment
-from push_predictor.simulation.noise import PushNoise
 from push_predictor.simulation.surface import FrictionField
 from push_predictor.types import Array
 
 GRAVITY = 9.81  # m/s^2
+KNOT_SPACING = 0.004  # m travelled by the tip between two independent draws
+PERSISTENT_SHARE = 0.2  # of the variance: stays the same for a whole push
+
+
+@dataclass(frozen=True, eq=False)
+class PushNoise:
+    """Deviations of n pushes.
+
+    persistent (n, k): constant over each push; knots (n, m, k): one every KNOT_SPACING metres.
+    """
+
+    persistent: Array
+    knots: Array
+
+    def at(self, travelled: Array) -> Array:
+        """Deviations (n, k) after the tips travelled (n,) m.
+
+        Their variance is the same between knots as at knots.
+        """
+        position = np.minimum(np.maximum(travelled / KNOT_SPACING, 0.0), self.knots.shape[1] - 1.001)
+        index = position.astype(np.intp)
+        phase = (np.pi / 2.0) * (position - index)[:, None]
+        rows = np.arange(len(travelled))
+        changing = np.cos(phase) * self.knots[rows, index] + np.sin(phase) * self.knots[rows, index + 1]
+        return np.asarray(self.persistent + changing)
+
+    def take(self, rows: np.ndarray) -> PushNoise:
+        """The given pushes."""
+        return PushNoise(self.persistent[rows], self.knots[rows])
+
+
+def knot_count(length: float) -> int:
+    """Number of knots for a path of `length` m."""
+    return int(np.ceil(length / KNOT_SPACING)) + 2
+
+
+def noise_from_draws(draws: Array) -> PushNoise:
+    """Noise with the variance of independent draws (n, m + 1, k).
+
+    The first draw is persistent, the others are the knots.
+    """
+    return PushNoise(np.sqrt(PERSISTENT_SHARE) * draws[:, 0], np.sqrt(1.0 - PERSISTENT_SHARE) * draws[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +105,6 @@ class Physics:
         """Mass (twice) and moment of inertia (n, 3) of each slider."""
         return np.stack([self.mass, self.mass, self.inertia], axis=1)
 
-    def grip(self, x: Array, y: Array, travelled: Array) -> Array:
-        """Coulomb friction (n, k) in N at support points x, y (n, k) m, after the tips travelled (n,) m."""
-        return self._grip(self.load_noise.at(travelled), x, y)
-
-    def friction_at_rod(self, travelled: Array) -> Array:
-        """Contact friction coefficients (n,) after the tips travelled (n,) m."""
-        return np.asarray(self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0]))
-
     def acting(
         self, pose: Array, velocity: Array, nearest: Projection, travelled: Array, points: tuple[Array, Array]
     ) -> ActingForces:
@@ -79,15 +112,15 @@ class Physics:
 
         nearest: the tips on the outline, points: world x, y (n, k) of the support, m; the others as in Moment.
         """
-        if self.changes == PLAIN:
-            return ActingForces(self.grip(*points, travelled), self.friction_at_rod(travelled))
         changes, moment = self.changes, Moment(self.conditions, pose, velocity, nearest.contact, travelled)
         load = self.load_noise.at(travelled)
         grip = self._grip(load if changes.load is None else load + changes.load(moment), *points)
-        friction = self.friction_at_rod(travelled)
+        friction = self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0])
+        if changes.contact_friction is not None:
+            friction = np.maximum(friction + changes.contact_friction(moment), 0.0)
         return ActingForces(
             grip if changes.grip is None else grip * changes.grip(moment)[:, None],
-            friction if changes.contact_friction is None else _added(friction, changes.contact_friction(moment)),
+            friction,
             None if changes.grain is None else changes.grain(moment),
             None if changes.viscosity is None else changes.viscosity(moment),
             None if changes.pull is None else changes.pull(moment),
@@ -100,21 +133,13 @@ class Physics:
 
     def take(self, rows: np.ndarray) -> Physics:
         """The given pushes."""
-        return Physics(
-            self.outline,
-            self.radius,
-            self.mass[rows],
-            self.inertia[rows],
-            self.support,
-            self.shares[rows],
-            self.contact_friction[rows],
-            self.surface,
-            self.load_noise.take(rows),
-            self.contact_noise.take(rows),
-            self.changes,
-            self.conditions.take(rows) if len(self.conditions.row) else self.conditions,
+        return replace(
+            self,
+            mass=self.mass[rows],
+            inertia=self.inertia[rows],
+            shares=self.shares[rows],
+            contact_friction=self.contact_friction[rows],
+            load_noise=self.load_noise.take(rows),
+            contact_noise=self.contact_noise.take(rows),
+            conditions=self.conditions.take(rows) if len(self.conditions.row) else self.conditions,
         )
-
-
-def _added(friction: Array, change: Array) -> Array:
-    return np.asarray(np.maximum(friction + change, 0.0))

@@ -96,9 +96,7 @@ def feel_wrench(
     """The stream of the force-torque sensor; its bias is constant within a recording."""
     time, stamp = _ticks(truth, sensors, sensors.wrench_rate, epoch, rng)
     bias = sensors.force_bias * rng.standard_normal(2)
-    wrench = truth.at(time, "wrench")
-    if faults != FAULTLESS:
-        wrench = wrench + np.asarray(faults.wrench_bias)
+    wrench = truth.at(time, "wrench") + np.asarray(faults.wrench_bias)
     force = wrench[:, :2] + bias + sensors.force_noise * rng.standard_normal((len(time), 2))
     torque = wrench[:, 2] + sensors.torque_noise * rng.standard_normal(len(time))
     force = _quantised(force, FORCE_STEP)
@@ -122,8 +120,6 @@ def record_topic(topic: Topic, truth: Truth, epoch: int, rng: np.random.Generato
 
 def _in_tracker_frame(pose: Array, faults: Faults) -> Array:
     """Poses (n, 3) reported in a frame that is rotated about the origin, then shifted."""
-    if faults == FAULTLESS:
-        return pose
     turn = faults.frame_rotation
     return np.column_stack([rotate(pose[:, :2], np.array(turn)) + faults.frame_shift, pose[:, 2] + turn])
 
@@ -131,8 +127,6 @@ def _in_tracker_frame(pose: Array, faults: Faults) -> Array:
 def _reported_tip(truth: Truth, time: Array, faults: Faults) -> Array:
     """Tip positions (n, 3) as the robot reports them."""
     tip = truth.at(time, "pusher")
-    if faults == FAULTLESS:
-        return tip
     bent = faults.compliance * truth.at(time, "wrench")[:, :2]
     return tip + np.column_stack([np.asarray(faults.tool_offset) - bent, np.zeros(len(tip))])
 

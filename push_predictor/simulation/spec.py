@@ -12,8 +12,7 @@ import numpy as np
 
 from push_predictor.recordings.rig import Rig
 from push_predictor.simulation.changes import PLAIN, Changes, Topic
-from push_predictor.simulation.noise import PushNoise, knot_count, noise_from_draws
-from push_predictor.simulation.physics import Physics
+from push_predictor.simulation.physics import Physics, PushNoise, knot_count, noise_from_draws
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.sensors import FAULTLESS, Faults, Sensors
 from push_predictor.simulation.slider import (

@@ -1,20 +1,20 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Suggested pushes: within the limits, where the model knows least, and fewer where the windows of a push agree."""
+"""Suggested pushes: candidates within a robot's limits, and the batch of which a model learns most."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from coarse import coarse_simulator
 from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
-from learnt_models import learnt as predictor_of
-from synthetic import noisy_pushes, square_rig
+from synthetic import noisy_pushes, square_pushes, square_rig
 
 from push_predictor.design import batch
 from push_predictor.design.batch import (
@@ -33,11 +33,11 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.prior import CORRELATION
 from push_predictor.models.predictors import PriorPredictor
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.push_model import USUAL_SPEED, PushModel
 from push_predictor.models.pushes import Push, Pushes
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.persistence import persistence_of
-from push_predictor.recordings.table import PushTable, concatenate, empty_table
+from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
@@ -110,10 +110,6 @@ class TestCandidates:
         slits = tuple((k / 1000 + 1e-9, (k + 1) / 1000 - 1e-9) for k in range(1000))
         with pytest.raises(RequestError, match=r"excluded.*leave more of the outline"):
             candidate_pushes(learnt, Limits(excluded=slits), 1024)
-
-    def test_differ_by_seed_only(self, learnt: PushModel) -> None:
-        first, same, other = (candidate_pushes(learnt, Limits(), 50, seed) for seed in (0, 0, 1))
-        assert np.array_equal(first, same) and not np.array_equal(first, other)
 
     def test_follow_the_slider_as_the_simulator_moves_it(self) -> None:
         plan = PushPlan(np.array([0.1, 0.4, 0.7]), np.array([0.2, -0.5, 0.0]), np.full(3, 0.02), np.full(3, 0.03))
@@ -193,23 +189,6 @@ class TestSuggestedPushes:
         found = suggest_pushes(learnt, 4, matter=matter)
         assert np.all(found.inputs[:, 2] > 0.3)
 
-    def test_predict_how_much_variance_the_outcomes_remove(self, learnt: PushModel) -> None:
-        """The share that is left is that of a model with the same hyperparameters and the most informative push."""
-        rows = learnt.training
-        inputs = candidate_pushes(learnt, Limits(travel=0.002), 40)
-        tried = courses(learnt, inputs, 0.002)
-        assert tried.kept.shape[1] == 1
-        matter = Push(candidate_pushes(learnt, Limits(), 64, 5), np.full(64, 0.2), {})
-        found = information_of(learnt, tried, matter)
-        before = found.variance
-        best = int(np.argmax(found.gains()))
-        found.observe(best)
-        more = PushTable(tried.inputs[best], np.full(1, 0.2), np.zeros((1, 3)), np.array(["new"]))
-        after = _retold(learnt, concatenate([replace(rows, covariates={}), more]))
-        ratios = [_latent(model, matter) for model in (after, learnt)]
-        assert found.variance / before == pytest.approx(ratios[0] / ratios[1], abs=0.005)
-        assert found.variance / before < 0.97
-
     def test_windows_of_a_push_tell_less_than_as_many_pushes(self, untrained: PushModel) -> None:
         inputs = np.array([[0.02, 0.1, 0.3]])
         windows = courses(untrained, inputs, 0.016)
@@ -286,19 +265,63 @@ def _way(contact: np.ndarray) -> float:
     return float(np.sum(np.minimum(away, 1.0 - away)))
 
 
-def _retold(model: PushModel, rows: PushTable) -> PushModel:
-    """The model with the same hyperparameters and scaling, conditioned on other rows."""
-    from push_predictor.models.gaussian_process.gp import GaussianProcess
-
-    predictor = predictor_of(model)
-    features = predictor.scaling.features(model.rig.outline, rows.inputs)
-    regressions = tuple(GaussianProcess(features, np.zeros(len(rows)), one.parameters) for one in predictor.regressions)
-    return replace(model, predictor=replace(predictor, regressions=regressions))
+# --- the limits of a robot ---
 
 
-def _latent(model: PushModel, push: Push) -> float:
-    """Mean variance in units of noise of the functions alone, without what speeds beyond the training's add."""
-    predictor = predictor_of(model)
-    features = predictor.scaling.features(model.rig.outline, push.inputs)
-    latent = [regression.predict(features) for regression in predictor.regressions]
-    return float(np.mean([one.variance / one.process_variance for one in latent]))
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("speed", (0.0, 0.1)),
+        ("speed", (0.1, 0.05)),
+        ("speed", (0.1, np.inf)),
+        ("speed", (np.nan, 0.1)),
+        ("speed", (1e-310, 0.1)),
+        ("speed", (0.03 / 601.0, 0.1)),
+        ("angle", (-1.6, 0.0)),
+        ("angle", (0.0, 1.6)),
+        ("angle", (0.5, 0.4)),
+        ("travel", 0.0),
+        ("travel", 1.1),
+        ("transfer_speed", 0.0),
+        ("transfer_speed", np.inf),
+        ("excluded", ((-0.1, 0.2),)),
+        ("excluded", ((0.1, 1.2),)),
+        ("excluded", ((0.0, 0.995),)),
+    ],
+)
+def test_a_value_out_of_range_is_refused_by_name(field: str, value: Any) -> None:
+    with pytest.raises(RequestError, match=field):
+        Limits(**{field: value})
+
+
+def test_a_push_may_last_ten_minutes_and_a_window_be_a_metre_long() -> None:
+    table, rig = square_pushes(30)
+    model = train_model(table, rig, "analytical", name="m")
+    fastest = 1.0 / model.usual_duration
+    limits = Limits(speed=(0.03 / 599.0, 0.999 * fastest))
+    assert limits.ranges(model)[0] == limits.speed
+    with pytest.raises(RequestError, match=r"speed.*at most 5 m/s"):
+        Limits(speed=(0.1, 1.001 * fastest)).ranges(model)
+
+
+def test_excluded_contacts_are_not_allowed() -> None:
+    limits = Limits(excluded=((0.2, 0.3), (0.9, 0.1)))
+    contact = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.85, 0.9, 0.95])
+    allowed = [False, False, False, True, False, False, False, True, True, False, False]
+    assert limits.allows(contact).tolist() == allowed
+
+
+def test_by_default_speeds_are_those_of_training_and_angles_at_least_one_radian() -> None:
+    table, rig = square_pushes(30)
+    model = train_model(table, rig, "analytical", name="m")
+    assert Limits().ranges(model) == ((0.02, 0.02), (-1.0, 1.0))
+    model.training.inputs[0] = [0.01, 0.1, 1.3]
+    assert Limits().ranges(model) == ((0.01, 0.02), (-1.0, 1.3))
+    assert Limits(speed=(0.1, 0.2), angle=(-0.2, 0.1)).ranges(model) == ((0.1, 0.2), (-0.2, 0.1))
+
+
+def test_an_untrained_model_is_pushed_at_the_usual_speed() -> None:
+    corners = np.array([[0.04, 0.04, 0.5], [-0.04, 0.04, 0.25], [0.0, -0.04, 0.25]])  # a patch takes a second
+    rig = replace(square_pushes(1)[1], support_points=corners)
+    model: PushModel = train_model(empty_table(), rig, "prior", name="m")
+    assert Limits().ranges(model) == ((USUAL_SPEED, USUAL_SPEED), (-1.0, 1.0))

@@ -26,7 +26,6 @@ from push_predictor.models.predictors.correlation import (
     LONGEST,
     Correlation,
     correlated,
-    correlations,
     covariances,
     fit_correlation,
 )
@@ -39,7 +38,6 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 PER_PUSH = 4
-EVERY_KIND = pytest.mark.parametrize("kind", ["gp", pytest.param("vhgp", marks=pytest.mark.long)])
 
 
 def pushes(n: int, seed: int, strength: float) -> PushTable:
@@ -168,16 +166,14 @@ def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
 # --- fit -------------------------------------------------------------------------------------------------
 
 
-@EVERY_KIND
-def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
-    model, angles = trained_once(kind), np.array([-0.8, -0.5, 0.5, 0.8])
+def test_a_correlation_that_changes_its_sign_is_found(model: PushModel) -> None:
+    angles = np.array([-0.8, -0.5, 0.5, 0.8])
     inputs = np.column_stack([np.full(4, 0.02), np.full(4, 0.12), angles])
     assert of(model, inputs) == pytest.approx(0.8 * np.sign(angles), abs=0.25)
 
 
-@EVERY_KIND
-def test_correlation_increases_likelihood_of_new_pushes(kind: str) -> None:
-    model, new = trained_once(kind), pushes(400, 1, 0.8)
+def test_correlation_increases_likelihood_of_new_pushes(model: PushModel) -> None:
+    new = pushes(400, 1, 0.8)
     with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
         with_it.mean, with_it.covariance, new.outcomes
@@ -262,7 +258,3 @@ def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
     assert process == pytest.approx(correlated(sd, correlation.held_out(correlation.features, block)), rel=1e-9)
     assert np.all(np.linalg.eigvalsh(total - process) > 0.0)
     assert np.abs(total[:, 0, 2]).max() > 0.0
-
-
-def test_sums_of_no_rows_give_independence() -> None:
-    assert np.array_equal(correlations(np.zeros((2, 6)), 3.0), np.broadcast_to(np.eye(3), (2, 3, 3)))

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models of fitted mechanics: what they need, how they are saved, extended and retrained."""
+"""Models of fitted mechanics: what they need, their supports, how they are saved, extended and retrained."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from synthetic import square_pushes
 
+from push_predictor.api import train
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -23,12 +24,14 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
 from push_predictor.models.train_mechanics import on_supports, predictor_about
+from push_predictor.recordings.load import different_supports, load_data
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.table_file import write_table
 from push_predictor.types import Array
 
-ON_CORNERS = supported_at(
-    np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
-)
-IN_MIDDLE = supported_at(np.array([[0.01, 0.01, 0.25], [-0.01, 0.01, 0.25], [-0.01, -0.01, 0.25], [0.01, -0.01, 0.25]]))
+CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+MIDDLE = CORNERS * [0.25, 0.25, 1.0]
+ON_CORNERS, IN_MIDDLE = supported_at(CORNERS), supported_at(MIDDLE)
 
 
 def mechanics_model(values: dict[str, float], **covariates: Array) -> PushModel:
@@ -92,14 +95,13 @@ def test_support_of_the_recording_is_used_and_saved(by_recording: PushModel, tmp
 def test_model_of_several_supports_takes_those_of_other_recordings(by_recording: PushModel) -> None:
     push = Pushes(0.02, 0.05, 0.0, covariates={"recording": 1.0})
     narrow = by_recording.predict(push).mean
-    points = np.column_stack([IN_MIDDLE.points, IN_MIDDLE.shares])
-    alone = on_supports(by_recording, replace(by_recording.rig, support_points=points), {})
+    alone = on_supports(by_recording, replace(by_recording.rig, support_points=MIDDLE), {})
     assert alone.needs == ()
     np.testing.assert_allclose(alone.predict(Pushes(0.02, 0.05, 0.0)).mean, narrow)
-    moved = on_supports(by_recording, by_recording.rig, {5: points})
+    moved = on_supports(by_recording, by_recording.rig, {5: MIDDLE})
     fifth = Pushes(0.02, 0.05, 0.0, covariates={"recording": 5.0})
     np.testing.assert_allclose(moved.predict(fifth).mean, narrow)
-    assert on_supports(mechanics_model({}), replace(by_recording.rig, support_points=points), {}).needs == ()
+    assert on_supports(mechanics_model({}), replace(by_recording.rig, support_points=MIDDLE), {}).needs == ()
 
 
 def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None:
@@ -129,3 +131,38 @@ def test_each_change_of_the_rim_is_on_surfaces_of_its_own() -> None:
         shift = even.shifted(("rim_exponent",), np.full((len(still), 1), exponent), push)[0]
         moved = mechanics_model({"rim_exponent": exponent}).predictor.mechanics.displacement(push.inputs, push.duration)
         np.testing.assert_allclose(still + shift, moved, rtol=0.0, atol=1e-15)
+
+
+# --- recordings whose rigs have different support points ---
+
+
+@pytest.fixture
+def tables(tmp_path: Path) -> list[Path]:
+    """Two tables of the same slider, on points at its corners and in its middle, with friction 0.15."""
+    paths = []
+    for seed, points in enumerate((CORNERS, MIDDLE)):
+        table, rig = square_pushes(18, seed)
+        mechanics = PushMechanics(rig.outline, rig.pusher_radius, supported_at(points))
+        outcomes = mechanics.displacement({"contact_friction": 0.15}, table.inputs, table.duration)
+        outcomes += np.random.default_rng(seed).normal(0.0, [1e-5, 1e-5, 1e-3], (18, 3))
+        paths.append(tmp_path / f"{seed}.csv")
+        write_table(paths[-1], replace(table, outcomes=outcomes))
+        save_rig(replace(rig, support_points=points), tmp_path / f"{seed}.rig.yaml")
+    return paths
+
+
+def test_fit_uses_the_support_of_each_recording(tables: list[Path]) -> None:
+    model = train(tables, kind="analytical", fit=True, watch=lambda stage, done: None)
+    assert model.needs == ("recording",)
+    assert isinstance(model.predictor, MechanicsPredictor)
+    assert model.predictor.fitted.values["contact_friction"] == pytest.approx(0.15, abs=0.02)
+    assert np.sqrt(model.predictor.covariance[2, 2]) < 2e-3
+
+
+def test_supports_are_numbered_by_path_if_they_differ(tables: list[Path]) -> None:
+    first, second = (different_supports(tables)[number] for number in (0, 1))
+    np.testing.assert_allclose(first, CORNERS)
+    np.testing.assert_allclose(second, MIDDLE)
+    assert different_supports([tables[0], tables[0]]) == {}
+    assert load_data(tables, numbered=True).covariates["recording"].tolist() == [0.0] * 18 + [1.0] * 18
+    assert "recording" not in load_data(tables).covariates

@@ -1,12 +1,13 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Learnt models about fitted mechanics: training, choice, predictions at other speeds, files, tables."""
+"""Learnt models about fitted mechanics and the speed: training, choice of the mean, other speeds, tables."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,24 +15,21 @@ from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
 from push_predictor.models import train, train_learnt
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
+from push_predictor.models.features import DEVIATION
 from push_predictor.models.gaussian_process import vhgp
 from push_predictor.models.gaussian_process.bound import VhgpParameters
 from push_predictor.models.gaussian_process.gp import GpParameters, fit_gp
 from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
-from push_predictor.models.gaussian_process.sparse_vhgp import SparseVHGP
-from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Push
-from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
 
 pytestmark = pytest.mark.slow
 
@@ -90,20 +88,6 @@ def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> No
     assert replace(learnt(with_function), tails=None).gaussian
 
 
-@pytest.mark.long
-def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: PushModel, tmp_path: Path) -> None:
-    rows, later = with_function.training, pushes(50, 6)
-    sparse, dense = trained(rows, inducing=30), trained(rows)
-    assert isinstance(learnt(sparse).regressions[0], SparseVHGP) and learnt(sparse).mean is not None
-    found, wanted = (model.predict_rows(later.inputs, later.duration) for model in (sparse, dense))
-    sd = np.sqrt(np.diagonal(wanted.covariance, axis1=1, axis2=2))
-    assert np.max(np.abs(found.mean - wanted.mean) / sd) < 0.5
-    save_model(sparse, tmp_path / "sparse.pushmodel")
-    again = load_model(tmp_path / "sparse.pushmodel").predict_rows(later.inputs, later.duration)
-    np.testing.assert_allclose(again.mean, found.mean, rtol=0.0, atol=1e-9)
-    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-6)
-
-
 def test_a_tie_goes_to_mechanics_and_so_does_what_pushes_cannot_decide() -> None:
     zero, rng = np.zeros(40), np.random.default_rng(0)
     assert not zero_is_better(zero, zero)
@@ -155,39 +139,6 @@ def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(inform
         assert not informed.predict_rows(later.inputs, later.duration).in_domain.any()
 
 
-def test_covariates_of_the_mechanics_bound_the_domain_of_the_table_too() -> None:
-    table = pushes(40, 1)
-    heading = np.linspace(0.0, 0.5, len(table))
-    mechanics = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.15, "grain_x": 0.3})
-    options = TrainingOptions(about=mechanics)
-    model = train_model(replace(table, covariates={"push_heading": heading}), RIG, "gp", name="m", options=options)
-    served, given = tabulate(model), np.array([0.2, 2.0])
-    assert served.tabulated, served.how
-    for predicts in (model, served):
-        both = predicts.predict_rows(table.inputs[:2], table.duration[:2], {"push_heading": given})
-        assert both.in_domain.tolist() == [True, False]
-        for k in range(2):
-            rows = slice(k, k + 1)
-            one = predicts.predict_rows(table.inputs[rows], table.duration[rows], {"push_heading": given[rows]})
-            assert one.in_domain.tolist() == [k == 0]
-
-
-def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel, tmp_path: Path) -> None:
-    basis = DriverBasis("constant", (), (), (), 0.0, ())
-    effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
-    base, table = learnt(with_function), pushes(5, 11)
-    extended = replace(with_function, predictor=ExtendedPredictor(base, (effect,), np.array([1.5, 1.0, 1.0])))
-    expected = extended.predict_rows(table.inputs, table.duration)
-    shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))
-    alone = with_function.predict_rows(table.inputs, table.duration)
-    np.testing.assert_allclose(expected.mean, alone.mean + shift, rtol=1e-9)
-    save_model(extended, tmp_path / "m")
-    for found in (load_model(tmp_path / "m"), tabulate(extended)):
-        again = found.predict_rows(table.inputs, table.duration)
-        assert np.max(np.abs(again.mean - expected.mean) / expected.std) < 1e-3
-        np.testing.assert_allclose(again.std, expected.std, rtol=5e-3)
-
-
 def test_it_needs_no_covariate_that_requests_lack() -> None:
     table = pushes(12, 13)
     headed = replace(table, covariates={"push_heading": np.linspace(-3.0, 3.0, 12)})
@@ -233,13 +184,6 @@ def test_a_vhgp_is_retrained_from_its_own_hyperparameters_where_it_is_near(monke
         assert start.noise_variance == pytest.approx(noise)
 
 
-def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:
-    rows = with_function.training
-    held, seen = with_function.held_out_moments(), with_function.predict_rows(rows.inputs, rows.duration)
-    assert np.all(np.diagonal(held.covariance - seen.covariance, axis1=1, axis2=2)[:, 0] > 0.0)
-    assert np.abs(held.mean - seen.mean).max() < 3e-3
-
-
 def test_constant_noise_follows_the_tails_of_the_residuals() -> None:
     rng = np.random.default_rng(0)
     outputs = rng.standard_t(3, 400)
@@ -275,3 +219,125 @@ def test_the_search_of_a_vhgp_begins_from_the_gps_that_decided_about_the_mean(mo
     assert any(isinstance(regression, ConstantNoise) for regression in auto.regressions)
     with pytest.raises(AssertionError, match="all rows"):
         trained(pushes(24, 0), mean="zero")
+
+
+# --- the speed: per path length within the training's speeds, less certain beyond them ---
+
+
+MECHANICS = FittedMechanics(PushMechanics(RIG.outline, RADIUS), {"contact_friction": 0.25}, np.array([[1e-4]]))
+
+
+def pushes_at(*speeds: float, n: int = 48, seed: int = 0, jitter: float = 0.0) -> PushTable:
+    """Windows at these speeds in turn, three a push, by the textbook's mechanics, with noise per path length.
+
+    jitter: relative standard deviation of the recorded speed.
+    """
+    rng = np.random.default_rng(seed)
+    speed = np.array([speeds[k // 3 % len(speeds)] for k in range(n)])
+    inputs = np.column_stack([speed, rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    outcomes = analytical_mechanics(RIG.outline, RADIUS).displacement(inputs, np.full(n, 0.2))
+    outcomes += rng.standard_normal((n, 3)) * [0.05, 0.05, 1.0] * (speed * 0.2)[:, None]
+    inputs[:, 0] *= np.exp(jitter * rng.standard_normal(n))
+    return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"{seed}-{k // 3}" for k in range(n)]))
+
+
+def trained_at(table: PushTable, kind: str = "gp", **options: Any) -> PushModel:
+    return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
+
+
+def at(model: PushModel, speed: float, duration: float = 0.2, n: int = 6) -> tuple[Array, Array, Array]:
+    """Mean (n, 3), covariance and process covariance (n, 3, 3) of the same pushes at a speed."""
+    inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
+    found = model.predict_rows(inputs, np.full(n, duration))
+    return found.mean, found.covariance, found.process_covariance
+
+
+@pytest.fixture(scope="module", params=("gp", "vhgp", "gp about mechanics"))
+def slow(request: pytest.FixtureRequest) -> PushModel:
+    """Trained at 20 mm/s."""
+    about = MECHANICS if "about" in request.param else None
+    return trained_at(pushes_at(0.02), request.param.split()[0], about=about)
+
+
+def test_twice_the_path_has_twice_the_mean_and_spread(slow: PushModel) -> None:
+    (mean, covariance, process), twice = at(slow, 0.02), at(slow, 0.02, 0.4)
+    if learnt(slow).mean is None:
+        np.testing.assert_allclose(twice[0], 2.0 * mean, rtol=1e-9)
+    np.testing.assert_allclose(twice[1], 4.0 * covariance, rtol=1e-9, atol=1e-20)
+    np.testing.assert_allclose(twice[2], 4.0 * process, rtol=1e-9, atol=1e-20)
+
+
+def test_without_mechanics_a_faster_push_of_the_same_path_has_the_same_mean() -> None:
+    model = trained_at(pushes_at(0.02))
+    np.testing.assert_allclose(at(model, 0.08, 0.05)[0], at(model, 0.02, 0.2)[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", (0.25, 0.5, 2.0, 4.0, 8.0))
+def test_spread_grows_with_the_distance_of_the_speed_and_noise_of_slow_pushes_too(
+    slow: PushModel, ratio: float
+) -> None:
+    """In units of what was learnt, per path length: (DEVIATION log ratio)^2 more, and more noise in slower pushes."""
+    (_, near, noise), (_, far, far_noise) = at(slow, 0.02), at(slow, 0.02 * ratio)
+    growth = max(1.0 / ratio, 1.0)
+    np.testing.assert_allclose(far_noise / ratio**2, noise * growth, rtol=1e-9, atol=1e-20)
+    more = far / ratio**2 - (near - noise + noise * growth)
+    expected = np.diag((DEVIATION * np.log(ratio) * learnt(slow).reported_sd) ** 2)
+    np.testing.assert_allclose(more, np.broadcast_to(expected, more.shape), rtol=1e-6, atol=1e-6 * expected[0, 0])
+
+
+def test_between_training_speeds_nothing_is_added() -> None:
+    model = trained_at(pushes_at(0.01, 0.03))
+    assert learnt(model).scaling.speeds == pytest.approx((0.01, 0.03))
+    assert not learnt(model).scaling.beyond(np.array([[speed, 0.1, 0.0] for speed in (0.01, 0.02, 0.03)])).any()
+    np.testing.assert_allclose(learnt(model).scaling.beyond(np.array([[0.06, 0.1, 0.0]])), np.log(2.0))
+    np.testing.assert_allclose(learnt(model).scaling.beyond(np.array([[0.0025, 0.1, 0.0]])), -np.log(4.0))
+
+
+def test_what_changes_with_the_speed_is_learnt_and_kept_beyond() -> None:
+    """Faster pushes that slide further, by half at 40 mm/s: per path length that is one function of the speed."""
+    table = pushes_at(0.01, 0.04, n=90)
+    further = np.where(table.inputs[:, :1] > 0.02, 1.5, 1.0)
+    model = trained_at(replace(table, outcomes=table.outcomes * further))
+    means = [at(model, speed)[0][:, 0] / speed for speed in (0.01, 0.04, 0.08)]
+    assert np.median(means[1] / means[0]) == pytest.approx(1.5, abs=0.15)
+    np.testing.assert_allclose(means[2], means[1], rtol=1e-9)
+
+
+def test_noise_of_the_recorded_speed_is_no_input() -> None:
+    jittery = learnt(trained_at(pushes_at(0.02, jitter=0.05)))
+    assert 0 not in jittery.scaling.columns and jittery.scaling.speeds == pytest.approx((0.02, 0.02), rel=0.05)
+    assert 0 in learnt(trained_at(pushes_at(0.02, 0.03, jitter=0.05))).scaling.columns
+
+
+@pytest.mark.parametrize("about", (None, MECHANICS))
+@pytest.mark.parametrize("speed", (0.02, 0.08))
+def test_density_without_tails_is_that_of_the_moments(about: FittedMechanics | None, speed: float) -> None:
+    table = pushes_at(speed, seed=2)
+    predictor = learnt(trained_at(pushes_at(0.02), about=about, tails=False))
+    mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, {}))
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    expected = -0.5 * (np.log(2.0 * np.pi * variance) + (table.outcomes - mean) ** 2 / variance)
+    push = Push(table.inputs, table.duration, {})
+    found = predictor._log_density(predictor.latent(table.inputs), push, table.outcomes)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
+    model = trained_at(pushes_at(0.02, 0.04), per_path=False)
+    np.testing.assert_allclose(targets(learnt(model)), model.training.outcomes, rtol=1e-9, atol=1e-15)
+    for first, second in zip(at(model, 0.02), at(model, 0.02, 0.4), strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:
+    several = trained_at(pushes_at(0.02, 0.03, n=90), slow.kind)
+    for model in (slow, several):
+        tabulated = tabulate(model)
+        assert tabulated.tabulated, tabulated.how
+        for speed, n in product((0.005, 0.02, 0.025, 0.03, 0.06, 0.15), (1, 6)):
+            inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
+            assert not tabulated.exact_count(inputs)
+            found, expected = (m.predict_rows(inputs, np.full(n, 0.2)) for m in (tabulated, model))
+            assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 2e-3
+            np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
+            np.testing.assert_array_equal(found.in_domain, expected.in_domain)

@@ -99,23 +99,6 @@ def test_agrees_with_kept_displacements(name: str, accuracy: float, most: float)
 # --- one push or many ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_a_push_has_the_same_bits_alone_and_in_a_batch(parameter: MechanicsParameter) -> None:
-    """Next to pushes with another value, with the textbook's, and on other tables."""
-    draw, n = np.random.default_rng(0), 9
-    pushes = np.column_stack([
-        draw.uniform(0.02, 0.1, n), draw.random(n), draw.uniform(-1.3, 1.3, n), np.full(n, 0.1), draw.uniform(-3, 3, n)
-    ])  # fmt: skip
-    values = np.tile(TEXTBOOK, (n, 1))
-    values[:, COLUMN[parameter.name]] = np.linspace(0.4 * parameter.low, 0.4 * parameter.high, n)
-    values[::3] = TEXTBOOK
-    model = mechanics()
-    together = displaced(model, values, pushes)
-    for k in range(n):
-        assert np.array_equal(displaced(model, values[k : k + 1], pushes[k : k + 1])[0], together[k])
-    assert np.isfinite(together).all()
-
-
 @EVERY_SLIDER
 def test_all_parameters_together_have_the_same_bits_alone_and_in_a_batch(name: str) -> None:
     model, rows = slider(name, 1e-3), kept(name)
@@ -124,13 +107,6 @@ def test_all_parameters_together_have_the_same_bits_alone_and_in_a_batch(name: s
     together = displaced(model, values, pushes)
     alone = [displaced(model, values[k : k + 1], pushes[k : k + 1])[0] for k in range(len(some))]
     assert len(some) == 15 and np.array_equal(together, alone)
-
-
-def test_one_row_of_values_is_that_of_all_pushes() -> None:
-    rows = kept("hex, patch")
-    values = rows["values"][:1]
-    alike = displaced(mechanics("hex"), values, rows["pushes"])
-    assert np.array_equal(alike, displaced(mechanics("hex"), np.tile(values, (len(alike), 1)), rows["pushes"]))
 
 
 def test_each_recording_has_the_bits_of_its_own_support() -> None:
@@ -201,11 +177,6 @@ def test_a_slider_sent_to_another_process_moves_alike() -> None:
     sent = pickle.loads(pickle.dumps(fitted))
     assert sent._shape is not fitted._shape
     assert np.array_equal(sent.displacement(pushes[:, :3], pushes[:, 3]), expected)
-
-
-def test_no_pushes_have_no_displacements() -> None:
-    assert displaced(mechanics(), np.zeros((0, 28)), np.zeros((0, 5))).shape == (0, 3)
-    assert displaced(mechanics(), TEXTBOOK[None], np.zeros((0, 5))).shape == (0, 3)
 
 
 # --- what other files know of the kernel -----------------------------------------------------------------------------

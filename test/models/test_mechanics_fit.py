@@ -5,16 +5,19 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from repository import REPOSITORY
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_residuals, refit
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import CrossValidation, Rung, candidates, climb, worthwhile
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.mechanics.surface import uniform_ellipsoid
 
 NOISE = np.array([3e-5, 3e-5, 1e-3])
@@ -166,3 +169,22 @@ def test_rejects_rows_that_are_not_finite() -> None:
     rows = simulated({})
     with pytest.raises(TrainingError, match="not finite"):
         replace(rows, outcomes=rows.outcomes * np.nan)
+
+
+# --- the table of parameters ---
+
+
+def test_every_parameter_has_its_own_name_and_a_textbook_value_in_range() -> None:
+    assert len(BY_NAME) == len(PARAMETERS)
+    for parameter in PARAMETERS:
+        assert parameter.low <= parameter.textbook <= parameter.high
+        assert 0.0 < parameter.spread <= parameter.high - parameter.low
+        assert parameter.unit and parameter.meaning
+        assert parameter.part in ("contact", "pressure", "measurement", "world")
+
+
+def test_the_kernel_has_as_many_parameters() -> None:
+    """It checks no bounds: with another number it would read and write past its rows."""
+    source = (REPOSITORY / "push_predictor/models/mechanics/kernel/push.py").read_text()
+    numbers = re.findall(r"PARAMETERS = cython.declare\(cython.int, (\d+)\)|own: cython.double\[(\d+)\]", source)
+    assert [int(one or other) for one, other in numbers] == [len(PARAMETERS)] * 2

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The table of mechanisms: their parameters, their responses, and mechanics solved by other methods."""
+"""The table of mechanisms and their responses; effects as changes of parameters, exact for large ones and together."""
 
 from __future__ import annotations
 
@@ -9,17 +9,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drifting_models import DRIFT, pushes, slippery
 from repository import REPOSITORY
-from synthetic import triangle
+from synthetic import square_rig, triangle
 
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import JointEffects, joint, joint_shift
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
+from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, Mechanism, mechanism_named
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
+from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
+from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.types import Array
 
 EVERY = (*LIBRARY, *REFINEMENTS)
@@ -44,7 +54,7 @@ def patched(outline: str) -> FittedMechanics:
     return FittedMechanics(PushMechanics(OUTLINES[outline], 0.00475), {"contact_friction": 0.25})
 
 
-def pushes(n: int, seed: int = 0, duration: float = 0.2) -> Push:
+def some(n: int, seed: int = 0, duration: float = 0.2) -> Push:
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
     return Push(inputs, np.full(n, duration), {"slider_heading": rng.uniform(-3.0, 3.0, n)})
@@ -85,7 +95,7 @@ def test_each_parameter_has_the_unit_of_its_quantity_and_a_limit(mechanism: Mech
 
 @EVERY_MECHANISM
 def test_needs_the_heading_where_its_response_depends_on_it(mechanism: Mechanism) -> None:
-    push = pushes(12)
+    push = some(12)
     turned = altered(push, turn=0.7)
     same = np.array_equal(mechanism.response(patched("rect1"), push), mechanism.response(patched("rect1"), turned))
     assert mechanism.needs == (() if same else ("slider_heading",))
@@ -94,7 +104,7 @@ def test_needs_the_heading_where_its_response_depends_on_it(mechanism: Mechanism
 @EVERY_MECHANISM
 def test_a_response_is_the_central_difference_of_displacements(mechanism: Mechanism) -> None:
     """Over half a standard deviation of the parameter's prior to both sides, and not below zero where that is none."""
-    fitted, push = patched("rect1"), pushes(12)
+    fitted, push = patched("rect1"), some(12)
     response = mechanism.response(fitted, push)
     assert response.shape == (12, 3, len(mechanism.quantities))
     normal = fitted.outline.inward_normal(push.inputs[:, 1])
@@ -114,18 +124,6 @@ def test_a_response_is_the_central_difference_of_displacements(mechanism: Mechan
         assert response[:, :, k] * IN_METRES == pytest.approx(expected * IN_METRES, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["contact_friction", "centre_of_friction", "body_anisotropy", "tilted_surface"])
-def test_responses_are_those_of_smaller_steps(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At a finer accuracy; pushes at the edge of slip see a kink within the longer step."""
-    fine = mechanics_of("ellip3")
-    fine = replace(fine, mechanics=replace(fine.mechanics, accuracy=1e-6))
-    usual = mechanism_named(name).response(fine, pushes(60))
-    monkeypatch.setattr("push_predictor.models.mechanics.fitted.DIFFERENCE", 0.05)
-    shorter = mechanism_named(name).response(fine, pushes(60))
-    error = np.abs((usual - shorter) * IN_METRES[None, :, None]).max(axis=(1, 2)) / size(shorter).max()
-    assert np.median(error) < 0.02 and np.mean(error < 0.1) > 0.8
-
-
 def test_a_plausible_parameter_lies_within_the_limit() -> None:
     inertia = mechanism_named("inertia")
     assert inertia.plausible(np.array([[0.4], [0.8]]))
@@ -135,22 +133,15 @@ def test_a_plausible_parameter_lies_within_the_limit() -> None:
 # --- every mechanism on every outline --------------------------------------------------------------------------------
 
 
-@EVERY_MECHANISM
-def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism) -> None:
-    response = mechanism.response(patched("rect1"), pushes(30))
-    assert np.all(np.isfinite(response))
-    assert np.all(size(response) * [p.largest for p in mechanism.parameters] > 1e-5)
-
-
 @pytest.mark.parametrize("name", ["friction_by_load", "outline_rotation"])
 def test_a_circle_has_no_response_to_what_its_symmetry_hides(name: str) -> None:
     """Every normal of a circle runs through its centre and needs the same force; a turned circle is the same."""
-    assert np.all(size(mechanism_named(name).response(patched("ellip1"), pushes(30))) < 1e-5)
+    assert np.all(size(mechanism_named(name).response(patched("ellip1"), some(30))) < 1e-5)
 
 
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
 def test_a_mirrored_push_has_the_mirrored_response(mechanism: Mechanism) -> None:
-    push = pushes(40)
+    push = some(40)
     contact = np.random.default_rng(1).uniform(0.001, 0.249, 40)  # on the side that the x axis cuts in half
     here = mechanism.response(mechanics_of("rect1"), altered(push, contact))
     there = mechanism.response(mechanics_of("rect1"), altered(push, 0.25 - contact, angle=-1.0))
@@ -161,7 +152,7 @@ def test_a_mirrored_push_has_the_mirrored_response(mechanism: Mechanism) -> None
 @pytest.mark.parametrize(("outline", "order"), [("hex", 6), ("ellip2", 2)])
 @pytest.mark.parametrize("mechanism", [m for m in LIBRARY if m.name not in FIXED_TO_THE_BODY], ids=lambda m: m.name)
 def test_response_is_the_same_on_equivalent_sides(mechanism: Mechanism, outline: str, order: int) -> None:
-    push = pushes(30)
+    push = some(30)
     contact = np.random.default_rng(1).uniform(0.001, 1.0 / order - 0.001, 30)
     here = mechanism.response(mechanics_of(outline), altered(push, contact))
     turned = altered(push, contact + 1.0 / order, turn=-2.0 * np.pi / order)
@@ -171,43 +162,9 @@ def test_response_is_the_same_on_equivalent_sides(mechanism: Mechanism, outline:
 
 @pytest.mark.parametrize(("name", "sign"), [("anisotropic_friction", 1), ("tilted_surface", -1), ("inertia", 1)])
 def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int) -> None:
-    push = pushes(40)
+    push = some(40)
     here, there = (mechanism_named(name).response(mechanics_of("hex"), p) for p in (push, altered(push, turn=np.pi)))
     assert there == pytest.approx(sign * here, abs=1e-9)
-
-
-# --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------
-
-
-def share_explained(difference: Array, response: Array) -> tuple[float, float]:
-    """R^2 of a difference (n, 3) by a response (n, 3, 1), and the coefficient."""
-    y, x = (difference * IN_METRES).ravel(), (response[:, :, 0] * IN_METRES).ravel()
-    coefficient = float(x @ y / (x @ x))
-    return 1.0 - float(np.sum((y - coefficient * x) ** 2) / np.sum(y**2)), coefficient
-
-
-@pytest.mark.slow
-def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_response_to_it() -> None:
-    before, after = (_first_windows("delrin", 0.02, friction) for friction in (0.25, 0.3))
-    both = np.intersect1d(before.push_id, after.push_id)
-    before, after = (table.take(np.searchsorted(table.push_id, both)) for table in (before, after))
-    difference = after.outcomes - before.outcomes
-    push = Push(before.inputs, before.duration, {"slider_heading": np.zeros(len(before))})
-    explained = {
-        m.name: share_explained(difference, m.response(mechanics_of("rect1"), push))
-        for m in LIBRARY
-        if len(m.parameters) == 1
-    }
-    share, coefficient = explained.pop("contact_friction")
-    assert share > 0.7
-    assert coefficient == pytest.approx(0.05, rel=0.15)
-    assert max(other for other, _ in explained.values()) < share - 0.1
-
-
-def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
-    plan = random_pushes(80, (speed,), travel=0.005, rng=np.random.default_rng(3))
-    table = push_outcomes(SimulationSpec("rect1", surface, plan, contact_friction=friction))
-    return table.take(np.unique(table.push_id, return_index=True)[1])
 
 
 # --- the docs --------------------------------------------------------------------------------------------------------
@@ -217,3 +174,165 @@ def test_the_docs_name_every_mechanism_with_its_limit() -> None:
     text = (REPOSITORY / "docs" / "reference" / "trace.md").read_text()
     rows = {row.split("|")[1].strip(" `"): row.split("|") for row in text.splitlines() if row.startswith("| `")}
     assert [float(rows[m.name][3]) for m in EVERY] == [m.parameters[0].largest for m in EVERY]
+
+
+# --- effects as changes of parameters ---
+
+
+NAMES = [mechanism.name for mechanism in EVERY]
+ALWAYS = DriverBasis("constant")
+
+
+CONTACT, ANGLE = 1, 2  # columns of the inputs
+
+
+def made(n: int, seed: int = 0, duration: float = 0.2) -> Push:
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    covariates = {"slider_heading": rng.uniform(-3.0, 3.0, n), "elapsed_time": np.linspace(0.0, 1000.0, n)}
+    return Push(inputs, np.full(n, duration), covariates)
+
+
+EVEN = uniform_ellipsoid(square_rig().outline)
+
+
+def square(friction: float = 0.25, centre: tuple[float, float] = (0.0, 0.0), length: float = 1.0) -> FittedMechanics:
+    """length: over that of even pressure."""
+    surface = PowerSurface(np.array(centre), length * EVEN.length)
+    return analytical_mechanics(square_rig().outline, square_rig().pusher_radius, friction, surface)
+
+
+def effect(mechanism: str | None, *size: float, basis: DriverBasis = ALWAYS) -> Effect:
+    covariance = 1e-4 * np.eye(len(size))
+    return Effect(mechanism, "model_inputs", basis, np.array(size), covariance, np.ones(3))
+
+
+def size_of(shift: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((shift * IN_METRES) ** 2)))
+
+
+# --- the shift -----------------------------------------------------------------------------------------------------
+
+
+def test_two_effects_together_are_both_changes_at_once() -> None:
+    push, on = made(100), square()
+    both = effect("contact_friction", 0.4), effect("centre_of_friction", 0.01, -0.005)
+    changed = square(0.65, centre=(0.01, -0.005))
+    expected = changed.displacement(push.inputs, push.duration) - on.displacement(push.inputs, push.duration)
+    together, apart = joint_shift(on, both, push), sum(joint_shift(on, [one], push) for one in both)
+    assert size_of(together - expected) < 5e-3 * size_of(expected)
+    assert size_of(apart - expected) > 0.05 * size_of(expected)
+
+
+def test_two_effects_on_one_parameter_add_up() -> None:
+    push, on = made(50), square()
+    two = [effect("contact_friction", 0.1), effect("contact_friction", 0.25)]
+    expected = joint_shift(on, [effect("contact_friction", 0.35)], push)
+    np.testing.assert_allclose(joint_shift(on, two, push), expected, atol=1e-12)
+
+
+def test_an_effect_without_a_mechanism_adds_to_the_others() -> None:
+    push, on = made(30), square()
+    exact, generic = effect("contact_friction", 0.2), effect(None, *np.linspace(-0.1, 0.1, 18))
+    expected = joint_shift(on, [exact], push) + joint_shift(on, [generic], push)
+    for together in (joint_shift(on, [exact, generic], push), joint(on, [exact, generic], push).shift):
+        np.testing.assert_allclose(together, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_an_effect_follows_its_covariate() -> None:
+    push, on = made(60), square()
+    later = effect("contact_friction", 0.5, basis=DriverBasis("step", ("elapsed_time",), place=500.0))
+    shift, always = (joint_shift(on, [one], push) for one in (later, effect("contact_friction", 0.5)))
+    after = push.covariates["elapsed_time"] >= 500.0
+    assert not shift[~after].any()
+    np.testing.assert_allclose(shift[after], always[after], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_responses_of_an_effect_of_size_zero_are_those_of_its_mechanism(name: str) -> None:
+    push, on, mechanism = made(40, 1), square(), mechanism_named(name)
+    none = effect(name, *np.zeros(len(mechanism.parameters)))
+    together = joint(on, [none, effect("pusher_travel", 0.0)], push)
+    assert np.array_equal(together.designs[0], mechanism.response(on, push))
+    assert np.array_equal(JointEffects.of([none]).shifted(on, push)[1].transpose(0, 2, 1), together.designs[0])
+    assert not together.shift.any()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shift_is_the_direct_difference_of_displacements(name: str) -> None:
+    """Of the forward model itself, whose headings are those of the pushes."""
+    push, on, mechanism = made(30, 4), square(), mechanism_named(name)
+    size = 0.3 * np.array([LARGEST[quantity] for quantity in mechanism.quantities])
+    normal = on.outline.inward_normal(push.inputs[:, 1])
+    heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+    values = {quantity: on.value(quantity) + s for quantity, s in zip(mechanism.quantities, size, strict=True)}
+    changed, plain = (
+        on.mechanics.displacement(v, push.inputs, push.duration, {"push_heading": heading})
+        for v in ({**on.values, **values}, on.values)
+    )
+    shift = joint_shift(on, [effect(name, *size)], push)
+    assert shift == pytest.approx(changed - plain, abs=1e-15)
+    assert name == "rim_pressure" or size_of(shift) > 1e-6  # the ellipsoid has no rim
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("outline")])  # two ways at corners
+def test_designs_are_derivatives_where_the_effects_act(name: str) -> None:
+    push, on = made(80, 2), square()
+    spread = np.array([BY_NAME[quantity].spread for quantity in mechanism_named(name).quantities])
+    acting = effect(name, *(2.0 * spread))
+    design = joint(on, [acting], push).designs[0]
+    for k, step in enumerate(0.3 * spread * np.eye(len(spread))):
+        more, less = (
+            joint_shift(on, [replace(acting, coefficients=acting.coefficients + side * step)], push)
+            for side in (1.0, -1.0)
+        )
+        difference = (more - less) / (0.6 * spread[k])
+        assert size_of(design[:, :, k] - difference) <= 0.15 * size_of(difference)
+
+
+def test_a_parameter_stays_within_its_plausible_range() -> None:
+    push, on = made(40), square(0.25)
+    far, end = (joint_shift(on, [effect("contact_friction", size)], push) for size in (9.0, 1.0))
+    np.testing.assert_array_equal(far, end)
+    below, none = (joint_shift(on, [effect("contact_friction", size)], push) for size in (-9.0, -1.0))
+    np.testing.assert_array_equal(below, none)
+    far, end = (joint_shift(on, [effect("pusher_travel", size)], push) for size in (-9.0, -0.5))
+    np.testing.assert_array_equal(far, end)
+
+
+# --- in a model ----------------------------------------------------------------------------------------------------
+
+
+# --- estimation ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def deployed() -> PushModel:
+    return train_model(pushes(60), square_rig(), "analytical", name="deployed")
+
+
+def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis, *, of_size: bool = True) -> Effect:
+    evidence = evidence_of(deployed, table)
+    fit = fitted(FitRows(evidence), [candidate(evidence, mechanism, "elapsed_time", basis)])
+    return estimated(fit, of_size=of_size)[0][0]
+
+
+def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
+    """Friction grows from 0.3 to 0.9: by its first derivative alone it would come out a fifth too small."""
+    table = pushes(100, 5, slippery(0.4))
+    estimate = found(deployed, table, "contact_friction", DRIFT)
+    sd = float(np.sqrt(estimate.covariance[0, 0]))
+    assert abs(float(estimate.coefficients[0]) - 0.4) < 3.0 * sd < 0.1
+
+
+@pytest.mark.parametrize(("differ_by", "limit"), [(CONTACT, 0.5), (ANGLE, 0.0)])
+def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
+    deployed: PushModel, differ_by: int, limit: float
+) -> None:
+    """Real mechanics err by contact and angle: pushes of one angle, however many, do not make the size more certain."""
+    weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
+    on_one_side = weak.inputs[:, differ_by] > limit
+    mixed = replace(weak, outcomes=np.where(on_one_side[:, None], strong.outcomes, weak.outcomes))
+    narrow, wide = (found(deployed, mixed, "contact_friction", DRIFT, of_size=of_size) for of_size in (False, True))
+    assert 0.1 < wide.coefficients[0] < 0.3
+    assert wide.covariance[0, 0] > 2.5**2 * narrow.covariance[0, 0]

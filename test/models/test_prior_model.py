@@ -23,7 +23,6 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.mechanics.prior import (
     DRAWS,
-    MIRRORED,
     ProcessNoise,
     normal_draws,
     prior_draws,
@@ -204,21 +203,6 @@ def test_mirrored_pushes_get_mirrored_predictions(untrained: PushModel) -> None:
     np.testing.assert_allclose(other.covariance, one.covariance * np.outer(sign, sign), rtol=1e-3, atol=1e-10)
 
 
-def test_sides_of_a_square_differ_by_much_less_than_the_width(untrained: PushModel) -> None:
-    inputs = np.array([[0.02, 0.1 + 0.25 * k, 0.3] for k in range(4)])
-    found = untrained.predict_rows(inputs, np.full(4, 0.2))
-    assert np.all(np.ptp(found.mean, axis=0) < 0.2 * found.std.min(axis=0))
-
-
-def test_twice_the_path_moves_the_slider_further_and_is_less_certain(untrained: PushModel) -> None:
-    near, far = (
-        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).mean,
-        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).std,
-    )
-    assert 1.7 < near[1, 0] / near[0, 0] < 2.3
-    assert np.all(far[1] > 1.5 * far[0])
-
-
 def test_the_same_seed_gives_the_same_model(untrained: PushModel) -> None:
     again = train_model(empty_table(), RIG, "prior", name="again")
     np.testing.assert_array_equal(predictor_of(again).draws, predictor_of(untrained).draws)
@@ -251,13 +235,6 @@ def test_draws_of_a_posterior_have_its_mean_and_its_correlations(after_ten: Push
         np.testing.assert_allclose(drawn[row, column] / scale, true[row, column] / scale, atol=0.1)
 
 
-def test_mirror_images_of_prior_draws_are_draws(untrained: PushModel) -> None:
-    predictor = predictor_of(untrained)
-    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in predictor.fitted.values])
-    distance = np.abs((predictor.draws * sign)[:, None] - predictor.draws).max(axis=2)
-    assert distance.min(axis=1).max() < 1e-12
-
-
 def test_squares_of_deviates_vary_over_the_draws(untrained: PushModel) -> None:
     fitted = predictor_of(untrained).fitted
     deviates = (prior_draws(fitted, 0) - list(fitted.values.values())) / prior_spreads(tuple(fitted.values))
@@ -269,10 +246,6 @@ def test_priors_use_what_the_rig_knows() -> None:
     assert predictor_of(on_points).fitted.values["contact_friction"] == 0.6
     assert abs(predictor_of(on_points).draws[:, 0].mean() - 0.6) < 0.02
     assert "rim_exponent" not in predictor_of(on_points).fitted.values
-
-
-def test_needs_no_covariates(untrained: PushModel, after_ten: PushModel) -> None:
-    assert untrained.needs == after_ten.needs == ()
 
 
 def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel, after_ten: PushModel) -> None:

@@ -1,29 +1,43 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Push models: training, symmetry, domain, requests and files."""
+"""Push models: training, symmetry, domain, requests, files, and what they state about themselves."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+import drifting_models
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import noisy_pushes, square_rig, triangle
+from synthetic import RADIUS, noisy_pushes, square_pushes, square_rig, triangle
 
+from push_predictor.cli import main
 from push_predictor.errors import ModelFileError, RequestError, TrainingError
+from push_predictor.evaluation.metrics import metrics_lines
+from push_predictor.evaluation.report.summary import error_sentence
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.effects.covariates import UNITS
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.features import push_features
-from push_predictor.models.push_model import KINDS, PushModel
-from push_predictor.models.pushes import Pushes
-from push_predictor.models.request import PushRequest, check_request, check_requests
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.push_model import KINDS, PushModel, mean_in_words, mean_of, mean_parameters
+from push_predictor.models.pushes import Push, Pushes
+from push_predictor.models.request import PushRequest, check_request, check_requests, domain_remark, own_window
 from push_predictor.models.store.model_file import is_model_file, load_model, save_model
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import PushTable, empty_table
+from push_predictor.types import Array
 
 
 @pytest.fixture(scope="module")
@@ -198,3 +212,171 @@ def test_a_push_without_a_finite_prediction_is_an_error_that_names_it() -> None:
     broken = replace(model, predictor=replace(model.predictor, covariance=np.full((3, 3), np.nan)))
     with pytest.raises(RequestError, match=r"velocity\[0\].*too far from the training data"):
         broken.predict(Pushes(velocity=0.02, contact=[0.1, 0.2], angle=0.3))
+
+
+# --- pushes as a user states them ---
+
+
+VELOCITIES = st.lists(st.floats(1e-3, 0.2), min_size=1, max_size=5)
+
+
+def test_scalars_make_one_push_of_default_duration():
+    pushes = Pushes(0.02, 0.1, 0.3)
+    np.testing.assert_array_equal(pushes.inputs, [[0.02, 0.1, 0.3]])
+    np.testing.assert_array_equal(pushes.duration, [0.2])
+    assert len(pushes) == 1 and pushes.covariates == {}
+
+
+@given(VELOCITIES, st.sampled_from([list, tuple, np.array]))
+def test_lists_tuples_and_arrays_mean_the_same_and_scalars_apply_to_all(
+    velocity: list[float], kind: Callable[..., object]
+):
+    pushes = Pushes(kind(velocity), 0.1, angle=[0.3], duration=0.1, covariates={"dwell_time": 2})
+    np.testing.assert_array_equal(pushes.inputs, [[v, 0.1, 0.3] for v in velocity])
+    np.testing.assert_array_equal(pushes.duration, np.full(len(velocity), 0.1))
+    np.testing.assert_array_equal(pushes.covariates["dwell_time"], np.full(len(velocity), 2.0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("fast", 0.1, 0.3), r"velocity: \"'fast'\" is not accepted, give a number or a list of numbers"),
+        ((0.02, np.nan, 0.3), "contact: nan is not accepted, give a finite number"),
+        ((0.02, [0.1, np.inf], 0.3), r"contact\[1\]: inf is not accepted"),
+        (
+            (0.02, 0.1, np.zeros((2, 2))),
+            r"angle: 'an array of shape \(2, 2\)' is not accepted",
+        ),
+        (
+            ([0.02, 0.03], [0.1, 0.2, 0.3], 0.3),
+            "velocity: '2 numbers' .* give one number, or 3 as in contact",
+        ),
+        ((0.02, [], 0.3), "contact: 'an empty list' is not accepted, give at least one number"),
+        ((0.02, 0.1, 0.3, [0.2, 0.1], {"dwell_time": [1, 2, 3]}), "duration: '2 numbers'"),
+        ((0.02, 0.1, 0.3, 0.2, {"dwell_time": None}), "covariate dwell_time"),
+        ((0.02, 0.1, 0.3, 0.2, {"dwell_time": np.nan}), "covariate dwell_time: nan is not accepted"),
+    ],
+)
+def test_rejects_invalid_push_by_field_and_value(arguments: tuple[Any, ...], message: str):
+    with pytest.raises(RequestError, match=message):
+        Pushes(*arguments)
+
+
+# --- why a push is outside the domain ---
+
+
+CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+
+
+@pytest.fixture(scope="module")
+def gp() -> PushModel:
+    return train_model(*square_pushes(60), "gp", name="gp")
+
+
+def remark(gp: PushModel, inputs: Array, **covariates: Array) -> str:
+    push = Push(inputs, np.full(len(inputs), 0.2), covariates)
+    return domain_remark(gp, push, gp.predict_rows(inputs, push.duration, covariates).in_domain)
+
+
+def test_a_remark_counts_the_pushes_outside_and_names_value_and_range_of_the_first(gp: PushModel) -> None:
+    known, limits = gp.training.inputs, gp.input_limits
+    assert remark(gp, known) == remark(gp, np.empty((0, 3))) == ""
+    for column, value, name in ((0, 0.5, "velocity"), (0, 1e-4, "velocity"), (2, -1.5, "angle")):
+        pushes = known[:5].copy()
+        pushes[[2, 4], column] = value
+        unit, (low, high) = UNITS[name], getattr(limits, name)
+        assert (low, high) == (known[:, column].min(), known[:, column].max())
+        said = f"{name} {value:.4g} {unit}, training covers {low:.4g} to {high:.4g} {unit}"
+        assert remark(gp, pushes) == f"out of domain: 2 of 5 pushes, first push 2: {said}"
+        assert remark(gp, pushes[2:3]) == f"out of domain: {said}"
+
+
+def test_a_contact_without_training_pushes_is_named() -> None:
+    table, rig = square_pushes(60)
+    half = table.take(np.flatnonzero(table.inputs[:, 1] % 0.25 < 0.12))  # the first half of each side
+    gp = train_model(half, rig, "gp", name="half", options=TrainingOptions(mean="zero"))
+    inside = half.inputs[:1].copy()
+    inside[0, 1] = 0.2
+    assert remark(gp, inside) == "out of domain: contact 0.2, beyond those of the training pushes"
+
+
+def test_a_covariate_outside_its_range_is_named_with_its_unit() -> None:
+    table = drifting_models.pushes(20, 0)
+    gp = train_model(table, square_rig(), "analytical", name="drifting")
+    gp = drifting_models.extended(gp, drifting_models.slippery(0.1))
+    inputs = table.inputs[:1]
+    assert remark(gp, inputs, elapsed_time=np.array([500.0])) == ""
+    late = remark(gp, inputs, elapsed_time=np.array([2000.0]))
+    assert late == "out of domain: covariate elapsed_time 2000 s, training covers 0 to 1000 s"
+    times = np.array([500.0, 1500.0, 2000.0])
+    of_batch = remark(gp, np.repeat(inputs, 3, axis=0), elapsed_time=times)
+    assert of_batch.startswith("out of domain: 2 of 3 pushes, first push 1: covariate elapsed_time 1500 s")
+
+
+def test_an_edge_without_training_pushes_is_named_for_any_push_of_a_batch() -> None:
+    table = drifting_models.pushes(20, 0)
+    half = table.take(np.flatnonzero(table.inputs[:, 1] < 0.5))
+    by_edge = replace(drifting_models.slippery(0.1), basis=DriverBasis("category", ("edge",), levels=(0.0, 1.0)))
+    gp = drifting_models.extended(train_model(half, square_rig(), "analytical", name="half"), by_edge)
+    inputs = half.inputs[:2].copy()
+    inputs[1, 1] = 0.8
+    assert remark(gp, inputs) == "out of domain: 1 of 2 pushes, first push 1: covariate edge 3, training covers 0 to 1"
+
+
+def test_a_prior_model_has_limits_of_its_own() -> None:
+    rig = replace(square_rig(), support_points=CORNERS)
+    gp = train_model(empty_table(), rig, "prior", name="prior")
+    assert gp.input_limits.velocity == (0.0, 0.15) and gp.input_limits.angle == (-1.4, 1.4)
+    inputs = np.array([[0.02, 0.1, 0.2], [0.16, 0.1, 0.2], [0.02, 0.1, -1.41], [0.02, 0.1, 1.41]])
+    assert gp.in_domain(inputs).tolist() == [True, False, False, False]
+
+
+def test_duration_zero_means_the_models_own_window(gp: PushModel) -> None:
+    assert own_window(gp, 0.0) == gp.usual_duration == pytest.approx(np.median(gp.training.duration))
+    assert own_window(gp, 0.19) == 0.19 and own_window(gp, -0.2) == -0.2
+
+
+# --- what a model states about its mean and speeds ---
+
+
+VALUES = {"contact_friction": 0.25, "rim_exponent": 1.5}
+MECHANICS = FittedMechanics(PushMechanics(square_rig().outline, RADIUS), VALUES, 1e-4 * np.eye(2))
+
+
+@cache
+def trained(kind: str, **options: Any) -> PushModel:
+    table = empty_table() if kind == "prior" else square_pushes(30)[0]
+    return train_model(table, square_rig(), kind, name="m", options=TrainingOptions(**{"mean": "zero", **options}))
+
+
+def test_a_model_states_its_mean_and_parameters() -> None:
+    assert mean_in_words(trained("gp").predictor) == "zero"
+    assert mean_in_words(trained("gp", per_path=False).predictor) == "zero, not per path length"
+    about = trained("gp", about=MECHANICS).predictor
+    assert mean_in_words(about) == "fitted mechanics (contact_friction 0.25, rim_exponent 1.5)"
+    assert mean_in_words(trained("analytical").predictor) == "textbook mechanics"
+    prior = trained("prior").predictor
+    assert mean_of(prior) == "mechanics with uncertain parameters" and mean_parameters(prior)["contact_friction"] == 0.3
+
+
+def test_info_and_registry_state_mean_and_speeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "m.pushmodel"
+    trained("gp", about=MECHANICS).save(path)
+    assert main(["info", str(path), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["mean"] == "fitted mechanics" and found["mean_parameters"] == VALUES
+    assert found["velocity_range"] == pytest.approx([0.02, 0.02])
+    registry = ModelRegistry()
+    registry.load(path)
+    stated = dict(pair.split("=", 1) for pair in registry.describe("m").split("; "))
+    assert stated["mean"] == "fitted mechanics (contact_friction 0.25, rim_exponent 1.5)"
+    assert stated["speeds"] == "20..20 mm/s" and list(stated)[-1] == "file"
+
+
+def test_without_training_the_nmse_is_not_about_a_training_mean() -> None:
+    test = noisy_pushes(6)
+    before, after = (metrics_json(compare(trained(kind), test)) for kind in ("prior", "gp"))
+    for metrics, reference in ((before, "predicting no motion"), (after, "the training mean")):
+        text = "\n".join(metrics_lines(metrics))
+        assert f"1 is no better than {reference}" in text and f"so 3 for {reference}" in text
+        assert error_sentence(metrics).endswith(f"3 is {reference}.")

@@ -1,12 +1,15 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tabulated models: an accurate table inside the domain, the model itself everywhere else."""
+"""Tabulated models: an accurate table inside the domain, the model itself everywhere else; the splines of a table."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import product
+from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +24,14 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.regression import fit_constant
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors.correlation import Correlation
+from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along_all
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
+from push_predictor.models.tabulated.spline import spline_values, table_moments
 from push_predictor.models.tabulated.tabulated_model import (
     COMPUTED,
     COVARIANCE_TOLERANCE,
@@ -142,38 +146,15 @@ def assert_true_to_the_model(answers: TabulatedModel, inputs: Array | None = Non
 
 
 # A coupled VHGP has all that a table can have. The triangle has no symmetry, so a box for each edge.
-REPEAT = [
-    ("circle", "coupled vhgp"),
-    ("triangle", "gp"),
-    *(("ellipse", kind) for kind in KINDS if kind != "coupled vhgp"),
-]
 EACH = [
     *(("square", kind) for kind in KINDS),
     *(("ellipse", "coupled vhgp"), ("circle", "gp"), ("triangle", "coupled vhgp")),
 ]
-KNOWN = [
-    *EACH,
-    *(pytest.param(*both, marks=pytest.mark.long) for both in REPEAT),
-]
 
 
-@pytest.mark.parametrize(("shape", "kind"), KNOWN)
+@pytest.mark.parametrize(("shape", "kind"), EACH)
 def test_table_is_accurate(shape: str, kind: str) -> None:
     assert_true_to_the_model(tabulated(shape, kind))
-
-
-def test_simulated_correlation_is_strong_and_of_both_signs() -> None:
-    answers = tabulated("square", "coupled vhgp")
-    covariance = of(answers, inside(answers.model, 200)).process_covariance
-    correlation = covariance[:, 0, 2] / np.sqrt(covariance[:, 0, 0] * covariance[:, 2, 2])
-    assert correlation.max() > 0.7 and correlation.min() < -0.7
-
-
-def test_independent_outputs_have_no_covariance() -> None:
-    for count in (1, 50):
-        table = of(tabulated("square", "vhgp"), inside(tabulated("square", "vhgp").model, count))
-        for covariance in (table.covariance, table.process_covariance):
-            assert np.all(covariance - variances(covariance)[:, :, None] * np.eye(3) == 0.0)
 
 
 def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
@@ -246,22 +227,7 @@ def test_single_push_gets_the_prediction_it_has_in_a_batch(
     assert_close(alone, among, 10, precision)
 
 
-@given(fraction=st.floats(0.02, 0.95), angle=st.floats(-0.9, 0.9))
-def test_sides_that_symmetry_folds_share_predictions(fraction: float, angle: float) -> None:
-    for shape, order, kind in (("square", 4, "gp"), ("square", 4, "coupled vhgp"), ("ellipse", 2, "coupled vhgp")):
-        turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
-        prediction = of(tabulated(shape, kind), turned)
-        for k in range(1, order):
-            assert_close(of(tabulated(shape, kind), turned[k : k + 1]), prediction, 0, 1e-9)
-
-
-def test_contact_does_not_matter_on_a_circle() -> None:
-    contact = np.linspace(0.0, 0.999, 7)
-    inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
-    assert np.ptp(of(tabulated("circle", "gp"), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize(("shape", "kind"), KNOWN)
+@pytest.mark.parametrize(("shape", "kind"), EACH)
 def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: str, kind: str) -> None:
     answers = tabulated(shape, kind)
     outside = outside_pushes(answers.model, 200)
@@ -326,14 +292,6 @@ def test_boundary_of_the_domain_is_inside() -> None:
         assert table.mean == pytest.approx(exact.mean, abs=1e-5)
 
 
-def test_covariances_are_symmetric_and_positive_definite() -> None:
-    for shape, kind in EACH:
-        prediction = of(tabulated(shape, kind), inside(tabulated(shape, kind).model, 300))
-        assert np.array_equal(prediction.covariance, prediction.covariance.transpose(0, 2, 1))
-        assert np.all(np.linalg.eigvalsh(prediction.process_covariance) > 0.0)
-        assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > 0.0)
-
-
 def test_no_rows_give_no_predictions() -> None:
     prediction = of(tabulated("square", "vhgp"), np.empty((0, 3)))
     assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
@@ -371,34 +329,96 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- services ------------------------------------------------------------------------------------
 
 
-def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> None:
-    pytest.importorskip("rclpy")
-    from msg_adapters.predictions import (
-        PushQuery,
-        prediction_from_response,
-        query_to_batch_request,
-        query_to_request,
-    )
-    from push_predictor.models.store.model_registry import ModelRegistry
-    from push_predictor.nodes.server.services import (
-        handle_load_model,
-        handle_predict_push,
-        handle_predict_push_batch,
-    )
-    from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
+# --- splines on boxes ---
 
-    model = coupled(trained_widely("square", "vhgp"))
-    save_model(model, tmp_path / "m.model")
-    registry, loaded = ModelRegistry(), LoadModel.Response()
-    handle_load_model(registry, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
-    expected = tabulated("square", "coupled vhgp")
-    assert expected.tabulated and expected.how in loaded.message and registry.answering == [f"a vhgp: {expected.how}"]
-    inputs = inside(model, 40)
-    inputs[0, 0] = 0.2  # outside the domain
-    together, batch = of(expected, inputs), PredictPushBatch.Response()
-    handle_predict_push_batch(lambda: None, registry, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
-    for k, push in enumerate(inputs):
-        handle_predict_push(registry, query_to_request("", push, 0.2), single := PredictPush.Response())
-        assert_close(prediction_from_response(single), together, k, 1e-12 if k else 1e-8)
-    for name in FIELDS:
-        assert np.array_equal(getattr(prediction_from_response(batch), name), getattr(together, name))
+
+AXES = (Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7), Axis(3.0, 4.0, 3))
+ENDS = np.array([[axis.low, axis.high] for axis in AXES])
+
+
+def b_spline(u: Array) -> Array:
+    """The cardinal cubic B-spline, from its sum of truncated powers; not zero between 0 and 4."""
+    return sum((-1) ** k * comb(4, k) * np.maximum(u - k, 0.0) ** 3 / 6.0 for k in range(5))
+
+
+def by_formula(axes: Sequence[Axis], coefficients: Array, points: Array, box: Array) -> Array:
+    """Sum of all products of B-splines, with those that are zero too."""
+    factors = []
+    for axis, x in zip(axes, points.T, strict=True):
+        place = (x - axis.low) * axis.cells / (axis.high - axis.low)
+        factors.append(b_spline(place[:, None] + 3.0 - np.arange(axis.cells + 3)))
+    found = coefficients[box]
+    for factor in factors:
+        found = np.einsum("ni,ni...->n...", factor, found)
+    return np.asarray(found)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("functions", [1, 9, 16])
+def test_compiled_spline_is_the_sum_of_its_basis(count: int, functions: int) -> None:
+    """At random points, at knots, and at both ends of every axis, in several boxes; summed in single precision."""
+    axes, draw = AXES[:count], np.random.default_rng(0)
+    coefficients = draw.standard_normal((3, *(axis.cells + 3 for axis in axes), functions)).astype(np.float32)
+    corners = np.array(list(product(*ENDS[:count])))
+    knots = np.array([[axis.low + (axis.high - axis.low) * k / axis.cells for axis in axes] for k in range(3)])
+    points = np.concatenate([draw.uniform(*ENDS[:count].T, (60, count)), corners, knots])
+    box = draw.integers(0, 3, len(points))
+    expected = by_formula(axes, coefficients.astype(np.float64), points, box)
+    rounding = 4**count * np.finfo(np.float32).eps * np.abs(coefficients).max()
+    np.testing.assert_allclose(TensorSpline(axes, coefficients)(points, box), expected, rtol=0.0, atol=rounding)
+
+
+def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refused() -> None:
+    one = np.ones(1)
+    for axes, functions in ((4, 1), (1, 17), (0, 1)):
+        with pytest.raises(ValueError, match="1 to 3 and at most 16 are accepted"):
+            spline_values(
+                np.zeros((1, axes)), np.zeros(1, np.intp), one, one, np.ones(1, np.intp),
+                np.zeros((4, functions), np.float32), np.zeros((1, functions)),
+            )  # fmt: skip
+
+
+def through(axes: Sequence[Axis], values: Array) -> TensorSpline:
+    """The spline that takes values (cells_1 + 1, ..., K) at the knots."""
+    return TensorSpline(axes, along_all([axis.coarse_to_coefficients(axis.cells) for axis in axes], values[None]))
+
+
+def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
+    axes = AXES[:2]
+
+    def cubic(x: Array, y: Array) -> Array:
+        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
+
+    knots = np.meshgrid(*(np.linspace(axis.low, axis.high, axis.cells + 1) for axis in axes), indexing="ij")
+    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
+    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
+    found = through(axes, cubic(*knots))(points, np.zeros(len(points), np.intp))
+    assert found == pytest.approx(cubic(*points.T), abs=1e-5)  # coefficients have single precision
+
+
+def test_few_nodes_resolve_a_smooth_function() -> None:
+    axis = Axis(0.2, 3.0, 10)
+    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
+        knots = axis.nodes_to_knots(count) @ np.exp(-(axis.nodes(count) ** 2))
+        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_moments_are_the_covariances_of_variances_and_correlation(coupled: bool) -> None:
+    """The partial correlations in the table are inverse hyperbolic tangents; see partial_correlation."""
+    draw, n = np.random.default_rng(1), 40
+    values = draw.standard_normal((n, 12 if coupled else 9))
+    least = np.array([0.1, 0.2, 0.05])
+    correlation = None
+    if coupled:
+        first, second, partial = np.tanh(values[:, 9:]).T
+        third = first * second + partial * np.sqrt((1.0 - first**2) * (1.0 - second**2))
+        correlation = np.tile(np.eye(3), (n, 1, 1))
+        for (i, j), r in zip(((0, 1), (0, 2), (1, 2)), (first, second, third), strict=True):
+            correlation[:, i, j] = correlation[:, j, i] = r
+    expected = covariances(np.maximum(values[:, 3:6], least), np.exp(values[:, 6:9]), correlation)
+    found = np.full((n, 3, 3), np.nan), np.full((n, 3, 3), np.nan)
+    table_moments(values, least, *found)
+    for ours, theirs in zip(found, expected, strict=True):
+        assert ours == pytest.approx(theirs, rel=1e-13)
+    assert np.any(values[:, 3:6] < least) and np.all(np.linalg.eigvalsh(found[0]) > 0.0)

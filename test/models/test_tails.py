@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -121,18 +122,17 @@ def test_joint_region_has_its_probability() -> None:
     assert joint_radius(None, 0.95, 2) == pytest.approx(np.sqrt(-2.0 * np.log(0.05)))
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0, float("nan")])
-@pytest.mark.parametrize("tails", [None, made_up()])
-def test_level_outside_zero_and_one_is_refused(level: float, tails: Tails | None) -> None:
-    with pytest.raises(RequestError, match="level"):
-        half_widths(tails, level)
-
-
-def test_unknown_kind_and_conformal_without_tails_are_refused() -> None:
-    with pytest.raises(RequestError, match=r"interval.*bayes.*student or conformal"):
-        made_up().half_width(0.9, "bayes")  # type: ignore[arg-type]  # the point of the test
-    with pytest.raises(RequestError, match=r"interval.*conformal"):
-        half_widths(None, 0.9, "conformal")
+@pytest.mark.parametrize(
+    ("tails", "level", "kind", "message"),
+    [
+        *((tails, level, "student", "level") for tails in (None, made_up()) for level in (0.0, 1.0, float("nan"))),
+        (made_up(), 0.9, "bayes", r"interval.*bayes.*student or conformal"),
+        (None, 0.9, "conformal", r"interval.*conformal"),
+    ],
+)
+def test_other_levels_and_kinds_are_refused(tails: Tails | None, level: float, kind: Any, message: str) -> None:
+    with pytest.raises(RequestError, match=message):
+        half_widths(tails, level, kind)
 
 
 # Conformal intervals
@@ -200,14 +200,6 @@ def test_joint_region_is_fitted_under_the_correlation() -> None:
     reported = covariance * np.outer(tails.factor, tails.factor)
     away = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(reported), drawn[4000:].T), axis=0)
     assert np.mean(away <= tails.joint_radius(0.95)) == pytest.approx(0.95, abs=0.015)
-
-
-def test_hyperparameters_widen_few_pushes_more_than_many() -> None:
-    for windows in (1, 6):
-        few, many = (residuals_of(pushes, windows) for pushes in (40, 2000))
-        of_few, of_many = (fitted(*r, counts=(7, 2, 0)).factor / fitted(*r).factor for r in (few, many))
-        assert of_few[0] > of_few[1] > 1.02 and of_few[2] == pytest.approx(1.0)
-        assert np.all(of_many < 1.01)
 
 
 def test_final_prediction_error_of_independent_windows() -> None:
@@ -322,11 +314,6 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
     counts = [regression.parameters.count for regression in learnt(model).regressions]
     own = fit_tails(table.outcomes - held.mean, held.covariance, table.push_id, counts)
     assert own is not None and np.prod(tails_of(model).factor) > 1.01 * np.prod(own.factor)
-
-
-def test_training_without_tails_takes_windows_for_independent() -> None:
-    options = TrainingOptions(tails=False, mean="zero")
-    assert train_model(shared_errors(12, 0), square_rig(), "gp", name="a", options=options).predictor.tails is None
 
 
 def test_a_table_gives_the_model_s_covariance_and_tails() -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +15,7 @@ from drifting_models import extended, pushes, slippery
 from synthetic import square_rig
 
 from push_predictor.cli import main
-from push_predictor.errors import ModelFileError, RequestError
-from push_predictor.evaluation.report.maps import fixed_covariates
+from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.traced_session import Mark, TracedSession
@@ -25,11 +23,9 @@ from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_pushes
-from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
-from push_predictor.planning.rollout import rollout
 from push_predictor.recordings.table import PushTable
 
 SECOND, DAY = 10**9, 86_400 * 10**9
@@ -67,22 +63,19 @@ def counted(began: int, session: TracedSession = SESSION) -> list[list[float]]:
 # --- later recordings ------------------------------------------------------------------------------------------------
 
 
-def test_recording_after_the_end_goes_on_from_it() -> None:
-    assert counted(TUESDAY + DAY) == [[86_405.0, 86_409.0], [90.0, 91.0], [0.9, 0.908]]
-
-
-@pytest.mark.parametrize("after", [1000.0, 1500.0, 1998.0])  # s; the last goes on beyond the end
-def test_recording_within_the_session_has_the_counts_of_the_part_that_it_lies_in(after: float) -> None:
-    began = TUESDAY + int(after * SECOND)
-    assert counted(began) == [[after + 5.0, after + 9.0], [50.0, 51.0], [0.5, 0.508]]
-
-
-def test_recording_that_was_traced_first_keeps_its_counts() -> None:
-    assert counted(TUESDAY) == [[5.0, 9.0], [0.0, 1.0], [0.0, 0.008]]
-
-
-def test_recording_from_before_keeps_its_counts_and_has_a_time_before_zero() -> None:
-    assert counted(TUESDAY - DAY) == [[-86_395.0, -86_391.0], [0.0, 1.0], [0.0, 0.008]]
+@pytest.mark.parametrize(
+    ("began", "counts"),
+    [
+        (86_400.0, [[86_405.0, 86_409.0], [90.0, 91.0], [0.9, 0.908]]),  # after the end: goes on from it
+        (0.0, [[5.0, 9.0], [0.0, 1.0], [0.0, 0.008]]),  # the recording that was traced first
+        (-86_400.0, [[-86_395.0, -86_391.0], [0.0, 1.0], [0.0, 0.008]]),  # from before: a time before zero
+        *(  # within the session: the counts of the part that it lies in; the last goes on beyond the end
+            (after, [[after + 5.0, after + 9.0], [50.0, 51.0], [0.5, 0.508]]) for after in (1000.0, 1500.0, 1998.0)
+        ),
+    ],
+)
+def test_a_later_recording_has_the_counts_of_its_place_in_the_session(began: float, counts: list[list[float]]) -> None:
+    assert counted(TUESDAY + int(began * SECOND)) == counts
 
 
 def test_recordings_of_one_table_are_each_placed_by_their_own_stamps() -> None:
@@ -161,15 +154,6 @@ def test_request_with_one_of_two_counts_gets_the_default_of_the_other(base: Push
     assert np.array_equal(found, same) and not np.allclose(found, model.predict(pushed_at()).mean, atol=1e-5)
 
 
-def test_rollout_needs_no_count(base: PushModel) -> None:
-    model, steps = traced(base, stepped("push_index", 10.5)), np.array([[0.02, 0.1, 0.85, 0.4]])
-    ends = [
-        rollout(model, np.zeros(3), np.zeros((3, 3)), steps, particles=50, covariates=given).mean
-        for given in ({}, {"push_index": np.array([90.0])}, {"push_index": np.array([3.0])})
-    ]
-    assert np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])
-
-
 def test_default_of_a_growing_effect_is_in_the_domain_and_more_is_not(base: PushModel) -> None:
     model = traced(base, slippery(0.1))
     assert model.covariate_ranges["elapsed_time"].high == 2000.0  # training ends at 1000 s
@@ -184,11 +168,6 @@ def test_covariates_that_follow_from_nothing_are_still_needed(base: PushModel) -
     assert model.needs == ("topic:/warmth",)
     with pytest.raises(RequestError, match="covariate topic:/warmth: 'missing'"):
         model.predict(ONE)
-
-
-def test_map_is_drawn_at_the_counts_of_the_model(base: PushModel) -> None:
-    model = traced(base, stepped("push_index", 10.5))
-    assert fixed_covariates(model, recorded(TUESDAY + DAY, 5.0, 9.0)) == {"push_index": 90.0}
 
 
 # --- what is stated, and the file ------------------------------------------------------------------------------------
@@ -212,22 +191,3 @@ def test_info_list_models_and_repr_state_the_defaults(
 def test_session_is_the_same_after_saving(base: PushModel, tmp_path: Path) -> None:
     save_model(traced(base, stepped("push_index", 10.5)), tmp_path / "m")
     assert load_model(tmp_path / "m").predictor.session == SESSION
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda predictor: predictor.pop("session"), "train the model again"),
-        (lambda predictor: predictor["session"].update(now=[["warmth", 1.0]]), "'warmth' is no cumulative covariate"),
-        (lambda predictor: predictor["session"].update(now=[["push_index", 1e999]]), "not finite"),
-        (lambda predictor: predictor["session"]["marks"].reverse(), "decrease"),
-        (lambda predictor: predictor["session"].update(origin=2**63), "64 bits"),
-    ],
-)
-def test_damaged_session_is_refused(base: PushModel, tmp_path: Path, change: Any, words: str) -> None:
-    save_model(traced(base, stepped("push_index", 10.5)), tmp_path / "m")
-    record, arrays = read_archive(tmp_path / "m")
-    change(record["predictor"])
-    (tmp_path / "m").write_bytes(archived(record, arrays))
-    with pytest.raises(ModelFileError, match=words):
-        load_model(tmp_path / "m")

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections.abc import Callable
 from importlib import import_module
 
 import numpy as np
@@ -13,13 +14,13 @@ import pytest
 from likelihoods import bound_and_gradient, log_marginal_likelihood
 from sparse_rows import PARAMETERS, rows
 
-from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process import vhgp
+from push_predictor.models.gaussian_process import sparse_vhgp, vhgp
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import _sites as sites_from
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
 from push_predictor.models.gaussian_process.fit import maximise_over_noise, precisions_from
-from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, some_rows
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, some_rows
+from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
 
@@ -32,6 +33,7 @@ def fitted() -> VHGP:
 @pytest.mark.parametrize(("n", "every"), [(60, 1), (220, 40)])
 def test_gradient_of_every_parameter_equals_finite_differences(n: int, every: int) -> None:
     """Of 60 rows all, of 220 some of the sites and all hyperparameters."""
+    assert PARAMETERS.count == len(PARAMETERS.to_vector())
     inputs, outputs = rows(n)
     sites = np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
     at = np.concatenate([sites, PARAMETERS.to_vector()])
@@ -149,19 +151,6 @@ def test_fit_recovers_input_dependent_noise(fitted: VHGP) -> None:
     assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.1
 
 
-def test_vhgp_is_likelier_than_gp_on_heteroscedastic_data(fitted: VHGP) -> None:
-    assert fitted.bound > log_marginal_likelihood(fit_gp(*rows(250))) + 30.0
-
-
-def test_homoscedastic_data_get_nearly_one_noise_level() -> None:
-    rng = np.random.default_rng(2)
-    inputs = rng.normal(size=(150, 2))
-    outputs = np.sin(inputs[:, 0]) + 0.3 * rng.normal(size=150)
-    noise = np.sqrt(fit_vhgp(inputs, outputs).predict(inputs).process_variance)
-    assert np.median(noise) == pytest.approx(0.3, rel=0.2)
-    assert noise.std() < 0.1
-
-
 def test_prediction_far_from_data_is_the_prior(fitted: VHGP) -> None:
     far = fitted.predict(np.array([[1e6, 1e6]]))
     parameters = fitted.parameters
@@ -180,22 +169,15 @@ def test_variances_stay_positive_at_and_between_noiseless_rows() -> None:
     assert np.abs(prediction.mean[:120] - model.outputs).max() < 1e-2
 
 
-@pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0])
-def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
-    inputs = np.random.default_rng(0).normal(size=(40, 2))
-    prediction = fit_vhgp(inputs, outputs).predict(inputs)
+@pytest.mark.parametrize("fit", [fit_vhgp, lambda inputs, outputs: fit_sparse_vhgp(inputs, outputs, 8)])
+@pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0, rows(40)[1]])
+def test_degenerate_outputs_and_repeated_inputs_have_finite_predictions(
+    fit: Callable[..., VHGP], outputs: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sparse_vhgp, "_MOST_ITERATIONS", 6)  # an outlier takes all that are allowed
+    inputs = np.random.default_rng(0).normal(size=(40, 2))[np.arange(40) // 4 * 4]
+    prediction = fit(inputs, outputs).predict(inputs)
     assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
-
-
-def test_repeated_inputs_are_accepted() -> None:
-    inputs, outputs = rows(300)
-    inputs = inputs[np.arange(300) // 10 * 10]
-    assert np.isfinite(fit_vhgp(inputs, outputs).bound)
-
-
-def test_rejects_unusable_rows() -> None:
-    with pytest.raises(TrainingError, match="NaN"):
-        fit_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
 
 
 def test_priors_of_the_noise_lengthscales_keep_their_weight_in_a_row_from_a_hundred_rows_on() -> None:
@@ -218,13 +200,6 @@ def test_the_noise_at_an_input_is_the_conditional_gaussian_with_the_nugget_in_it
         np.testing.assert_allclose(prediction.log_noise_variance, expected, rtol=1e-9)
         assert (prediction.log_noise_variance > nugget).all()
         np.testing.assert_allclose(prediction.log_noise_mean, -1.0 + cross @ (sites - 0.5), atol=1e-9)
-
-
-def test_vector_of_parameters_round_trips() -> None:
-    vector = PARAMETERS.to_vector()
-    np.testing.assert_array_equal(VhgpParameters.from_vector(vector).to_vector(), vector)
-    assert vector.tolist() == [0.1, -0.2, 0.2, 0.3, 0.1, -0.1, -1.0, -0.8]
-    assert PARAMETERS.count == 8
 
 
 def test_more_rows_than_are_searched_get_the_hyperparameters_of_some_and_their_own_noise(

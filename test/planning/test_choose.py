@@ -210,15 +210,6 @@ def test_contact_with_the_tip_removes_noise_along_the_normal():
     np.testing.assert_allclose(does.covariance[0, 1, 1], 3e-8, rtol=1e-6)
 
 
-def test_all_sides_of_a_square_are_equivalent():
-    lines = push_grid([0.02], np.array([0.1, 0.35, 0.6, 0.85]), np.array([0.3]))
-    does = repertoire(moving(1e-4), SQUARE, lines, (3,), 0.4)
-    for side in range(4):
-        np.testing.assert_allclose(
-            does.mean[side, :2], rotate(does.mean[0, :2], np.array(side * np.pi / 2)), atol=1e-12
-        )
-
-
 def test_pushes_outside_the_domain_are_dropped():
     """Only they would reach the goal at once."""
     known = moving(1e-5, lambda inputs: np.abs(inputs[:, 2]) < 0.5)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Rollouts of push sequences: mechanics, symmetry, uncertainty, limits, rejected requests."""
+"""Rollouts of push sequences: mechanics, symmetry, uncertainty, persistence, limits, rejected requests."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from push_predictor.errors import CovariateError, RequestError
 from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import ANALYTICAL_ACCURACY, analytical_mechanics
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.planning.particles import Deviations
+from push_predictor.planning.given_earlier import LARGEST, EarlierWindows, given_earlier
+from push_predictor.planning.particles import Deviations, windows_of
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
-from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, pose_moments, rollout
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.recordings.rig import Rig
@@ -124,14 +123,6 @@ def test_covariance_root_is_that_of_an_eigendecomposition(correlation: Array, ac
     found = root_of(np.array([SD[:, None] * correlation * SD, correlation]))
     np.testing.assert_allclose(found, [SD[:, None] * expected, expected], rtol=0.0, atol=accuracy)
     np.testing.assert_allclose(found[0] / SD[:, None], expected, rtol=0.0, atol=accuracy)
-
-
-def test_covariance_root_is_independent_of_units() -> None:
-    covariance, units = np.diag(SD) @ CORRELATED @ np.diag(SD), np.diag([1e3, 1e3, 180.0 / np.pi])
-    root = root_of(covariance[None])[0]
-    np.testing.assert_allclose(root @ root.T, covariance, rtol=1e-12)
-    np.testing.assert_allclose(root_of((units @ covariance @ units)[None])[0], units @ root, rtol=1e-9)
-    np.testing.assert_allclose(root / SD[:, None], (root / SD[:, None]).T, rtol=1e-9)
 
 
 def test_rollout_is_equivariant_under_translation_and_rotation() -> None:
@@ -264,16 +255,6 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
     np.testing.assert_array_equal(fit_persistence(*pushes_with(given, 30, 1)).correlation(np.array([4e-3])), 0.0)
 
 
-@pytest.mark.slow
-def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
-    persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
-    turned = [
-        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.05, 0.0, 3.0]], 1000, persistence=each).covariance[0]
-        for each in (INDEPENDENT, persistent_fraction)
-    ]
-    assert turned[1][2, 2] > 2.0 * turned[0][2, 2]
-
-
 # --- windows and refusals -------------------------------------------------------------------------------------------
 
 
@@ -391,29 +372,6 @@ def test_pose_covariates_are_those_of_each_sample() -> None:
     np.testing.assert_allclose(second["slider_heading"], 3.2 - 2.0 * np.pi)
 
 
-def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
-    table = rows(100)
-    table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
-    base = train_model(table, square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
-    form, size = DriverBasis("constant"), np.array([0.4, 0.2])
-    effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
-    model = replace(base, predictor=ExtendedPredictor(base.predictor.base, (effect,), np.ones(3)))
-    assert model.needs == ("slider_heading",)
-    moved = []
-    for heading in (0.0, 0.8):
-        start = np.array([0.0, 0.0, heading])
-        rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.0, 0.2]], 4000)
-        heading_of_push = np.array([heading_of(0.125, 0.0, model)])
-        covariates = {"slider_heading": np.array([heading])}
-        expected = model.predict_rows(np.array([[0.02, 0.125, 0.0]]), np.array([0.2]), covariates)
-        along = displaced(AT_REST[None], heading_of_push, expected.mean)[0]
-        back = rotate(rolled.mean[0, :2], np.array(-heading))
-        error = 4.0 * np.sqrt(np.diagonal(expected.covariance[0]).max() / 4000)
-        np.testing.assert_allclose(back, along[:2], atol=error)
-        moved.append(rolled.mean[0, 2] - heading)
-    assert moved[0] != pytest.approx(moved[1], abs=1e-5)
-
-
 def test_given_covariates_apply_to_all_windows_of_their_step() -> None:
     predictor = Attentive(("slider_x", "elapsed_time"))
     model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
@@ -462,3 +420,93 @@ def test_bootstrap_does_not_compare_a_repetition_with_itself() -> None:
     samples, truth = rng.standard_normal((50, 3)), rng.standard_normal((30, 3))
     distance, weight = EnergyDistance(samples, truth, 1.0), np.tile([2.0, 0.0], 15)
     assert distance.value(weight) == pytest.approx(EnergyDistance(samples, truth[::2], 1.0).value())
+
+
+# --- the next window of a push, given its earlier windows ---
+
+
+PERSISTENCE = Persistence(np.array([0.3, 0.1, 0.0]), np.array([0.4, 0.5, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
+STEP = 4e-3  # m
+COVARIANCE = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.2], [0.0, 0.2, 25.0]]) * 1e-8
+MEAN = np.array([3e-3, 1e-3, 0.02])
+
+
+def predictions(count: int) -> Prediction:
+    covariance = np.tile(COVARIANCE, (count, 1, 1))
+    return Prediction(np.tile(MEAN, (count, 1)), covariance, 0.5 * covariance, np.ones(count, dtype=np.bool_))
+
+
+def earlier(whitened: Array) -> EarlierWindows:
+    """Contiguous windows with these whitened residuals (k, 3), the last one just before the predicted one."""
+    k = len(whitened)
+    observed = MEAN + whitened @ root_of(COVARIANCE[None])[0].T
+    return EarlierWindows(predictions(k), observed, STEP * np.arange(k, 0, -1))
+
+
+def test_without_earlier_windows_or_persistence_nothing_changes() -> None:
+    new = predictions(2)
+    assert given_earlier(new, earlier(np.zeros((0, 3))), PERSISTENCE) is new
+    found = given_earlier(new, earlier(np.ones((3, 3))), INDEPENDENT)
+    np.testing.assert_allclose(found.mean, new.mean)
+    np.testing.assert_allclose(found.covariance, new.covariance, atol=1e-20)
+
+
+def test_one_window_shifts_by_its_correlation() -> None:
+    z = np.array([[1.0, -2.0, 0.5]])
+    found, rho = given_earlier(predictions(1), earlier(z), PERSISTENCE), PERSISTENCE.correlation(np.array([STEP]))
+    root = root_of(COVARIANCE[None])[0]
+    np.testing.assert_allclose(found.mean[0], MEAN + root @ (rho[0] * z[0]), rtol=1e-9)
+    np.testing.assert_allclose(found.covariance[0], root @ np.diag(1.0 - rho[0] ** 2) @ root.T, rtol=1e-9, atol=1e-20)
+    assert found.mean[0, 0] > MEAN[0]  # what went further goes on doing so
+
+
+def test_conditioning_equals_the_conditional_of_the_joint_gaussian() -> None:
+    """Regression on samples of correlated windows."""
+    places = STEP * np.arange(4)
+    z = np.empty((200_000, 4, 3))
+    for k in range(3):
+        among = PERSISTENCE.correlation(np.abs(places[:, None] - places).ravel())[:, k].reshape(4, 4)
+        among[np.arange(4), np.arange(4)] = 1.0
+        drawn = np.random.default_rng(k).standard_normal((len(z), 4))
+        z[:, :, k] = drawn @ np.linalg.cholesky(among).T
+    shown = np.array([[0.5, 1.0, 0.2], [-0.4, 0.3, 1.0], [1.2, -1.0, 0.7]])
+    found, root = given_earlier(predictions(1), earlier(shown), PERSISTENCE), root_of(COVARIANCE[None])[0]
+    away, left = np.linalg.solve(root, found.mean[0] - MEAN), np.linalg.solve(root, root_of(found.covariance)[0])
+    for k in range(3):
+        weights, rest, *_ = np.linalg.lstsq(z[:, :3, k], z[:, 3, k], rcond=None)
+        assert away[k] == pytest.approx(weights @ shown[:, k], abs=0.02)
+        assert (left @ left.T)[k, k] == pytest.approx(rest[0] / len(z), rel=0.02)
+
+
+def test_all_alternatives_are_shifted_alike_and_the_process_noise_shrinks_too() -> None:
+    new = predictions(3)
+    found = given_earlier(new, earlier(np.ones((2, 3))), PERSISTENCE)
+    np.testing.assert_allclose(found.mean, np.tile(found.mean[0], (3, 1)))
+    np.testing.assert_allclose(found.process_covariance, 0.5 * found.covariance, rtol=1e-9, atol=1e-20)
+
+
+def test_outliers_count_no_more_than_large_residuals() -> None:
+    large, outlier = (given_earlier(predictions(1), earlier(np.full((1, 3), z)), PERSISTENCE) for z in (LARGEST, 1e3))
+    np.testing.assert_allclose(outlier.mean, large.mean, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"observed": np.zeros((1, 3))}, "observed"),
+        ({"observed": np.full((2, 3), np.nan)}, "observed"),
+        ({"distance": np.array([1.0])}, "distance"),
+        ({"distance": np.array([0.004, 0.0])}, "distance"),
+        ({"distance": np.array([0.004, np.inf])}, "distance"),
+    ],
+)
+def test_windows_that_do_not_match_are_refused(change: dict[str, Array], field: str) -> None:
+    with pytest.raises(RequestError, match=field):
+        EarlierWindows(
+            **{
+                "predictions": predictions(2),
+                "observed": np.zeros((2, 3)),
+                "distance": np.array([0.008, 0.004]),
+                **change,
+            }
+        )

@@ -143,12 +143,18 @@ def test_contact_friction_is_never_negative() -> None:
     assert beyond == pytest.approx(none, abs=1e-12)
 
 
-@pytest.mark.slow
-def test_lower_table_friction_changes_the_force_but_not_the_motion() -> None:
-    half = replace(ON_GLASS, changes=Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)))
-    (plain, force), (slippery, of_half) = moved_and_forces(ON_GLASS), moved_and_forces(half)
-    assert np.max(np.abs(slippery - plain)) < 0.03 * np.max(np.abs(plain))
-    assert of_half == pytest.approx(0.5 * force, rel=0.05)
+@pytest.mark.parametrize(
+    ("changes", "factor"),
+    [
+        (Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)), 0.5),
+        (Changes(added_mass=0.4), 1.0 + 0.4 / ON_GLASS.slider.mass),
+    ],
+    ids=["friction", "mass"],
+)
+def test_friction_of_the_table_and_mass_change_the_force_but_not_the_motion(changes: Changes, factor: float) -> None:
+    (plain, force), (moved, changed) = moved_and_forces(ON_GLASS), moved_and_forces(replace(ON_GLASS, changes=changes))
+    assert np.max(np.abs(moved - plain)) < 0.03 * np.max(np.abs(plain))
+    assert changed == pytest.approx(factor * force, rel=0.05)
 
 
 @cache
@@ -158,14 +164,6 @@ def moved_and_forces(spec: SimulationSpec) -> tuple[Array, Array]:
     order, motion = np.argsort(batch.rows), batch.motion
     force = np.hypot(motion.wrench[..., 0], motion.wrench[..., 1])
     return (motion.slider[:, -1] - motion.slider[:, 0])[order], np.array([np.median(f[f > 0.0]) for f in force[order]])
-
-
-def test_mass_added_at_the_centre_changes_the_force_but_not_the_motion() -> None:
-    loaded = replace(ON_GLASS, changes=Changes(added_mass=0.4))
-    (plain, force), (heavy, of_heavy) = moved_and_forces(ON_GLASS), moved_and_forces(loaded)
-    assert np.max(np.abs(heavy - plain)) < 0.03 * np.max(np.abs(plain))
-    heavier = 1.0 + 0.4 / ON_GLASS.slider.mass
-    assert of_heavy == pytest.approx(heavier * force, rel=0.05)
 
 
 def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:

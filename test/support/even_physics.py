@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.simulation.noise import PushNoise
+from push_predictor.simulation.physics import PushNoise
 from push_predictor.simulation.surface import CELL, HALF_EXTENT, FrictionField
 
 

@@ -19,9 +19,8 @@ import numpy as np
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.inducing import InducedKernel, InducedRidge
 from push_predictor.models.gaussian_process.kernels import ArdKernel
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior, DenseRidge
-from push_predictor.models.remembered import Remembered
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.

@@ -1,7 +1,8 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The prediction of one output at m inputs, before noise and function are combined, and the densities of an outcome.
+"""The prediction of one output at m inputs, before noise and function are combined, the densities of an outcome, and
+results that are remembered.
 
 The exact predictive of a VHGP, int N(y | a, c^2 + e^g) N(g | b, d^2) dg (Lazaro-Gredilla and Titsias 2011,
 section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
@@ -9,10 +10,13 @@ section 3.3), is not Gaussian. The integral is done by Gauss-Hermite quadrature.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from push_predictor.types import Array
 
@@ -82,3 +86,27 @@ def _variances_at_nodes(prediction: LatentPrediction) -> Array:
 
 def _log_normal(values: Array, mean: Array, variance: Array) -> Array:
     return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + (values - mean) ** 2 / variance))
+
+
+Found = TypeVar("Found")
+MOST_REMEMBERED, MOST_ROWS = 4, 50_000  # results, and rows of one: a batch of a million would take 100 MB
+
+
+class Remembered(Generic[Found]):
+    """The last few results of several rows: moments, densities, correlation and tails of the same rows share them.
+
+    `functools.lru_cache` takes no arrays.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, Found] = {}
+
+    def of(self, compute: Callable[[], Found], *given: NDArray[Any]) -> Found:
+        """The result for these arrays, computed if it is not known. It must not be changed."""
+        if not 1 < len(given[0]) <= MOST_ROWS:
+            return compute()
+        key = b"".join(each.tobytes() for each in given)
+        if (known := self._known.get(key)) is None:
+            known = compute()
+            self._known = dict([*self._known.items(), (key, known)][-MOST_REMEMBERED:])
+        return known

@@ -28,9 +28,8 @@ from push_predictor.models.gaussian_process.gp import (
     some_rows,
 )
 from push_predictor.models.gaussian_process.inducing import InducedPosterior
-from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.prediction import LatentPrediction, Remembered
 from push_predictor.models.gaussian_process.ridge import DenseKernel, DensePosterior
-from push_predictor.models.remembered import Remembered
 from push_predictor.types import Array, IntArray
 
 Posterior: TypeAlias = DensePosterior | InducedPosterior

@@ -33,7 +33,7 @@ import scipy
 
 from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK, PushMechanics
+from push_predictor.models.mechanics.forward import COLUMN, TEXTBOOK
 from push_predictor.models.mechanics.kernel.push import drawn_moments
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.pushes import Push
@@ -47,24 +47,15 @@ MOST_STEPS = 15
 SHORTENINGS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class ParameterUpdate:
-    """values (p,), their covariance (p, p), and the noise."""
+def updated(before: FittedMechanics, rows: FitRows) -> tuple[FittedMechanics, ProcessNoise]:
+    """The parameters' posterior and the noise, from normal priors about the values with the spreads of `prior_spreads`.
 
-    values: Array
-    covariance: Array
-    noise: ProcessNoise
-
-
-def updated(
-    mechanics: PushMechanics, names: tuple[str, ...], means: Array, rows: FitRows, length: float
-) -> ParameterUpdate:
-    """The parameters' posterior, from normal priors about `means` (p,) with the spreads of `prior_spreads`.
-
-    length: c of the support in m, for the noise of the turn. Gauss-Newton steps within the plausible ranges, each
-    shortened until the posterior grows; the noise's factor is estimated again after each. Deterministic.
+    Gauss-Newton steps within the plausible ranges, each shortened until the posterior grows; the noise's factor is
+    estimated again after each. Deterministic.
     """
-    return _Update(mechanics, names, means, rows, length).solved()
+    values, covariance, noise = _Update(before, rows).solved()
+    named = dict(zip(before.values, values.tolist(), strict=True))
+    return FittedMechanics(before.mechanics, named, covariance), noise
 
 
 def window_weights(push: IntArray) -> Array:
@@ -83,18 +74,15 @@ class _Local:
 
 
 class _Update:
-    def __init__(
-        self, mechanics: PushMechanics, names: tuple[str, ...], means: Array, rows: FitRows, length: float
-    ) -> None:
-        self.mechanics, self.names, self.means, self.rows = mechanics, names, means, rows
-        table = [BY_NAME[name] for name in names]
-        self.low, self.high = np.array([p.low for p in table]), np.array([p.high for p in table])
-        self.spread = prior_spreads(names)
+    def __init__(self, before: FittedMechanics, rows: FitRows) -> None:
+        self.mechanics, self.names, self.rows = before.mechanics, tuple(before.values), rows
+        self.means, (self.low, self.high) = np.array(list(before.values.values())), _ranges(before)
+        self.spread = prior_spreads(self.names)
         self.weight = window_weights(rows.push)
-        self.travel, self.length = rows.inputs[:, 0] * rows.duration, length
+        self.travel, self.length = rows.inputs[:, 0] * rows.duration, before.ellipsoid.length
 
-    def solved(self) -> ParameterUpdate:
-        """See `updated`."""
+    def solved(self) -> tuple[Array, Array, ProcessNoise]:
+        """Values (p,), their covariance (p, p), and the noise."""
         values, factor = self.means, np.ones(3)
         for _ in range(MOST_STEPS):
             local = self._local(values)
@@ -107,7 +95,7 @@ class _Update:
                 break
         local = self._local(values)
         curvature, _ = self._equations(local, self._precision(local.noise, factor), values)
-        return ParameterUpdate(values, _inverse(curvature), ProcessNoise(factor))
+        return values, _inverse(curvature), ProcessNoise(factor)
 
     def _local(self, values: Array) -> _Local:
         step = np.where(values + DIFFERENCE * self.spread > self.high, -DIFFERENCE, DIFFERENCE) * self.spread

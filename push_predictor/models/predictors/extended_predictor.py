@@ -14,11 +14,11 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import JointEffects, covariance_of, joint
 from push_predictor.models.effects.traced_session import TracedSession
+from push_predictor.models.gaussian_process.prediction import Remembered
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Shift
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.pushes import Push
-from push_predictor.models.remembered import Remembered
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, IntArray
 

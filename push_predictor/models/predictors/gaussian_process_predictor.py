@@ -107,7 +107,7 @@ class GaussianProcessPredictor(BasePredictor):
         return self._log_density(latent, push, outcomes)
 
     def latent(self, inputs: Array) -> list[LatentPrediction]:
-        """Per output, the latent predictions in standardised units; beyond the training's speeds see scaling.py."""
+        """Per output, the latent predictions in standardised units; beyond the training's speeds see features.py."""
         features, beyond = self.scaling.features(self.rig.outline, inputs), self.scaling.beyond(inputs)
         found = [regression.predict(features) for regression in self.regressions]
         more, growth = (DEVIATION * beyond) ** 2, self.scaling.noise_growth(inputs)
