@@ -13,7 +13,6 @@ where the names of the recordings state them, the support points. No base is fit
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.support.scripts import parser_of
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.models.effects.effect import Effect
@@ -58,7 +58,7 @@ class Measured:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the steps of each trace."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
     parser.add_argument("--base", choices=sorted(BASES))

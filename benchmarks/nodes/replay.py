@@ -6,19 +6,13 @@
     python -m benchmarks.nodes.replay [--seconds 60] [--rate 1] [--depth 1000] [--rounds 1]
 
 Simulates pushes with poses at 250 Hz and a wrench at 125 Hz, replays them with push_replay in a separate process and
-subscribes here. --depth is that of the subscriber's queues, 0 keeps all messages.
-
-The lateness that the node reports is compared with that of two bare loops over the same deadlines (bare_loop.py): one
-sleeps, the other sleeps and publishes. `late` is the delay up to the call that publishes a message, `after` up to its
-return, which only the loop that publishes shares. The three take turns in each round, in processes of their own, so
-that a busy machine delays all of them. Prints p50 and p99 of each round, the medians over the rounds, their ratios and
-the load.
+subscribes here. --depth is that of the subscriber's queues, 0 keeps all messages. Prints what was received, and the
+lateness that the node reports: p50 and p99 of each round, and their medians over the rounds.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import statistics
@@ -26,11 +20,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
-from typing import TypeAlias
 
 import numpy as np
 import rclpy
@@ -39,6 +32,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 
+from benchmarks.support.scripts import parser_of
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.pushes import random_pushes
@@ -46,7 +40,6 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.simulation.sensors import Sensors
 
 TOPICS = {"/slider/pose": PoseStamped, "/pusher/pose": PoseStamped, "/pusher/wrench": WrenchStamped}
-Figures: TypeAlias = tuple[float, float]  # p50 and p99 of the lateness, us
 SECONDS_A_PUSH = 2.0  # at least, at 20 mm/s over 30 mm
 
 
@@ -60,26 +53,22 @@ def main() -> int:
         plan = random_pushes(int(options.seconds / SECONDS_A_PUSH) + 2, [0.02], 0.03, np.random.default_rng(0))
         sensors = Sensors(rate=250.0, wrench_rate=125.0)
         write_recording(bag, simulate(SimulationSpec("rect1", "abs", plan, sensors=sensors, name="pushes")))
-        wrong, figures = 0, {name: list[Figures]() for name in ("push_replay", "publish", "sleep")}
+        wrong, late = 0, list[tuple[float, float]]()
         for number in range(options.rounds):
             print(f"round {number + 1}: load average {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores", flush=True)
             with _subscribed(options.depth) as received:
-                figures["push_replay"].append(_replay(bag, options.rate, options.seconds))
+                late.append(_replay(bag, options.rate, options.seconds))
             wrong += _compare(bag, received, options.seconds)
-            with _subscribed(options.depth):
-                figures["publish"].append(_bare_loop("publish", bag, options.rate, options.seconds))
-            figures["sleep"].append(_bare_loop("sleep", bag, options.rate, options.seconds))
-            for name, found in figures.items():
-                print(f"    {name:12s} {_text(found[-1])}", flush=True)
-        _print_ratios(figures)
+        p50, p99 = (statistics.median(values) for values in zip(*late, strict=True))
+        print(f"medians over the rounds: late p50 {p50:.0f} us, p99 {p99:.0f} us")
         return 1 if wrong else 0
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="of recorded time (default %(default)s)")
     parser.add_argument("--rate", type=float, default=1.0, help="of the replay (default %(default)s)")
-    parser.add_argument("--rounds", type=int, default=1, help="of the three (default %(default)s)")
+    parser.add_argument("--rounds", type=int, default=1, help="number of replays (default %(default)s)")
     parser.add_argument("--depth", type=int, default=1000, help="of the subscriber's queues (default %(default)s)")
     return parser.parse_args()
 
@@ -117,8 +106,8 @@ def _spin(executor: SingleThreadedExecutor) -> None:
         return
 
 
-def _replay(bag: Path, rate: float, seconds: float) -> Figures:
-    """The lateness that a replay reports at its end."""
+def _replay(bag: Path, rate: float, seconds: float) -> tuple[float, float]:
+    """The lateness that a replay reports at its end: p50 and p99, us."""
     parameters = {
         "recording": bag,
         "play.rate": rate,
@@ -133,30 +122,6 @@ def _replay(bag: Path, rate: float, seconds: float) -> Figures:
     (summary,) = re.findall(r"finished: .*", printed)
     (late,) = re.findall(r"p50 (\d+) us, p99 (\d+) us", summary)
     return float(late[0]), float(late[1])
-
-
-def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
-    """The lateness of a bare loop over the same deadlines."""
-    options = ["--rate", str(rate), "--seconds", str(seconds)]
-    command = [sys.executable, "-m", "benchmarks.nodes.bare_loop", kind, str(bag), *options]
-    found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
-    return found["late"]["p50"], found["late"]["p99"]
-
-
-def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
-    """Print the medians over the rounds, and those of the replay over those of the bare loops."""
-    medians = {
-        name: [statistics.median(values) for values in zip(*found, strict=True)] for name, found in figures.items()
-    }
-    for name, found in medians.items():
-        print(f"{name:12s} medians: {_text(found)}")
-    for name in ("sleep", "publish"):
-        ratios = [ours / bare for ours, bare in zip(medians["push_replay"], medians[name], strict=True)]
-        print(f"push_replay over {name}: late p50 {ratios[0]:.2f} and p99 {ratios[1]:.2f}")
-
-
-def _text(figures: Sequence[float]) -> str:
-    return "late p50 {:.0f} us, p99 {:.0f} us".format(*figures)
 
 
 def _compare(bag: Path, received: dict[str, list[bytes]], seconds: float) -> int:
