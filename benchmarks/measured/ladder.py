@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.support.scripts import parser_of
+from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.models.effects.effect import Effect
@@ -43,8 +43,7 @@ from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |
-|---|---|---|---|---|"""
+HEAD = ruled("| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |")
 ORDER = ("row_id", "push_index")  # meaningless in the square's table: its rows are shuffled
 
 
@@ -173,7 +172,7 @@ def step_row(before: PushScores | None, after: PushScores, name: str) -> str:
     cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
     for figure in (total_nmse, total_nlpd):
         cells.append("" if before is None else difference_by_push(before, after, figure).text("+.3f"))
-    return f"| {name} | {' | '.join(cells)} |"
+    return piped([name, *cells])
 
 
 if __name__ == "__main__":
