@@ -26,6 +26,7 @@ import numpy as np
 from benchmarks.adaptation.days import MODEL, cut_measured, cut_rig, make, train, tuesdays
 from benchmarks.adaptation.methods import METHODS, Tuesday
 from benchmarks.adaptation.tables import Record, markdown, rows, verdict
+from benchmarks.support.scripts import parser_of
 from push_predictor.models.store.model_file import load_model
 
 TITLES = {"after": "After so many pushes", "next": "The next pushes, each predicted before it is seen"}
@@ -33,7 +34,7 @@ TITLES = {"after": "After so many pushes", "next": "The next pushes, each predic
 
 def main() -> None:
     """Run one of the commands."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("command", choices=("make", "run", "table"))
     for name in ("data", "results", "out", "measured"):
         parser.add_argument(f"--{name}", type=Path)

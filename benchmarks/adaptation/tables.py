@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.adaptation.methods import Scored, joined
 from benchmarks.adaptation.rigs import CHANGES, NOTHING
+from benchmarks.support.scripts import piped, ruled
 from push_predictor.evaluation.estimate import Estimate, difference_by_push, of_draws, total_exact_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, samples_of
 from push_predictor.types import Array
@@ -109,7 +110,7 @@ def share(deployed: PushScores, other: PushScores, oracle: PushScores) -> Estima
 
 def markdown(found: Sequence[dict[str, Any]], table: str, level: str) -> str:
     """The rows of one table, after or next, at one level: all, simulator or rig."""
-    lines = [HEAD, "|" + HEAD.count(" |") * " --- |"]
+    lines = [ruled(HEAD)]
     for row in found:
         if (row["table"], row["level"]) == (table, level):
             gains = [_cell(row["gain"].get(name), "+.2f") for name in OTHERS]
@@ -119,7 +120,7 @@ def markdown(found: Sequence[dict[str, Any]], table: str, level: str) -> str:
             )
             covered = [" ".join(f"{c:.2f}" for c in row["coverage"].get(name, ())) for name in ("adapted", "headed")]
             head = (row["rig"], row["change"], str(row["pushes"]), f"{row['nlpd']['deployed']:.2f}")
-            lines.append(f"| {' | '.join((*head, *gains, *shares, nmse, *covered))} |")
+            lines.append(piped([*head, *gains, *shares, nmse, *covered]))
     return "\n".join(lines) + "\n"
 
 

@@ -53,12 +53,6 @@ class Change:
         return not self.effects and not self.faults and self.noise_ratio == 1.0
 
 
-def group_at(place: float) -> str:
-    """Group of a recording at `place` in [0, 1) of the shares."""
-    bounds = np.cumsum(list(catalogue.GROUP_SHARES.values()))
-    return list(catalogue.GROUP_SHARES)[int(np.searchsorted(bounds, place * bounds[-1], side="right"))]
-
-
 def draw_distribution(rng: np.random.Generator, group: str) -> tuple[PushDistribution, Answer]:
     """How the pushes of the new recording are chosen, and the answer if that is all that changes."""
     rest = float(rng.choice([0.0, 0.0, 0.0, rng.uniform(0.2, 0.4)]))

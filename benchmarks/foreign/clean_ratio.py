@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much a hidden change moves the outcomes of pushes, compared with their process noise."""
+"""The outcomes of pushes as a model sees them, without sensor noise: how much a hidden change moves them."""
 
 from __future__ import annotations
 
@@ -28,9 +28,3 @@ def outcomes(rig: Rig, motion: PushMotion, touch: Array, faults: Sequence[Fault]
         step[:, :2] = rotate(step[:, :2], np.full(len(step), -motion.heading[push]))
         rows.append(step)
     return np.concatenate(rows)
-
-
-def change_over_noise(changed: Array, unchanged: Array, other_noise: Array) -> float:
-    """Root-mean-square change of outcomes in units of their difference between two draws of the noise."""
-    spread = np.sqrt(np.mean((other_noise - unchanged) ** 2, axis=0))
-    return float(np.sqrt(np.mean(((changed - unchanged) / spread) ** 2)))

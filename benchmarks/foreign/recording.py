@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.foreign import engine
-from benchmarks.foreign.catalogue import CHANNELS
-from benchmarks.foreign.change import Answer, Change, draw_change, draw_distribution, group_at
-from benchmarks.foreign.clean_ratio import change_over_noise, outcomes
+from benchmarks.foreign.catalogue import CHANNELS, GROUP_SHARES
+from benchmarks.foreign.change import Answer, Change, draw_change, draw_distribution
+from benchmarks.foreign.clean_ratio import outcomes
 from benchmarks.foreign.conditions import PushFacts
 from benchmarks.foreign.motion import PushMotion
 from benchmarks.foreign.noise import ProcessNoise, draw_process_noise
@@ -24,6 +23,7 @@ from benchmarks.foreign.scalars import draw_scalars
 from benchmarks.foreign.sensing import sense
 from benchmarks.foreign.session import Track, lay_out
 from benchmarks.support.bags import write_bag
+from benchmarks.support.truths import change_over_noise, group_at, write_truth
 
 FIRST_DAY = 1_790_000_000_000_000_000  # ns since 1970
 DAY = 86_400_000_000_000  # ns
@@ -62,7 +62,7 @@ def make_recording(spec: RecordingSpec, data: Path, truth: Path) -> None:
         first_rng, data / "training", rig, training, motion, Change("none"), FIRST_DAY + 3 * spec.number * DAY
     )
 
-    group = group_at(_share_of(spec))
+    group = group_at(GROUP_SHARES, _share_of(spec))
     distribution, shifted = draw_distribution(change_rng, group)
     new = draw_inputs(new_rng, rig, spec.later, distribution)
     change = draw_change(change_rng, group, rig, new.facts)
@@ -71,10 +71,7 @@ def make_recording(spec: RecordingSpec, data: Path, truth: Path) -> None:
 
     ratio = clean_ratio(other_rng, rig, new, motion, change)
     answers = (shifted,) if group == "input_shift" else change.answers
-    facts = _truth(spec, rig, change.group, new, answers, ratio)
-    unfinished = truth.with_suffix(".part")
-    unfinished.write_text(json.dumps(facts, indent=1) + "\n")
-    unfinished.rename(truth)
+    write_truth(truth, _truth(spec, rig, change.group, new, answers, ratio))
 
 
 def _share_of(spec: RecordingSpec) -> float:

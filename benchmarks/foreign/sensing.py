@@ -15,28 +15,12 @@ from benchmarks.foreign.faults import Fault
 from benchmarks.foreign.rig import Rig, Sensors
 from benchmarks.foreign.session import Session, Track
 from benchmarks.support import bags
-from benchmarks.support.plane import Array, IntArray
+from benchmarks.support.bags import Samples
+from benchmarks.support.plane import Array
 
 LOG_DELAY = 300_000  # ns between a stamp and its arrival at the recorder
 SLIDER_HEIGHT = 0.015  # m
 MISSED = 0.0005  # share of frames that the tracker misses
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Stamps (s from the start) and values, one row each."""
-
-    time: Array
-    values: Array
-
-    def stamps(self, start: int) -> IntArray:
-        """The stamps in ns since 1970; `start` is the recording's first instant."""
-        return np.asarray(start + np.round(self.time * 1e9).astype(np.int64))
-
-    @property
-    def short(self) -> Array:
-        """Values rounded to single precision, as sensors deliver them."""
-        return self.values.astype(np.float32).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -52,10 +36,15 @@ class SensedSession:
         """The topics of a bag; `start` is the recording's first instant in ns since 1970."""
         bodies = [("/slider/pose", self.slider), ("/pusher/pose", self.pusher)]
         return [
-            *(bags.poses(name, of.stamps(start), of.short[:, :3], of.values[:, 3], LOG_DELAY) for name, of in bodies),
-            bags.wrenches("/pusher/wrench", self.wrench.stamps(start), self.wrench.short, LOG_DELAY),
+            *(bags.poses(name, of.stamps(start), _short(of)[:, :3], of.values[:, 3], LOG_DELAY) for name, of in bodies),
+            bags.wrenches("/pusher/wrench", self.wrench.stamps(start), _short(self.wrench), LOG_DELAY),
             *(bags.scalars(name, of.stamps(start) + LOG_DELAY, of.values) for name, of in self.scalars.items()),
         ]
+
+
+def _short(samples: Samples) -> Array:
+    """Values rounded to single precision, as sensors deliver them."""
+    return samples.values.astype(np.float32).astype(np.float64)
 
 
 def sense(

@@ -13,7 +13,6 @@ n = 0 is the prior model. A row "minus" has paired differences from the plain mo
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -25,6 +24,7 @@ import numpy as np
 
 from benchmarks.measured.scores import within
 from benchmarks.measured.square import imported_square
+from benchmarks.support.scripts import parser_of, ruled
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_exact_nlpd, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.splits import FOLDS, Split, split_by_push
@@ -55,14 +55,14 @@ class Case:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, help="the folder of the measured data")
     parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
     parser.add_argument("--sizes", nargs="+", type=int, default=SIZES)
     parser.add_argument("--models", nargs="+", default=MODELS, metavar="KIND:MEAN")
     options = parser.parse_args(arguments)
     for name, cases in (*measured_cases(options.data), *simulated_cases(options.bags)):
-        print(f"\n{name}\n\n{HEAD}\n{8 * '|---'}|")
+        print(f"\n{name}\n\n{ruled(HEAD)}")
         for n in options.sizes:
             if all(n <= len(case.training) for case in cases):
                 rows(cases, n, options.models)

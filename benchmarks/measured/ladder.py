@@ -13,7 +13,6 @@ where the names of the recordings state them, the support points. No base is fit
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.models.effects.effect import Effect
@@ -43,8 +43,7 @@ from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |
-|---|---|---|---|---|"""
+HEAD = ruled("| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |")
 ORDER = ("row_id", "push_index")  # meaningless in the square's table: its rows are shuffled
 
 
@@ -58,7 +57,7 @@ class Measured:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the steps of each trace."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
     parser.add_argument("--base", choices=sorted(BASES))
@@ -173,7 +172,7 @@ def step_row(before: PushScores | None, after: PushScores, name: str) -> str:
     cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
     for figure in (total_nmse, total_nlpd):
         cells.append("" if before is None else difference_by_push(before, after, figure).text("+.3f"))
-    return f"| {name} | {' | '.join(cells)} |"
+    return piped([name, *cells])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ its steps is scored on the held-out pushes.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -20,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.measured.ladder import HEAD, LADDERS, step_row
+from benchmarks.support.scripts import parser_of
 from push_predictor.evaluation.ladder_page import parameter_lines
 from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.scored_ladder import score_ladder
@@ -42,7 +42,7 @@ QUICK_ROWS = 200
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the ladders."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
     parser.add_argument("--quick", action="store_true", help=f"{QUICK_ROWS} windows")

@@ -12,6 +12,7 @@ from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.fits.fit import KINDS, Fit, Score, SplitName, score
 
 from benchmarks.measured.scores import HEAD, difference, figures
+from benchmarks.support.scripts import ruled
 from push_predictor.evaluation.push_scores import pooled
 from push_predictor.evaluation.splits import FOLDS
 from push_predictor.recordings.importers import import_source
@@ -25,7 +26,8 @@ def mit_square_tables(data: Path, work: Path, quick: bool) -> None:
     """Print a table for each split."""
     pushes = imported_square(data, work)
     for split, name in SPLITS:
-        print(f"\n{name}\n\n| model | n | {HEAD} | NMSE, NLPD: mean of {FOLDS} | CPU, s |\n{10 * '|---'}|")
+        head = f"| model | n | {HEAD} | NMSE, NLPD: mean of {FOLDS} | CPU, s |"
+        print(f"\n{name}\n\n{ruled(head)}")
         for n in SIZES[:1] if quick else SIZES:
             scores = {kind: square_scores(pushes, kind, n, split) for kind in KINDS}
             for kind in KINDS:

@@ -3,15 +3,14 @@
 
 """Models on pushes measured by others: prints the tables of docs/results/accuracy.md.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit-square] [--quick]
 
-FOLDER has mcube_preliminary, mit_raw and mit_square. Everything is imported into a temporary folder and takes the path
+FOLDER has mcube_preliminary and mit_square. Everything is imported into a temporary folder and takes the path
 of the command line: import, windows, train_model, compare. Only the random split separates windows of one push.
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,7 +20,7 @@ import numpy as np
 
 from benchmarks.measured.scores import HEAD, PLAIN, Fold, figures, pooled, total, trained
 from benchmarks.measured.square import mit_square_tables
-from push_predictor.models.mechanics.fitted import analytical_mechanics
+from benchmarks.support.scripts import parser_of, ruled
 from push_predictor.models.train import TrainingOptions
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import distinct_pushes, load_data, load_rig_for
@@ -30,7 +29,6 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.types import Array
 
 BLOCKS = {"Al": "aluminium", "St": "steel"}
 STRIDE = 0.02  # s between the starts of overlapping training windows
@@ -46,7 +44,7 @@ MCUBE_MODELS = (  # kind, fitted physics, stride of the training windows
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="the folder of the measured data")
     parser.add_argument("--kind", choices=tuple(TABLES), action="append", help="which tables; all if not given")
     parser.add_argument("--quick", action="store_true", help="mit-square: n = 100 only")
@@ -56,18 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             TABLES[kind](options.data, Path(work), options.quick)
 
 
-# --- mcube ----------------------------------------------------------------------------------------------------
-
-
 def mcube_tables(data: Path, work: Path, quick: bool) -> None:
     """Print the windows of the eight runs, and the models of each block on held-out runs."""
     runs = sorted(import_source("mcube", [data / "mcube_preliminary"], work).written)
-    print("\n| run | windows | s in windows | tip, mm/s | path of the block, mm | turn, degrees |\n" + 6 * "|---" + "|")
+    print("\n" + ruled("| run | windows | s in windows | tip, mm/s | path of the block, mm | turn, degrees |"))
     for run in runs:
         print(f"| {run.name} | {_summary(read_recording(run))} |")
     for prefix, name in BLOCKS.items():
         block = [run for run in runs if run.name.startswith(prefix)]
-        print(f"\n{name}\n\n| model | trained on | {HEAD} | in domain, NMSE there | NMSE run by run |\n{10 * '|---'}|")
+        head = f"| model | trained on | {HEAD} | in domain, NMSE there | NMSE run by run |"
+        print(f"\n{name}\n\n{ruled(head)}")
         for kind, fit, stride in MCUBE_MODELS:
             print(_leave_one_out_row(block, kind, fit, stride), flush=True)
 
@@ -127,28 +123,7 @@ def _nmse_in_domain(folds: Sequence[Fold]) -> float:
     return float(np.sum(error.sum(axis=0) / spread.sum(axis=0)))
 
 
-# --- mit ------------------------------------------------------------------------------------------------------
-
-
-def mit_table(data: Path, work: Path, quick: bool) -> None:
-    """Print the windows of the one push: observed and by the analytical model."""
-    (path,) = import_source("mit", [data / "mit_raw"], work).written
-    rig, table = load_rig_for([path]), load_data([path])
-    for velocity, contact, angle in table.inputs:
-        print(f"\nvelocity {1e3 * velocity:.0f} mm/s, contact {contact:.3f}, angle {np.degrees(angle):.1f} degrees")
-    print("\n| | dx, mm | dy, mm | dtheta, degrees |\n|---|---|---|---|")
-    print(_outcome_rows("observed", table.outcomes))
-    physics = analytical_mechanics(rig.outline, rig.pusher_radius)
-    print(_outcome_rows("analytical, textbook", physics.displacement(table.inputs, table.duration)))
-
-
-def _outcome_rows(title: str, outcomes: Array) -> str:
-    rows = outcomes * [1e3, 1e3, 180.0 / np.pi]
-    return "\n".join(f"| {title} | {dx:.1f} | {dy:.1f} | {dtheta:.1f} |" for dx, dy, dtheta in rows)
-
-
 TABLES: dict[str, Callable[[Path, Path, bool], None]] = {
     "mcube": mcube_tables,
-    "mit": mit_table,
     "mit-square": mit_square_tables,
 }

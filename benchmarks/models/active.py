@@ -17,7 +17,6 @@ pushes that matter are those of the pool, of which a way sees the inputs of all 
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -28,6 +27,7 @@ import numpy as np
 
 from benchmarks.measured.square import imported_square
 from benchmarks.models.active_table import REFERENCE, print_tables
+from benchmarks.support.scripts import parser_of
 from push_predictor.adaptation import Adaptation
 from push_predictor.design.batch import CHOSEN_OF_PRIOR, FIRST, information_of
 from push_predictor.design.candidates import Courses
@@ -75,7 +75,7 @@ class Case:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Train and score the models, or print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run")
     run.add_argument("--out", type=Path, required=True)

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support.scripts import piped, ruled
 from push_predictor.types import Array
 
 DRAWS = 1000
@@ -107,19 +108,18 @@ def needed(sizes: Array, scores: Array, target: Array) -> Array:
 
 def _print_scores(curves: Mapping[tuple[str, str], Curve]) -> None:
     sizes = sorted({n for curve in curves.values() for n in curve.sizes.tolist()})
-    print("| model | way | " + " | ".join(f"{n:.0f}" for n in sizes) + " |\n" + "|---" * (len(sizes) + 2) + "|")
+    print(ruled(piped(["model", "way", *(f"{n:.0f}" for n in sizes)])))
     for (model, way), curve in curves.items():
         known = dict(zip(curve.sizes.tolist(), zip(curve.nmse[0], curve.nlpd[0], strict=True), strict=True))
         cells = [f"{known[n][0]:.3f}, {_minus(known[n][1])}" if n in known else "" for n in sizes]
-        print(f"| {model} | {way} | " + " | ".join(cells) + " |")
+        print(piped([model, way, *cells]))
 
 
 def _print_needed(curves: Mapping[tuple[str, str], Curve]) -> None:
     reference = curves[REFERENCE]
     most = reference.sizes[-1]
-    print(
-        f"\n| model | way | pushes for the NMSE of {most:.0f} | pushes for the NLPD of {most:.0f} |\n|---|---|---|---|"
-    )
+    heads = (f"pushes for the {score} of {most:.0f}" for score in ("NMSE", "NLPD"))
+    print("\n" + ruled(piped(["model", "way", *heads])))
     for (model, way), curve in curves.items():
         nmse = needed(curve.sizes, curve.nmse, reference.nmse[:, -1])
         nlpd = needed(curve.sizes, curve.nlpd, reference.nlpd[:, -1])
@@ -141,13 +141,13 @@ def _print_differences(curves: Mapping[tuple[str, str], Curve]) -> None:
         return
     others = [way for way in ways if way != "suggest"]
     heads = [f"minus {way}: {score}" for way in others for score in ("NMSE", "NLPD")]
-    print("\n| model | pushes | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 2) + "|")
+    print("\n" + ruled(piped(["model", "pushes", *heads])))
     for model in dict.fromkeys(model for model, way in curves if way == "suggest"):
         own = curves[model, "suggest"]
         for k, size in enumerate(own.sizes.tolist()):
             compared = [curves.get((model, way)) for way in others]
             cells = [cell for other in compared for cell in _differences(own, k, other)]
-            print(f"| {model} | {size:.0f} | " + " | ".join(cells) + " |")
+            print(piped([model, f"{size:.0f}", *cells]))
 
 
 def _differences(own: Curve, k: int, other: Curve | None) -> list[str]:

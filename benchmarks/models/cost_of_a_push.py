@@ -13,7 +13,6 @@ load. Also printed: a push alone by PushModel.predict, and the time to tabulate 
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.models.made_up_models import analytical_model, eight_fitted, fitted_model, made_up_table, square_rig
+from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.load_map import load_map
@@ -60,7 +60,7 @@ class Asked:
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the table; draw the picture."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--most", type=int, default=MOST, help="pushes of the largest batch (default %(default)s)")
     parser.add_argument("--picture", type=Path, help="file to draw, such as docs/pictures/cost_of_a_push.png")
     options = parser.parse_args(arguments)
@@ -151,7 +151,7 @@ def table(costs: dict[str, list[float]], sizes: list[int]) -> str:
     """Microseconds a push, as Markdown."""
     head = ["mechanics, accuracy", *(f"{size:,}".replace(",", " ") for size in sizes)]
     rows = [[name, *(f"{1e6 * cost:.3g}" for cost in row)] for name, row in costs.items()]
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
+    return "\n".join([ruled(piped(head)), *map(piped, rows)])
 
 
 def _paint(costs: dict[str, list[float]], sizes: list[int], figure: Figure) -> None:

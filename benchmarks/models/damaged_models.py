@@ -11,7 +11,6 @@ seed and number. test/faults/test_faults_models.py tries 60 copies of each kind 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -21,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.models.made_up_models import drifting_effect, extended_model, made_up_table, square_rig
+from benchmarks.support.scripts import parser_of
 from push_predictor.errors import ModelFileError
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
@@ -35,7 +35,7 @@ WINDOWS, PROBES = 75, 12  # to train on, to compare predictions on
 
 def main() -> None:
     """Print, for each kind of model, how many copies were refused and how many predict as before."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--copies", type=int, default=2000, help="of each kind of model (default %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the damage (default %(default)s)")
     options = parser.parse_args()

@@ -24,6 +24,7 @@ from push_predictor_paper.data.corpus import learning_set
 from push_predictor_paper.plan import FULL
 
 from benchmarks.measured.informed import Case, measured_cases, simulated_cases, trained
+from benchmarks.support.scripts import parser_of, ruled
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.estimate import by_push, difference_by_push, of_draws, total_exact_nlpd
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, standardised
@@ -56,7 +57,7 @@ class Found:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, help="the folder of the measured data")
     parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
     parser.add_argument("--sets", action="store_true", help="the simulated pairs of shape and surface")
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print_cases(name, cases, options)
     if options.sets:
         each = [print_cases(name, cases, options) for name, cases in set_cases()]
-        print(f"\nall {len(each)} pairs together\n\n{HEAD}\n{9 * '|---'}|")
+        print(f"\nall {len(each)} pairs together\n\n{ruled(HEAD)}")
         for mean, tables in zip(options.means, zip(*each, strict=True), strict=True):
             for of_size in zip(*tables, strict=True):
                 print_rows(_together(of_size), mean)
@@ -78,7 +79,7 @@ def print_cases(name: str, cases: Sequence[Case], options: argparse.Namespace) -
     """Print the table of some cases; return what was found by mean and size."""
     held = [case.test for case in cases]
     pushes = sum(len(table.pushes) for table in held)
-    print(f"\n{name}: {sum(map(len, held))} held-out windows of {pushes} pushes\n\n{HEAD}\n{9 * '|---'}|")
+    print(f"\n{name}: {sum(map(len, held))} held-out windows of {pushes} pushes\n\n{ruled(HEAD)}")
     most = min(len(case.training) for case in cases)
     every = []
     for mean in options.means:

@@ -21,6 +21,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
 DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])  # m, m, rad: dy and dtheta are correlated
 EIGHT = {
     "contact_friction": 0.25,
     "friction_by_angle": 0.1,
@@ -43,6 +44,17 @@ def made_up_table(count: int, seed: int) -> PushTable:
     covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
     covariates |= {name: rng.uniform(-0.1, 0.1, count) for name in ("slider_x", "slider_y")}
     return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
+
+
+def trained_vhgp(count: int) -> PushModel:
+    """A VHGP of so many windows at several speeds, with correlated noise that grows with the angle."""
+    rng, rig = np.random.default_rng(0), square_rig()
+    inputs = rng.uniform([0.01, 0.0, -1.2], [0.05, 1.0, 1.2], (count, 3))
+    duration = np.full(count, 0.2)
+    outcomes = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes += rng.normal(size=(count, 3)) @ NOISE * (0.3 + np.abs(inputs[:, 2:]))
+    table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
+    return train_model(table, rig, "vhgp", name=f"vhgp_{count}", options=TrainingOptions(mean="zero"))
 
 
 def square_rig() -> Rig:

@@ -17,7 +17,6 @@ resample whole pushes. The last column is the paired difference of the exact NLP
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +26,7 @@ import numpy as np
 
 from benchmarks.measured.scores import within
 from benchmarks.models.rigs_at_speeds import RIGS, session
+from benchmarks.support.scripts import parser_of, ruled
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_exact_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.validation import compare
@@ -74,7 +74,7 @@ class Case:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--rigs", nargs="+", choices=tuple(RIGS), default=tuple(RIGS))
     parser.add_argument("--models", nargs="+", choices=tuple(MODELS), default=tuple(MODELS))
     parser.add_argument("--count", type=int, default=3)
@@ -123,7 +123,7 @@ def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int)
         found[model] = pooled([case.scores(model, rows) for case in cases])
     pushes = sum(len(case.test.pushes) for case in cases)
     windows = sum(len(case.test) for case in cases)
-    print(f"\n{rig}: {windows} windows of {pushes} pushes on {len(cases)} rigs\n\n{HEAD}\n{5 * '|---'}|")
+    print(f"\n{rig}: {windows} windows of {pushes} pushes on {len(cases)} rigs\n\n{ruled(HEAD)}")
     best = found[ALL_SPEEDS]
     for model, scores in found.items():
         nmse, nlpd = by_push(scores, total_nmse).text(".3f"), by_push(scores, total_exact_nlpd).text(".2f")
@@ -131,7 +131,7 @@ def print_rig(rig: str, cases: Sequence[Case], models: Sequence[str], rows: int)
         print(f"| {model} | {nmse} | {nlpd} | {within(scores)} | {difference} |")
     if "vhgp auto" not in found:
         return
-    print(f"\n{BY_SPEED}\n{5 * '|---'}|")
+    print(f"\n{ruled(BY_SPEED)}")
     for speed in ASKED:
         default, there = (at_speed(found[model], speed) for model in ("vhgp auto", ALL_SPEEDS))
         count = int(default.windows.sum())

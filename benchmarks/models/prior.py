@@ -17,7 +17,6 @@ and the coverage before the first push on average over rigs and on the worst.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -30,6 +29,7 @@ from benchmarks.measured.informed import OWN_FOLDS, Case, with_rig
 from benchmarks.measured.scores import WITHIN, within
 from benchmarks.measured.square import imported_square
 from benchmarks.models.rigs_at_speeds import session
+from benchmarks.support.scripts import parser_of, ruled
 from push_predictor.evaluation.estimate import by_push, total_exact_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.splits import FOLDS, push_folds
@@ -48,7 +48,7 @@ HEAD = "| pushes | windows | model | NMSE (95 %) | exact NLPD (95 %) | within 95
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
     parser.add_argument("--data", type=Path, help="the folder of the measured data")
     parser.add_argument("--kinds", nargs="+", choices=("prior", "gp", "vhgp"), default=("prior", "gp", "vhgp"))
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     before = {}
     for name, cases in (*_simulated(options.bags), *_measured(options.data), *_others(options.rigs)):
-        print(f"\n{name}\n\n{HEAD}\n{7 * '|---'}|")
+        print(f"\n{name}\n\n{ruled(HEAD)}")
         for n in options.pushes:
             if all(n <= len(case.training.pushes) for case in cases):
                 scores = _rows(cases, n, options.kinds)

@@ -17,13 +17,16 @@ import argparse
 import sys
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter, sleep
 
 import numpy as np
 from rclpy.client import Client
 
-from benchmarks.models.made_up_models import analytical_model, made_up_table
-from benchmarks.nodes.server_under_test import Caller, caller, graph, load, model_files, predict_server, single_requests
+from benchmarks.models.made_up_models import analytical_model, made_up_table, trained_vhgp
+from benchmarks.nodes.server_under_test import Caller, caller, graph, load, predict_server, single_requests
+from benchmarks.nodes.vitals import memory_of
+from benchmarks.support.scripts import parser_of
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
@@ -39,10 +42,13 @@ def main() -> int:
     """Measure and print."""
     arguments = _arguments()
     with ExitStack() as stack:
-        paths = [arguments.model] if arguments.model else stack.enter_context(model_files(1000))
+        paths = [arguments.model]
         if not arguments.model:
-            paths.append(paths[0].with_name("analytical.pushmodel"))
-            save_model(analytical_model(made_up_table(300, 0)), paths[-1])
+            folder = Path(stack.enter_context(TemporaryDirectory(prefix="push_model_")))
+            models = (trained_vhgp(1000), analytical_model(made_up_table(300, 0)))
+            paths = [folder / f"{model.name}.pushmodel" for model in models]
+            for model, path in zip(models, paths, strict=True):
+                save_model(model, path)
         stack.enter_context(graph(arguments.domain))
         for path in paths:
             _measure_model(path, arguments.sizes, arguments.seconds)
@@ -69,7 +75,7 @@ def _measure(client: Caller, model: PushModel, sizes: list[int], seconds: float,
     for size in sizes:
         alone += _single_times(client, single, requests)
         medians[size] = _batch_time(client, batch, model, size, seconds)
-        memory[size] = _peak_memory(server)
+        memory[size] = memory_of(server, "VmHWM")
     rate = 1.0 / float(np.median(alone))
     print(f"single calls, one at a time: {rate:.0f} predictions/s (p50 of {len(alone)})")
     print(f"{'n a call':>10s}{'ms a call':>12s}{'predictions/s':>16s}{'/ single':>10s}{'server peak MB':>16s}")
@@ -119,14 +125,8 @@ def _query(model: PushModel, size: int) -> PushQuery:
     return PushQuery("", model.training.inputs[rows], float(model.training.duration[0]), {})
 
 
-def _peak_memory(process: int) -> float:
-    """Peak resident memory of the process, MB."""
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
-
-
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--model", type=Path, help="a model file (default: train one)")
     parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES), help="pushes a call")
     parser.add_argument("--seconds", type=float, default=2.0, help="of calls for each size (default 2)")

@@ -31,6 +31,7 @@ from typing import Any
 
 from benchmarks.nodes.server_under_test import Caller, caller, graph, load, process
 from benchmarks.nodes.vitals import Vitals, growth, vitals
+from benchmarks.support.scripts import parser_of
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
@@ -163,7 +164,7 @@ def _text(value: Any) -> str:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="at most (default %(default)s)")
     parser.add_argument("--hours", type=float, default=24.0, help="of recorded time (default %(default)s)")
     parser.add_argument("--rate", type=float, default=100.0, help="of the replay (default %(default)s)")

@@ -31,6 +31,7 @@ import numpy as np
 from benchmarks.nodes.load_client import MANY, SINGLE, TIMEOUT
 from benchmarks.nodes.server_under_test import caller, graph, load, predict_server
 from benchmarks.nodes.vitals import Growth, Vitals, growth, vitals
+from benchmarks.support.scripts import parser_of
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
 A_PROCESS = 10  # clients per process; with one process each, localhost discovery would miss some
@@ -121,7 +122,7 @@ def _clients(out: Path, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--clients", type=int, default=50, help="default %(default)s")
     parser.add_argument("--minutes", type=float, default=10.0, help="default %(default)s")
     parser.add_argument("--rate", type=float, default=5.0, help="requests a second of each client (%(default)s)")

@@ -32,6 +32,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.utilities import get_default_context
 
+from benchmarks.support.scripts import parser_of
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 TIMEOUT = 5.0  # s, after which a client counts a request as failed
@@ -206,7 +207,7 @@ def _batch(rng: np.random.Generator) -> PredictPushBatch.Request:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--clients", type=int, default=1)
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--rate", type=float, required=True, help="requests a second of each client, at most")

@@ -47,6 +47,7 @@ from benchmarks.models.made_up_models import (
     informed_model,
     made_up_table,
     prior_model,
+    trained_vhgp,
 )
 from benchmarks.nodes.server_under_test import (
     DEPTH,
@@ -58,8 +59,8 @@ from benchmarks.nodes.server_under_test import (
     predict_server,
     process,
     single_requests,
-    trained_vhgp,
 )
+from benchmarks.support.scripts import parser_of, ruled
 from msg_adapters.predictions import push_from_request
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
@@ -220,8 +221,8 @@ def _report(times: dict[str, np.ndarray]) -> None:
 def _report_callbacks(cases: list[Case], statuses: list[dict[str, str]]) -> None:
     """Print a table; processor time, because the time of a busy machine goes to others."""
     medians = {case.name: float(status["callback_p50_us"]) for case, status in zip(cases, statuses, strict=True)}
-    print("\n| kind | callback, us | 99 % | callback / tabulated | processor time, us | library, us | predicts |")
-    print("|---" * 7 + "|")
+    head = "| kind | callback, us | 99 % | callback / tabulated | processor time, us | library, us | predicts |"
+    print("\n" + ruled(head))
     for case, status in zip(cases, statuses, strict=True):
         tabulated = as_served(case.model)
         ratio = f"{medians[case.name] / medians[TABULATED]:.2f}" if TABULATED in medians else ""
@@ -248,7 +249,7 @@ def _processor_times(tabulated: TabulatedModel, case: Case) -> tuple[float, floa
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--model", type=Path, help="a model file (default: the kinds above)")
     parser.add_argument("--calls", type=int, default=2000, help="calls of each service (default 2000)")
     parser.add_argument("--domain", type=int, default=77, help="ROS domain to run in (default 77)")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,18 +23,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from push_predictor.blas_threads import VARIABLES
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated.tabulated_model import outside_pushes
-from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictPush
 
 DEPTH = QoSProfile(depth=100)
-NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])  # m, m, rad: dy and dtheta are correlated
 
 
 class Caller:
@@ -137,16 +129,6 @@ def process(*arguments: str, **given: str) -> Iterator[int]:
         running.wait(10.0)
 
 
-@contextmanager
-def model_files(*sizes: int) -> Iterator[list[Path]]:
-    """Write, for each size, a VHGP trained on that many simulated windows of the MIT square."""
-    with tempfile.TemporaryDirectory(prefix="push_model_") as folder:
-        paths = [Path(folder) / f"vhgp_{size}.pushmodel" for size in sizes]
-        for size, path in zip(sizes, paths, strict=True):
-            save_model(trained_vhgp(size), path)
-        yield paths
-
-
 def single_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
     """Requests for `count` of the model's training pushes, drawn at random."""
     rows = model.training.take(np.random.default_rng(0).integers(0, len(model.training), count))
@@ -168,15 +150,3 @@ def outside_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
 def load() -> str:
     """The machine's load averages, to print next to times."""
     return "{:.1f} {:.1f} {:.1f}".format(*os.getloadavg())
-
-
-def trained_vhgp(count: int) -> PushModel:
-    """A VHGP of so many simulated windows of the MIT square."""
-    rng = np.random.default_rng(0)
-    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = rng.uniform([0.01, 0.0, -1.2], [0.05, 1.0, 1.2], (count, 3))
-    duration = np.full(count, 0.2)
-    outcomes = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(inputs, duration)
-    outcomes += rng.normal(size=(count, 3)) @ NOISE * (0.3 + np.abs(inputs[:, 2:]))
-    table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
-    return train_model(table, rig, "vhgp", name=f"vhgp_{count}", options=TrainingOptions(mean="zero"))

@@ -36,6 +36,12 @@ def vitals(process: int) -> Vitals:
     return Vitals(monotonic(), memory, threads, len(os.listdir(folder / "fd")))
 
 
+def memory_of(process: int, key: str) -> float:
+    """Memory of a process, MB; key: VmRSS (resident now) or VmHWM (at most so far)."""
+    lines = (Path("/proc") / str(process) / "status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith(key)) / 1024.0
+
+
 @dataclass(frozen=True)
 class Growth:
     """Growth after the warm-up.

@@ -3,5 +3,5 @@
 
 """Rollouts and planned pushes against the rig simulator.
 
-`rollout`, `risk` and `risk_picture` are scripts; the other modules belong to them.
+`mpc_goals`, `rollout` and `risk` are scripts; the other modules belong to them.
 """

@@ -13,7 +13,6 @@ model's MPC to other goals there. The models predict in this process.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,6 +22,7 @@ import numpy as np
 
 from benchmarks.blind.scores import wilson
 from benchmarks.planning.closed_loops import BUDGET, LIMIT, Command, Planner, run
+from benchmarks.support.scripts import parser_of, piped, ruled
 from examples.mpc import OUT, SamplingMpc
 from examples.square import TABLE, WINDOW, square_model, square_pusher, square_spec
 from push_predictor.adaptation import Adaptation
@@ -44,12 +44,15 @@ FARTHEST, TURNED = 0.06, 0.6  # of goals: m, rad
 LENGTHS, SPEEDS = (2, 4, 6, 8, 10, 12, 16), (0.02, 0.05)  # of choose_push: windows, m/s
 FRICTION, OFFSET = 2.0 * CONTACT_FRICTION, 0.008  # of the changed rig; m
 CALIBRATION, SEED = 20, 20  # goals of the pushes that the adapted model has seen
-HEAD = "rig, planner, reached in 6 s (%), reached in 20 s (%), s, contacts, windows, error after 6 s, ms per plan"
+HEAD = (
+    "| rig | planner | reached in 6 s (%) | reached in 20 s (%) | s | contacts | windows | error after 6 s "
+    "| ms per plan |"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run every planner and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--goals", type=int, default=200, help="number of goals (default %(default)s)")
     parser.add_argument("--model", type=Path, default=OUT / "square.pushmodel", help="a file; trained if there is none")
     parser.add_argument("--tolerance", type=float, nargs=2, default=(0.002, 0.05), help="m, rad (default %(default)s)")
@@ -57,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     model, drawn = square_model(options.model), drawn_goals(options.goals + CALIBRATION, *options.tolerance)
     goals, others, predictor = drawn[: options.goals], drawn[options.goals :], tabulate(model)
     plain, changed = square_spec(SEED), changed_spec(SEED)
-    print("| " + HEAD.replace(", ", " | ") + " |\n" + "|---" * (HEAD.count(",") + 1) + "|")
+    print(ruled(HEAD))
     for speed in SPEEDS:
         _report(f"plain | `choose_push`, {1e3 * speed:.0f} mm/s", choosers(predictor, speed, goals), goals, plain)
     typical = model.predict_rows(model.training.inputs, model.training.duration).covariance.mean(axis=0)
@@ -149,7 +152,7 @@ def _report(name: str, planners: Sequence[Planner], goals: Sequence[Goal], spec:
     distance, turn = np.hypot(*runs.errors[:, :2].T), np.abs(runs.errors[:, 2])
     cells.append(f"{1e3 * np.median(distance):.1f} mm, {1e3 * np.median(turn):.0f} mrad")
     cells.append(f"{1e3 * np.median(runs.planning):.0f}, {1e3 * np.quantile(runs.planning, 0.95):.0f}")
-    print(f"| {name} | {' | '.join(cells)} |", flush=True)
+    print(piped([name, *cells]), flush=True)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ skipped. The thresholds of equal risk are applied afterwards (risk_table.py).
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -26,6 +25,7 @@ import numpy as np
 
 from benchmarks.planning.risk_table import VARIANTS, tables
 from benchmarks.planning.risk_tasks import TASKS, Problem, Task, inner_target, problem
+from benchmarks.support.scripts import parser_of
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
@@ -68,7 +68,7 @@ class Run:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the problems, or print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--out", type=Path, help="folder of the results")
     parser.add_argument("--table", type=Path, help="print the tables of a folder")
     parser.add_argument("--tasks", nargs="*", default=[task.name for task in TASKS])

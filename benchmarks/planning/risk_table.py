@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support.scripts import piped, ruled
+from push_predictor.evaluation.estimate import of_draws
 from push_predictor.types import Array, BoolArray
 
 DRAWS = 4000  # of the bootstrap
@@ -79,9 +81,10 @@ def _runs(rows: Sequence[dict[str, Any]]) -> Runs:
 
 def _attempted(runs: Mapping[str, Runs]) -> str:
     lines = [
-        "| covariance | reached, % | failed, % | no plan or missed, % | reached more than constant, points "
-        "| failed more, points | pushes more, both reached |",
-        "|---" * 7 + "|",
+        ruled(
+            "| covariance | reached, % | failed, % | no plan or missed, % | reached more than constant, points "
+            "| failed more, points | pushes more, both reached |"
+        )
     ]
     base = runs[BASE]
     for name, of in runs.items():
@@ -92,34 +95,23 @@ def _attempted(runs: Mapping[str, Runs]) -> str:
             _interval(100.0 * (of.failed.astype(float) - base.failed)),
             _interval((of.pushes - base.pushes)[both], 2),
         ]
-        cells = [
-            name,
-            _interval(100.0 * of.reached.astype(float)),
-            _interval(100.0 * of.failed.astype(float)),
-            f"{100.0 * other.mean():.0f}",
-        ]
-        lines.append(f"| {' | '.join(cells + (['–'] * 3 if of is base else more))} |")
+        cells = [name, _share(of.reached), _share(of.failed), f"{100.0 * other.mean():.0f}"]
+        lines.append(piped(cells + (["–"] * 3 if of is base else more)))
     return "\n".join(lines)
 
 
 def _calibration(runs: Mapping[str, Runs]) -> str:
     lines = [
-        "| covariance | promised risk, % | failed, % | promised probability, % | reached, % "
-        "| failure ranked above success |",
-        "|---" * 6 + "|",
+        ruled(
+            "| covariance | promised risk, % | failed, % | promised probability, % | reached, % "
+            "| failure ranked above success |"
+        )
     ]
     for name, of in runs.items():
         tried = np.isfinite(of.promised)
         risk = "–" if np.isnan(of.promised_risk).all() else f"{100.0 * np.nanmean(of.promised_risk):.1f}"
-        cells = [
-            name,
-            risk,
-            _interval(100.0 * of.failed[tried].astype(float)),
-            f"{100.0 * of.promised[tried].mean():.0f}",
-            _interval(100.0 * of.reached[tried].astype(float)),
-            _ranked(of),
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
+        promised = f"{100.0 * of.promised[tried].mean():.0f}"
+        lines.append(piped([name, risk, _share(of.failed[tried]), promised, _share(of.reached[tried]), _ranked(of)]))
     return "\n".join(lines)
 
 
@@ -136,16 +128,14 @@ def _equal_risk(runs: Mapping[str, Runs], risk: float) -> str:
     lines = [
         f"At most {100.0 * risk:g} % failed on the tuning problems:",
         "",
-        "| covariance | reached, % | failed, % | reached more than constant, points |",
-        "|---" * 4 + "|",
+        ruled("| covariance | reached, % | failed, % | reached more than constant, points |"),
     ]
     accepted = {name: _accepted(of, risk) for name, of in runs.items()}
-    base = (runs[BASE].reached & accepted[BASE]).astype(float)
+    base = runs[BASE].reached & accepted[BASE]
     for name, of in runs.items():
-        reached = (of.reached & accepted[name]).astype(float)
-        failed = (of.failed & accepted[name]).astype(float)
-        more = "–" if name == BASE else _interval(100.0 * (reached - base))
-        lines.append(f"| {name} | {_interval(100.0 * reached)} | {_interval(100.0 * failed)} | {more} |")
+        reached = of.reached & accepted[name]
+        more = "–" if name == BASE else _interval(100.0 * (reached.astype(float) - base))
+        lines.append(piped([name, _share(reached), _share(of.failed & accepted[name]), more]))
     return "\n".join(lines)
 
 
@@ -164,12 +154,15 @@ def _threshold(doubt: Array, failed: BoolArray, risk: float) -> float:
     return float(max(candidates, default=-np.inf))
 
 
+def _share(which: BoolArray) -> str:
+    """Per cent of the problems."""
+    return _interval(100.0 * which.astype(float))
+
+
 def _interval(values: Array | BoolArray, digits: int = 1) -> str:
     """Mean with its 95 % interval."""
     if not len(values):
         return "–"
     rng = np.random.default_rng(0)
     drawn = values[rng.integers(0, len(values), (DRAWS, len(values)))].mean(axis=1)
-    low, high = np.percentile(drawn, [2.5, 97.5])
-    text = f"{values.mean():.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
-    return text.replace("-", "−")
+    return of_draws(float(values.mean()), drawn).text(f".{digits}f")

@@ -37,6 +37,8 @@ from benchmarks.planning.rollout_truth import (
     repeats,
     weights_of,
 )
+from benchmarks.support.scripts import parser_of
+from push_predictor.evaluation.estimate import of_draws
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
@@ -98,15 +100,12 @@ def _report(tabulated: TabulatedModel, title: str, cases: Sequence[Steps], truth
         first = drawn if first is None else first
         divergence = np.mean([gaussian_divergence(s, t) for s, t in zip(samples, truth, strict=True)])
         covered = np.mean([inside(s, t) for s, t in zip(samples, truth, strict=True)], axis=(0, 1))
+        ratio = of_draws(float(np.median(drawn / first)), drawn / first)
+        energy = of_draws(value, drawn)
         print(
-            f"{name:12s}{_interval(value, drawn):>28s}{_interval(float(np.median(drawn / first)), drawn / first):>24s}"
-            f"{divergence:10.2f}" + "".join(f"{share:8.3f}" for share in covered)
+            f"{name:12s}{energy.text('.3f'):>28s}{ratio.text('.3f'):>24s}{divergence:10.2f}"
+            + "".join(f"{share:8.3f}" for share in covered)
         )
-
-
-def _interval(value: float, drawn: Array) -> str:
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return f"{value:.3f} ({low:.3f} to {high:.3f})"
 
 
 def _persistence(model: PushModel) -> list[str]:
@@ -154,7 +153,7 @@ DISTRIBUTIONS: dict[str, Callable[[TabulatedModel, Steps], Array]] = {
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--model", type=Path, help="a model file of the square on ABS (default: train one)")
     parser.add_argument("--repeats", type=int, default=200, help="repetitions of each push (default 200)")
     parser.add_argument("--picture", type=Path, help="also draw a push with two modes")

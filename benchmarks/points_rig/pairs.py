@@ -3,8 +3,6 @@
 
 """Make one numbered pair of recordings with its truth, from a seed."""
 
-import json
-import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +16,7 @@ from benchmarks.points_rig.sensors import Streams, sense
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import draw_noise, simulate
 from benchmarks.support.bags import write_bag
+from benchmarks.support.truths import write_truth
 
 EPOCH = 1_760_000_000  # s, absolute time of the first training session
 
@@ -62,10 +61,7 @@ def write_pair(pair: Pair, data: Path, truth: Path) -> None:
     for name, streams, start in zip(("training", "new"), (pair.training, pair.new), pair.starts, strict=True):
         shutil.rmtree(data / number / name, ignore_errors=True)
         write_bag(data / number / name, streams.serialised(start), pair.rig.record(), "points_rig")
-    truth.mkdir(parents=True, exist_ok=True)
-    draft = truth / f"{number}.json.draft"
-    draft.write_text(json.dumps(pair.truth, indent=2) + "\n", encoding="utf-8")
-    os.replace(draft, truth / f"{number}.json")
+    write_truth(truth / f"{number}.json", pair.truth)
 
 
 def record(random: np.random.Generator, rig: Rig, session: Session, scenario: Scenario) -> Streams:

@@ -10,6 +10,7 @@ from benchmarks.points_rig.rigs import Rig
 from benchmarks.points_rig.sessions import Session
 from benchmarks.points_rig.simulation import Tracks, draw_noise, simulate
 from benchmarks.support.plane import Array, IntArray, rotate
+from benchmarks.support.truths import change_over_noise
 
 PIECE = 0.2  # s
 JUDGED_PUSHES = 120
@@ -29,8 +30,7 @@ def displacements(session: Session, tracks: Tracks) -> Array:
 def clean_ratio(rig: Rig, session: Session, seed: int, effects: tuple[Effect, ...], ratio: float) -> float:
     """Size of the change in displacement over the difference between two noise draws without the change.
 
-    Both are root mean squares over the pieces of some of the session's pushes, each begun where it is planned; the
-    three outputs are pooled in units of the latter.
+    Of the pieces of some of the session's pushes, each begun where it is planned.
     """
     if not effects and ratio == 1.0:
         return 0.0
@@ -38,19 +38,13 @@ def clean_ratio(rig: Rig, session: Session, seed: int, effects: tuple[Effect, ..
     plain = _pieces(rig, session, seed, chosen)
     other = _pieces(rig, session, seed + 1, chosen)
     changed = _pieces(rig, session, seed, chosen, effects, ratio)
-    return float(np.sqrt(np.mean(np.sum((changed - plain) ** 2, axis=0) / np.sum((other - plain) ** 2, axis=0))))
+    return change_over_noise(changed, plain, other)
 
 
 def _pieces(
-    rig: Rig,
-    session: Session,
-    seed: int,
-    chosen: IntArray | None = None,
-    effects: tuple[Effect, ...] = (),
-    ratio: float = 1.0,
+    rig: Rig, session: Session, seed: int, chosen: IntArray, effects: tuple[Effect, ...] = (), ratio: float = 1.0
 ) -> Array:
     """Pieces of the chosen pushes with noise drawn from a seed."""
-    rows = np.arange(len(session)) if chosen is None else chosen
-    part = session.unchained(rows)
+    part = session.unchained(chosen)
     noise = draw_noise(np.random.default_rng(seed), rig, part, ratio)
     return displacements(part, simulate(rig, part, noise, effects))

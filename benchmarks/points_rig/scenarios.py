@@ -13,6 +13,7 @@ from benchmarks.points_rig.drivers import MEASURES, draw_driver
 from benchmarks.points_rig.effects import KINDS, LIBRARY, UNNAMED, WRENCH, Effect, Kind
 from benchmarks.points_rig.rigs import Rig
 from benchmarks.points_rig.sessions import InputShift, Session
+from benchmarks.support.truths import group_at
 
 SIZES = ("small", "medium", "large")
 SHARES = {"none": 0.33, "input_shift": 0.05, "wrench": 0.05, "measurement": 0.09, "variance": 0.03, "motion": 0.45}
@@ -53,8 +54,7 @@ class Scenario:
 def draw_scenario(random: np.random.Generator, rig: Rig, seed: int, number: int) -> Scenario:
     """Draw a hidden change; a golden-ratio sequence over the numbers keeps the groups' shares."""
     place = (np.random.default_rng(seed).random() + GOLDEN * number) % 1.0
-    ends = np.cumsum(list(SHARES.values()))
-    group = list(SHARES)[int(np.searchsorted(ends, place * ends[-1], side="right"))]
+    group = group_at(SHARES, place)
     size = int(random.integers(3))
     if group == "motion":
         return _draw_motion(random, rig)

@@ -12,6 +12,7 @@ from benchmarks.points_rig.scenarios import Fault
 from benchmarks.points_rig.sessions import AFTER, BEFORE, Session
 from benchmarks.points_rig.simulation import STEP, Tracks
 from benchmarks.support import bags
+from benchmarks.support.bags import Samples
 from benchmarks.support.plane import Array, IntArray, cross, direction, rotate
 
 LATENCY = {"slider": 4_000_000, "tip": 1_000_000, "wrench": 1_500_000}  # ns from stamp to arrival
@@ -23,36 +24,25 @@ LIFT, LIFT_TIME, RETREAT_SPEED = 0.03, 0.1, 0.05  # m, s, m/s
 
 
 @dataclass(frozen=True)
-class Readings:
-    """One topic: stamps (S,) in s, and values (S, D)."""
-
-    stamps: Array
-    values: Array
-
-    def nanoseconds(self, epoch: float) -> IntArray:
-        """The stamps in ns since 1970."""
-        return np.int64(epoch) * 1_000_000_000 + np.rint(self.stamps * 1e9).astype(np.int64)
-
-
-@dataclass(frozen=True)
 class Streams:
     """Readings of the slider (x, y, heading), the tip (x, y, z), the force (x, y, torque z) and the topics."""
 
-    slider: Readings
-    tip: Readings
-    wrench: Readings
-    topics: dict[str, Readings]
+    slider: Samples
+    tip: Samples
+    wrench: Samples
+    topics: dict[str, Samples]
 
     def serialised(self, epoch: float) -> list[bags.Topic]:
         """The topics of a bag; `epoch` (s) is the absolute time of the session's start."""
+        start = int(epoch) * 1_000_000_000
         slider, tip, (x, y, torque) = self.slider.values, self.tip.values, self.wrench.values.T
         place, level = np.column_stack([slider[:, :2], np.zeros(len(slider))]), np.zeros(len(tip))
         wrench = np.column_stack([x, y, *np.zeros((3, len(x))), torque])
         return [
-            bags.poses("/slider/pose", self.slider.nanoseconds(epoch), place, slider[:, 2], LATENCY["slider"]),
-            bags.poses("/pusher/pose", self.tip.nanoseconds(epoch), tip, level, LATENCY["tip"]),
-            bags.wrenches("/pusher/wrench", self.wrench.nanoseconds(epoch), wrench, LATENCY["wrench"]),
-            *(bags.scalars(f"/{name}", of.nanoseconds(epoch), of.values) for name, of in self.topics.items()),
+            bags.poses("/slider/pose", self.slider.stamps(start), place, slider[:, 2], LATENCY["slider"]),
+            bags.poses("/pusher/pose", self.tip.stamps(start), tip, level, LATENCY["tip"]),
+            bags.wrenches("/pusher/wrench", self.wrench.stamps(start), wrench, LATENCY["wrench"]),
+            *(bags.scalars(f"/{name}", of.stamps(start), of.values) for name, of in self.topics.items()),
         ]
 
 
@@ -70,7 +60,7 @@ def sense(
 ) -> Streams:
     """Record a simulated session, with a sensor's fault if there is one."""
     tracker, sensor = _clock(random, session, rig.tracker_rate), _clock(random, session, RATE)
-    topics = {name: Readings(session.topic_times, values[:, None]) for name, values in session.topics.items()}
+    topics = {name: Samples(session.topic_times, values[:, None]) for name, values in session.topics.items()}
     slider, wrench = _slider(random, session, tracks, tracker), _wrench(random, session, tracks, sensor)
     if fault is not None:
         slider, wrench = _faulty_slider(slider, fault), _faulty_wrench(wrench, fault, session)
@@ -99,13 +89,13 @@ def _rest(session: Session, clock: _Clock) -> Array:
     return clock.since - (session.length / session.speed)[clock.push]
 
 
-def _slider(random: np.random.Generator, session: Session, tracks: Tracks, clock: _Clock) -> Readings:
+def _slider(random: np.random.Generator, session: Session, tracks: Tracks, clock: _Clock) -> Samples:
     pose = tracks.at(clock.push, _path(session, clock))
     noise = random.normal(0.0, 1.0, pose.shape) * [TRACKER_NOISE, TRACKER_NOISE, HEADING_NOISE]
-    return Readings(clock.time, pose + noise)
+    return Samples(clock.time, pose + noise)
 
 
-def _tip(random: np.random.Generator, rig: Rig, session: Session, tracks: Tracks, clock: _Clock) -> Readings:
+def _tip(random: np.random.Generator, rig: Rig, session: Session, tracks: Tracks, clock: _Clock) -> Samples:
     path, retreat = _path(session, clock), np.maximum(_rest(session, clock) - HOLD, 0.0)
     height = np.zeros(len(path))
     if rig.lifts:
@@ -115,10 +105,10 @@ def _tip(random: np.random.Generator, rig: Rig, session: Session, tracks: Tracks
         path = path - RETREAT_SPEED * retreat
     place = tracks.origin[clock.push] + path[:, None] * direction(tracks.heading[clock.push])
     values = np.column_stack([place, height])
-    return Readings(clock.time, values + random.normal(0.0, TIP_NOISE, values.shape))
+    return Samples(clock.time, values + random.normal(0.0, TIP_NOISE, values.shape))
 
 
-def _wrench(random: np.random.Generator, session: Session, tracks: Tracks, clock: _Clock) -> Readings:
+def _wrench(random: np.random.Generator, session: Session, tracks: Tracks, clock: _Clock) -> Samples:
     """Force of the slider on the tip, world axes, and the torque about the tip's centre."""
     rest = _rest(session, clock)
     inside = np.maximum(_path(session, clock) - 1e-9, 0.0)
@@ -127,25 +117,25 @@ def _wrench(random: np.random.Generator, session: Session, tracks: Tracks, clock
     force = share[:, None] * tracks.force[step, clock.push]
     torque = PUSHER_RADIUS * cross(tracks.normal[step, clock.push], force)
     noise = random.normal(0.0, 1.0, (len(step), 3)) * [FORCE_NOISE, FORCE_NOISE, TORQUE_NOISE]
-    return Readings(clock.time, np.column_stack([force, torque]) + noise)
+    return Samples(clock.time, np.column_stack([force, torque]) + noise)
 
 
-def _faulty_slider(slider: Readings, fault: Fault) -> Readings:
+def _faulty_slider(slider: Samples, fault: Fault) -> Samples:
     place, heading = slider.values[:, :2], slider.values[:, 2]
     match fault.kind:
         case "clock_offset":
-            return Readings(slider.stamps + fault.value, slider.values)
+            return Samples(slider.time + fault.value, slider.values)
         case "frame_rotation":
             turned = rotate(place, np.full(len(place), fault.value))
-            return Readings(slider.stamps, np.column_stack([turned, heading + fault.value]))
+            return Samples(slider.time, np.column_stack([turned, heading + fault.value]))
         case "frame_shift":
-            return Readings(slider.stamps, np.column_stack([place + fault.value * direction(fault.angle), heading]))
+            return Samples(slider.time, np.column_stack([place + fault.value * direction(fault.angle), heading]))
     return slider
 
 
-def _faulty_wrench(wrench: Readings, fault: Fault, session: Session) -> Readings:
+def _faulty_wrench(wrench: Samples, fault: Fault, session: Session) -> Samples:
     if fault.kind != "wrench_bias":
         return wrench
     begin = session.start[0] + fault.begin * (session.start[-1] - session.start[0]) if fault.begin > 0 else 0.0
     bias = fault.value * np.append(direction(fault.angle), 0.0)
-    return Readings(wrench.stamps, wrench.values + bias * (wrench.stamps >= begin)[:, None])
+    return Samples(wrench.time, wrench.values + bias * (wrench.time >= begin)[:, None])

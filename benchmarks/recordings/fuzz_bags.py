@@ -22,7 +22,6 @@ if there are any.
 
 from __future__ import annotations
 
-import argparse
 import os
 import pickle
 import re
@@ -39,6 +38,7 @@ from random import Random
 from typing import Any
 
 from benchmarks.recordings.bag_damage import KINDS, Copy, Form, damaged, forms, write_form
+from benchmarks.support.scripts import parser_of, piped
 from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.describe import describe_recording
@@ -66,7 +66,7 @@ class Reading:
 
 def main() -> int:
     """Read the copies, print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--copies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the copies to read; their notes are printed")
@@ -211,7 +211,7 @@ def table(rows: dict[str, list[tuple[Copy, Reading]]], failed: dict[str, int]) -
             f"{max(r.seconds for _, r in of_kind):.2f}",
             failed[kind],
         ]
-        lines.append(" | ".join([f"| {kind}", *map(str, cells)]) + " |")
+        lines.append(piped([kind, *cells]))
     return "\n".join(lines)
 
 

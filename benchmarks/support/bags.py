@@ -64,6 +64,18 @@ class Topic:
         return [data[begin : begin + size] for begin in range(0, len(data), size)]
 
 
+@dataclass(frozen=True)
+class Samples:
+    """One topic of a session: times (n,) in s from its start, and values (n, d)."""
+
+    time: Array
+    values: Array
+
+    def stamps(self, start: int) -> IntArray:
+        """The times in ns since 1970; start: that of the session."""
+        return np.asarray(start + np.rint(self.time * 1e9).astype(np.int64))
+
+
 def poses(name: str, stamps: IntArray, place: Array, yaw: Array, latency: int) -> Topic:
     """PoseStamped in frame `world`: stamps (n,) and latency in ns, place (n, 3) in m, yaw (n,) in rad."""
     zeros, half = np.zeros((len(yaw), 2)), yaw / 2

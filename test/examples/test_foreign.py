@@ -23,8 +23,8 @@ from benchmarks.foreign.effects import Effect
 from benchmarks.foreign.plan import PushDistribution
 from benchmarks.foreign.recording import SessionInputs
 from benchmarks.foreign.rig import Rig, draw_rig
-from benchmarks.foreign.sensing import Samples, SensedSession
-from benchmarks.support.bags import write_bag
+from benchmarks.foreign.sensing import SensedSession
+from benchmarks.support.bags import Samples, write_bag
 from push_predictor import load_model, read_recording
 
 PACKAGE = Path(command.__file__).parent

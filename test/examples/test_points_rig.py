@@ -17,10 +17,10 @@ from benchmarks.points_rig.outlines import rectangle
 from benchmarks.points_rig.pairs import make_pair, write_pair
 from benchmarks.points_rig.pieces import clean_ratio
 from benchmarks.points_rig.rigs import GRAVITY, Rig, draw_rig
-from benchmarks.points_rig.sensors import Readings, Streams
+from benchmarks.points_rig.sensors import Streams
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import STEP, Tracks, draw_noise, simulate
-from benchmarks.support.bags import write_bag
+from benchmarks.support.bags import Samples, write_bag
 from benchmarks.support.plane import dot, quarter_turn, rotate
 from push_predictor import read_recording
 
@@ -98,10 +98,10 @@ def test_friction_never_returns_power(tracks: Tracks) -> None:
 def test_bags_contain_the_readings(rig: Rig, tmp_path: Path) -> None:
     """As the project's own reader, which shares no code with the writer, decodes them."""
     time, steps = np.array([0.0, 0.25, 0.5]), np.arange(3.0)
-    slider = Readings(time, np.column_stack([0.1 + steps, 0.2 - steps, [3.0, -3.0, 0.5]]))
-    tip = Readings(time, np.column_stack([0.3 + steps, 0.4 - steps, 0.01 * steps]))
-    wrench = Readings(time + 0.1, np.array([[1.0, 2.0, 0.3]] * 3))
-    streams = Streams(slider, tip, wrench, {"room/humidity": Readings(time[:2], np.array([[45.5], [46.5]]))})
+    slider = Samples(time, np.column_stack([0.1 + steps, 0.2 - steps, [3.0, -3.0, 0.5]]))
+    tip = Samples(time, np.column_stack([0.3 + steps, 0.4 - steps, 0.01 * steps]))
+    wrench = Samples(time + 0.1, np.array([[1.0, 2.0, 0.3]] * 3))
+    streams = Streams(slider, tip, wrench, {"room/humidity": Samples(time[:2], np.array([[45.5], [46.5]]))})
     topics = streams.serialised(7.0)
     assert [int(topic.arrival[0]) - 7_000_000_000 for topic in topics] == [4_000_000, 1_000_000, 101_500_000, 0]
     write_bag(tmp_path / "bag", topics, rig.record(), "points_rig")

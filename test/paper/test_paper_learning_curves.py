@@ -78,11 +78,6 @@ def test_folds_of_one_set_do_not_count_as_sets():
     assert verdict_on("learning_curves", "circle", circle(one, PAIRS)) == "not decided"
 
 
-def test_without_a_circle_nothing_is_decided():
-    pairs = tuple(pair for pair in PAIRS if pair[0] != "ellip1")
-    assert verdict_on("learning_curves", "circle", circle(round_is(0.5, -1.0), pairs)) == "not decided"
-
-
 def spread(surfaces: float, shapes: float) -> Curves:
     """NMSE and NLPD that differ by so much from surface to surface and from shape to shape."""
 
@@ -100,11 +95,6 @@ def test_the_surface_matters_little_if_shapes_differ_far_more(surfaces, shapes, 
     assert verdict_on("learning_curves", "surface", surface(spread(surfaces, shapes), PAIRS)) == verdict
 
 
-def test_one_surface_decides_nothing():
-    pairs = tuple(pair for pair in PAIRS if pair[1] == "abs")
-    assert verdict_on("learning_curves", "surface", surface(spread(0.1, 0.1), pairs)) == "not decided"
-
-
 def falling(per_doubling: float, nats: float, sizes=(500, 1000)) -> Curves:
     """Each doubling takes that share of the NMSE and so many nats."""
     return made_up(
@@ -119,10 +109,18 @@ def test_saturated_means_that_a_doubling_gains_next_to_nothing(share, nats, verd
     assert verdict_on("learning_curves", "saturation", saturation(falling(share, nats), PAIRS)) == verdict
 
 
-def test_a_curve_that_falls_but_ends_early_decides_nothing():
-    assert (
-        verdict_on("learning_curves", "saturation", saturation(falling(0.3, 0.5, (100, 200)), PAIRS)) == "not decided"
-    )
+@pytest.mark.parametrize(
+    ("claim", "evidence"),
+    [
+        ("circle", circle(round_is(0.5, -1.0), [pair for pair in PAIRS if pair[0] != "ellip1"])),
+        ("surface", surface(spread(0.1, 0.1), [pair for pair in PAIRS if pair[1] == "abs"])),
+        ("saturation", saturation(falling(0.3, 0.5, (100, 200)), PAIRS)),
+        ("saturation", saturation(falling(0.3, 0.5, (100,)), PAIRS)),
+    ],
+    ids=["no circle", "one surface", "an early end", "one size"],
+)
+def test_without_what_a_claim_compares_nothing_is_decided(claim, evidence):
+    assert verdict_on("learning_curves", claim, evidence) == "not decided"
 
 
 def test_the_gain_of_one_set_has_an_interval_by_push():
@@ -146,10 +144,6 @@ def test_gain_is_per_doubling_for_any_ratio_of_sizes():
 def test_difference_to_each_shape():
     figures = {figure.name: figure.estimate.value for figure in circle(round_is(0.5, -1.0, noise=0.0), PAIRS).figures}
     assert figures["square NMSE"] == pytest.approx(0.15) and len(figures) == 4
-
-
-def test_one_size_decides_nothing():
-    assert verdict_on("learning_curves", "saturation", saturation(falling(0.3, 0.5, (100,)), PAIRS)) == "not decided"
 
 
 def test_a_size_that_a_fold_is_too_small_for_is_not_shown():

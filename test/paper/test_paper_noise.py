@@ -12,14 +12,16 @@ import pytest
 from paper_studies import PLAN, made_up_grid, verdict_on
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.fits.map_models import ModelMap
-from push_predictor_paper.sections.noise import learned_figures, shape, size, span
-from push_predictor_paper.statistics.noise import (
+from push_predictor_paper.sections.noise import (
     Ratios,
     Shape,
     ceiling,
+    learned_figures,
     noise_ratios,
-    radius_of_gyration,
     repeated_shapes,
+    shape,
+    size,
+    span,
     span_of,
     spans,
 )
@@ -62,10 +64,6 @@ def test_the_span_of_noise_that_varies_tenfold() -> None:
     factor = 10.0 ** rng.random(len(grid.cells))
     for part in spans(noisier(replace(grid, cells=tuple(alike)), factor).seen):
         assert part.low < span_of(factor) < part.high < 1.2 * part.low
-
-
-def test_a_square_plates_radius_of_gyration() -> None:
-    assert radius_of_gyration(made_up_grid()) == pytest.approx(0.09 / np.sqrt(6.0))
 
 
 def test_surfaces_that_share_the_shape_of_their_noise_correlate_and_others_do_not() -> None:

@@ -10,17 +10,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study, verdict_on
-from push_predictor_paper.fits.held_out import (
+from push_predictor_paper.section import TooFewError
+from push_predictor_paper.sections.speed_error import (
     FEWEST_PUSHES,
     HeldOut,
     bias,
+    captured,
     joined,
     push_speeds,
+    rank_correlation,
+    section,
+    spearman,
     speed_groups,
+    unreliable,
     within_nmse,
 )
-from push_predictor_paper.section import TooFewError
-from push_predictor_paper.sections.speed_error import captured, rank_correlation, section, spearman, unreliable
 from scipy.stats import spearmanr
 
 SPEEDS = np.array([0.02, 0.1, 0.2, 0.4])

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
@@ -62,14 +62,6 @@ class MitPush:
     place: MitPlace
 
 
-@dataclass(eq=False)
-class Found:
-    """The corpora in a folder, and descriptions of what was skipped."""
-
-    corpora: list[Corpus] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-
-
 def measured_corpora(folder: Path, work: Work, scratch: Path) -> tuple[Corpus, ...]:
     """Corpora of `mit_square` and of the straight pushes at constant speed of the MIT push data set, if present.
 
@@ -77,16 +69,15 @@ def measured_corpora(folder: Path, work: Work, scratch: Path) -> tuple[Corpus, .
     files that have not changed are not imported again (work). Sets with too few pushes for a learning curve are left
     out: the last one's notes say which. Raises ImportSourceError if nothing remains.
     """
-    found = Found()
-    _add_square(found, folder)
-    _add_mit(found, folder, work, scratch)
-    skipped = _skipped(found.skipped)
-    if not found.corpora:
+    left_out: list[str] = []
+    corpora = [*_square_corpora(folder, left_out), *_mit_corpora(folder, work, scratch, left_out)]
+    skipped = _skipped(left_out)
+    if not corpora:
         raise ImportSourceError(
             f"{folder}: holds nothing that the paper's tables can use{skipped}; accepted: {ACCEPTED}"
         )
-    *others, last = found.corpora
-    return (*others, replace(last, notes=(f"{last.title}{skipped}.",))) if skipped else tuple(found.corpora)
+    *others, last = corpora
+    return (*others, replace(last, notes=(f"{last.title}{skipped}.",))) if skipped else tuple(corpora)
 
 
 def square_tables(folder: Path) -> list[Path]:
@@ -147,32 +138,32 @@ def _push_at(place: MitPlace) -> MitPush | None:
     return MitPush((metadata["shape"], metadata["surface"]), speed, place)
 
 
-def _add_square(found: Found, folder: Path) -> None:
+def _square_corpora(folder: Path, skipped: list[str]) -> Iterator[Corpus]:
     for path in square_tables(folder):
         rig = square_rig()
         pushes = PushSet(bare(read_mit_square(path, rig.outline)), rig)
         name = path.name.split(".")[0]
         if not _enough(pushes):
-            found.skipped.append(f"{SQUARE}/{name} {_too_few(pushes)}")
+            skipped.append(f"{SQUARE}/{name} {_too_few(pushes)}")
             continue
         title = (
             f"measured: {SQUARE}/{name}, one side of a square, {len(pushes.table)} overlapping windows of "
             f"{len(pushes.table.pushes)} pushes (the grouping into pushes is an estimate) at 20 mm/s"
         )
         pair = (rig.shape, rig.surface)
-        found.corpora.append(Corpus("measured", title, {pair: pushes}, pair))
+        yield Corpus("measured", title, {pair: pushes}, pair)
 
 
-def _add_mit(found: Found, folder: Path, work: Work, scratch: Path) -> None:
-    pushes = straight_pushes(paths_in(folder), found.skipped)
+def _mit_corpora(folder: Path, work: Work, scratch: Path, skipped: list[str]) -> Iterator[Corpus]:
+    pushes = straight_pushes(paths_in(folder), skipped)
     sets = _imported_sets(pushes, work, scratch)
     good = {pair: s for pair, s in sets.items() if _enough(s)}
     for pair in sorted({push.pair for push in pushes} - good.keys()):
-        found.skipped.append(f"{pair[0]} on {pair[1]} {_too_few(sets.get(pair))}")
+        skipped.append(f"{pair[0]} on {pair[1]} {_too_few(sets.get(pair))}")
     if good:
         reference = REFERENCE if REFERENCE in good else max(good, key=lambda pair: len(good[pair].table))
         ordered = dict(sorted(good.items(), key=lambda item: item[0] != reference))
-        found.corpora.append(Corpus("measured", _mit_title(good, pushes), ordered, reference))
+        yield Corpus("measured", _mit_title(good, pushes), ordered, reference)
 
 
 def _imported_sets(pushes: Sequence[MitPush], work: Work, scratch: Path) -> dict[Pair, PushSet]:

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.estimate import Figure as Statistic
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.data.corpus import Corpus, Pair
-from push_predictor_paper.estimate import over_seeds
 from push_predictor_paper.fits.fit import SPLITS, Fit, Score, SplitName, scores
-from push_predictor_paper.plan import Plan
 from push_predictor_paper.study import Study
 
 Cell = tuple[Pair, str, SplitName, int]  # pair, kind of model, split, training windows
@@ -40,36 +38,24 @@ class Curves:
         rows = [[float(measure(score.push_scores.totals())[0]) for score in cell] for cell in cells]
         return [float(np.mean(seed)) for seed in zip(*rows, strict=False)]  # the reference pair has more seeds
 
-    def over_seeds(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Statistic) -> Estimate:
-        """The mean of a measure over pairs and seeds, with its interval over seeds."""
-        return over_seeds(self.values(pairs, kind, split, n, measure))
-
     def push_scores(self, pair: Pair, kind: str, split: SplitName, n: int) -> PushScores:
         """Scores of the pushes of all seeds together."""
         return pooled([score.push_scores for score in self.cells[pair, kind, split, n]])
 
 
 def curves(study: Study, corpus: Corpus, pairs: Sequence[Pair], kinds: Sequence[str]) -> Curves:
-    """Train and score these kinds on these pairs at all sizes, on both splits."""
-    fits = [
-        (pair, Fit(kind, n, split, seed))
-        for pair in pairs
-        for kind in kinds
-        for split in SPLITS
-        for n in sizes_tried(study.plan, pair == corpus.reference)
-        for seed in range(seeds_tried(study.plan, split, pair == corpus.reference))
-    ]
+    """Train and score these kinds on these pairs at all sizes, on both splits.
+
+    The reference pair has the largest size as well, and all draws of the random split.
+    """
+    plan, fits = study.plan, []
+    for pair in pairs:
+        reference = pair == corpus.reference
+        sizes = [*plan.sizes, *([plan.largest] if reference and plan.largest is not None else [])]
+        for kind, split, n in product(kinds, SPLITS, sizes):
+            seeds = plan.seeds if reference or split == "push" else min(plan.seeds, OTHER_SEEDS)
+            fits += [(pair, Fit(kind, n, split, seed)) for seed in range(seeds)]
     return gathered(fits, scores(study.work, corpus, fits))
-
-
-def sizes_tried(plan: Plan, reference: bool) -> tuple[int, ...]:
-    """Training sizes; the largest on the reference pair only."""
-    return plan.sizes + ((plan.largest,) if reference and plan.largest is not None else ())
-
-
-def seeds_tried(plan: Plan, split: SplitName, reference: bool) -> int:
-    """Number of folds or draws; the random split has fewer draws except on the reference pair."""
-    return plan.seeds if reference or split == "push" else min(plan.seeds, OTHER_SEEDS)
 
 
 def gathered(fits: Sequence[tuple[Pair, Fit]], found: Mapping[tuple[Pair, Fit], Score]) -> Curves:

@@ -58,7 +58,7 @@ class Score:
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
     """Train and score all fits; those with more windows than the set has are skipped."""
-    possible = [(pair, fit) for pair, fit in fits if fit.n <= trainable(corpus.sets[pair], fit)]
+    possible = [(pair, fit) for pair, fit in fits if fit.n <= len(split_of(corpus.sets[pair], fit).training)]
     calls = [(corpus.sets[pair], fit) for pair, fit in possible]
     return dict(zip(possible, work.run("models", score, calls), strict=True))
 
@@ -113,8 +113,3 @@ def random_split(rows: int, seed: int) -> Split:
     order = np.random.default_rng(0).permutation(rows)
     tested = min(RANDOM_TEST_ROWS, int(RANDOM_TEST_SHARE * rows))
     return Split(np.random.default_rng(RANDOM_TEST_ROWS + seed).permutation(order[tested:]), order[:tested])
-
-
-def trainable(pushes: PushSet, fit: Fit) -> int:
-    """The number of training rows that the split of the fit allows."""
-    return len(split_of(pushes, fit).training)

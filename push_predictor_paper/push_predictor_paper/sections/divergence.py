@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from scipy.special import digamma
 
-from push_predictor.evaluation.estimate import Estimate, of_draws
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import Picture
 from push_predictor.types import Array
@@ -22,7 +22,7 @@ from push_predictor_paper.fits.map_models import reference_maps
 from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
-from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, mean_of, median_of
+from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, by_blocks, mean_of, median_of
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
@@ -118,11 +118,11 @@ def expected_kl(count: int) -> float:
 
 def estimate(values: Array, statistic: Statistic, weights: Array, less: Array | None = None) -> Estimate:
     """Mean over seeds of a statistic of values (s, p), with interval from weights (d, p); minus that of `less`."""
-    value, draws = by_seed(values, statistic).mean(), np.mean([statistic(seed, weights) for seed in values], axis=0)
-    if less is None:
-        return of_draws(float(value), draws)
-    base = np.mean([statistic(seed, weights) for seed in less], axis=0)
-    return of_draws(float(value - by_seed(less, statistic).mean()), draws - base)
+
+    def over_seeds(of: Array, w: Array) -> Array:
+        return np.asarray(np.mean([statistic(seed, w) for seed in of], axis=0))
+
+    return by_blocks(lambda w: over_seeds(values, w) - (0.0 if less is None else over_seeds(less, w)), weights)
 
 
 def by_seed(values: Array, statistic: Statistic) -> Array:

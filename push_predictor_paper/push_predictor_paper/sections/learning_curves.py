@@ -212,7 +212,10 @@ def _table(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Table:
     rows = [
         (
             f"{_word(pair[0])}, {pair[1]}",
-            *(Number(found.over_seeds([pair], KIND, s, last[s], measure), form) for s, _, measure, form in columns),
+            *(
+                Number(over_seeds(found.values([pair], KIND, s, last[s], measure)), form)
+                for s, _, measure, form in columns
+            ),
         )
         for pair in pairs
     ]

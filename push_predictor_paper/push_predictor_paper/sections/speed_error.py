@@ -5,33 +5,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.stats import rankdata
 
 from push_predictor.evaluation.estimate import Estimate, of_draws
+from push_predictor.evaluation.push_scores import by_push
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.reporting.canvas import Picture
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
-from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS
-from push_predictor_paper.fits.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
+from push_predictor_paper.fits.curves import curves
+from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS, split_of
 from push_predictor_paper.painters.curves import KIND_LOOKS, SPEED_TICKS, Line, Panel, paint_curves
+from push_predictor_paper.plan import SPEEDS
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
 
 FAST = 0.1  # m/s, from which on a push counts as fast
+SAME_SPEED = 1.12  # ratio of speeds that a reader is told as one
+FEWEST_PUSHES = 8  # at a speed, for an interval
 NOTES = (
     "The simulator has inertia, and friction that does not depend on speed. Quasi-static prediction therefore fails at "
     "high speed by construction. The speed at which it fails follows from the rig's masses and friction.",
     "Fast pushes have few windows each, and only those in which the tip stays in contact for the whole window.",
     "Slow pushes move the slider by 2 mm in a window. Friction noise and camera noise weigh more there.",
 )
+BySpeed = Mapping[str, Sequence[Estimate]]  # by kind of model, at each speed
 
 
-Curves = Mapping[str, Sequence[Estimate]]  # by kind of model, at each speed
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """n held-out windows of all folds, of models with `size` training windows.
+
+    push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
+    pusher; observed (n, 3); predicted by kind (n, 3).
+    """
+
+    size: int
+    push_id: np.ndarray
+    speed: Array
+    group: IntArray
+    speeds: Array
+    travel: Array
+    observed: Array
+    predicted: Mapping[str, Array]
+
+    def at(self, group: int) -> HeldOut:
+        """The windows of one speed."""
+        return self.take(self.group == group)
+
+    def take(self, rows: np.ndarray) -> HeldOut:
+        """Some of the windows."""
+        columns = {f: getattr(self, f)[rows] for f in ("push_id", "speed", "group", "travel", "observed")}
+        return replace(self, **columns, predicted={kind: mean[rows] for kind, mean in self.predicted.items()})
+
+    @property
+    def pushes(self) -> int:
+        """The number of pushes."""
+        return len(np.unique(self.push_id))
+
+    def levelled(self) -> HeldOut:
+        """Outcomes and predictions standardised within each speed, so that every speed counts."""
+        held = np.unique(self.group)
+        rows = [self.observed[self.group == k] for k in held]
+        at = np.searchsorted(held, self.group)
+        mean = np.array([r.mean(axis=0) for r in rows])[at]
+        sd = np.array([r.std(axis=0).clip(1e-30) for r in rows])[at]
+        predicted = {kind: (values - mean) / sd for kind, values in self.predicted.items()}
+        return replace(self, observed=(self.observed - mean) / sd, predicted=predicted)
+
+    @property
+    def speed_range(self) -> str:
+        """The speeds of these pushes, for a reader."""
+        low, high = 1e3 * self.speed.min(), 1e3 * self.speed.max()
+        return f"{1e3 * np.median(self.speed):.0f} mm/s" if high < SAME_SPEED * low else f"{low:.0f} to {high:.0f} mm/s"
+
+    def error(self, kind: str) -> Array:
+        """Squared errors (n, 3)."""
+        return np.asarray((self.observed - self.predicted[kind]) ** 2)
 
 
 def section(study: Study, corpus: Corpus) -> Section:
@@ -61,6 +117,49 @@ def captured(windows: HeldOut) -> Evidence:
     return Evidence(figures, f"n = {windows.size}, {SPLIT_WORDS['push']}, interval by push.")
 
 
+def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
+    """The windows of the reference pair's learning curves at the plan's size, or at the largest smaller one; else None.
+
+    All kinds of model, fold by fold.
+    """
+    pushes, found = corpus.sets[corpus.reference], curves(study, corpus, [corpus.reference], KINDS)
+    sizes = [n for n in found.sizes([corpus.reference], "gp", "push") if n <= study.plan.size]
+    if not sizes:
+        return None
+    folds = {kind: found.cells[corpus.reference, kind, "push", sizes[-1]] for kind in KINDS}
+    table = pushes.table.take(np.concatenate([split_of(pushes, score.fit).test for score in folds["gp"]]))
+    speed = push_speeds(table.push_id, table.inputs[:, 0])
+    group = speed_groups(table.push_id, speed)
+    speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
+    predicted = {kind: np.concatenate([score.predicted for score in scores]) for kind, scores in folds.items()}
+    travel = table.inputs[:, 0] * table.duration
+    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted)
+
+
+def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
+    """The median speed (n,) of each row's push."""
+    _, push = np.unique(push_id, return_inverse=True)
+    medians = np.array([np.median(speed[push == k]) for k in range(int(push.max()) + 1)])
+    return np.asarray(medians[push])
+
+
+def speed_groups(push_id: np.ndarray, speed: Array) -> IntArray:
+    """Numbers (n,) of groups: the nearest of the paper's speeds, as a ratio; see `joined`."""
+    return joined(np.abs(np.log(speed)[:, None] - np.log(SPEEDS)).argmin(axis=1), push_id)
+
+
+def joined(group: IntArray, push_id: np.ndarray) -> IntArray:
+    """Groups (n,) renumbered from 0, FEWEST_PUSHES in each: small ones join the next, the last its neighbour."""
+    counts = [len(np.unique(push_id[group == k])) for k in range(int(group.max()) + 1)]
+    numbers, number, held = [], 0, 0
+    for count in counts:
+        numbers.append(number)
+        held += count
+        if held >= FEWEST_PUSHES:
+            number, held = number + 1, 0
+    return np.minimum(np.array(numbers, dtype=np.int64), max(number - 1, 0))[group]
+
+
 def rank_correlation(windows: HeldOut, kind: str) -> Estimate:
     """Spearman correlation over pushes of speed and mean squared error in units of the variance at that speed.
 
@@ -77,31 +176,54 @@ def rank_correlation(windows: HeldOut, kind: str) -> Estimate:
 
 def spearman(first: Array, second: Array, weights: Array) -> Array:
     """Rank correlations (d,) of samples in which each of n pairs occurs as often as its weight (d, n)."""
-    one, other = (_centred(_ranks(values, weights), weights) for values in (first, second))
+    samples = [np.repeat(np.arange(len(first)), drawn.astype(np.int64)) for drawn in weights]
     with np.errstate(invalid="ignore"):  # NaN in a draw of one speed
-        squares = np.sum(weights * one**2, axis=1) * np.sum(weights * other**2, axis=1)
-        return np.asarray(np.sum(weights * one * other, axis=1) / np.sqrt(squares))
+        return np.array([np.corrcoef(rankdata(first[rows]), rankdata(second[rows]))[0, 1] for rows in samples])
 
 
-def _ranks(values: Array, weights: Array) -> Array:
-    """Ranks (d, n), of equal values their mean."""
-    order = np.argsort(values, kind="stable")
-    _, place = np.unique(values, return_inverse=True)
-    begins = np.flatnonzero(np.diff(values[order], prepend=np.nan))  # of each run of equal values
-    counts = np.add.reduceat(weights[:, order], begins, axis=1)
-    return np.asarray((np.cumsum(counts, axis=1) - 0.5 * (counts - 1.0))[:, place])
+def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
+    """NMSE of a kind, or of the second kind minus the first, over the variance of these windows; interval by push."""
+
+    def figure(sums: list[Array]) -> Array:
+        first, second, total, squares, count = sums
+        return np.asarray(((second - first) / (squares - total**2 / count)).sum(axis=1))
+
+    errors = [windows.error(kind) for kind in kinds]
+    first, second = errors if len(errors) == 2 else (np.zeros_like(errors[0]), errors[0])
+    centred = windows.observed - windows.observed.mean(axis=0)
+    columns = [first, second, centred, centred**2, np.ones((len(centred), 1))]
+    return by_drawn_pushes(windows.push_id, columns, figure)
 
 
-def _centred(ranks: Array, weights: Array) -> Array:
-    return np.asarray(ranks - np.sum(weights * ranks, axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True))
+def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
+    """Mean of observed minus predicted as a share of the pusher's travel; interval by push.
+
+    Across (output 1) it counts towards the side to which the slider goes by the analytical model, lest left and
+    right cancel.
+    """
+    side = np.sign(windows.predicted["analytical"][:, 1]) if output == 1 else 1.0
+    residual = side * (windows.observed[:, output] - windows.predicted[kind][:, output])
+    columns = [residual[:, None], windows.travel[:, None]]
+    return by_drawn_pushes(windows.push_id, columns, lambda sums: (sums[0] / sums[1])[:, 0])
 
 
-def _bias(windows: Sequence[HeldOut], output: int) -> Curves:
+def _bias(windows: Sequence[HeldOut], output: int) -> BySpeed:
     """Bias at each speed, per cent of the pusher's travel."""
     return {kind: [bias(at, kind, output).times(100.0) for at in windows] for kind in KINDS}
 
 
-def _table(corpus: Corpus, windows: HeldOut, nmse: Curves, along: Curves, across: Curves) -> Table:
+def by_drawn_pushes(push_id: np.ndarray, columns: Sequence[Array], figure: Callable[[list[Array]], Array]) -> Estimate:
+    """A figure of sums over windows of columns (n, k), with interval by push; none for too few pushes."""
+    pushes, push = np.unique(push_id, return_inverse=True)
+    sums = [by_push(push, column) for column in columns]
+    value = float(figure([total.sum(axis=0, keepdims=True) for total in sums])[0])
+    if len(pushes) < FEWEST_PUSHES:
+        return Estimate(value, np.nan, np.nan)
+    weights = push_bootstrap(pushes)
+    return of_draws(value, figure([weights @ total for total in sums]))
+
+
+def _table(corpus: Corpus, windows: HeldOut, nmse: BySpeed, along: BySpeed, across: BySpeed) -> Table:
     rows = []
     for k in range(len(windows.speeds)):
         at = windows.at(k)
@@ -118,11 +240,11 @@ def _table(corpus: Corpus, windows: HeldOut, nmse: Curves, along: Curves, across
     return Table(caption, head, tuple(rows))
 
 
-def _picture(study: Study, corpus: Corpus, windows: HeldOut, nmse: Curves, along: Curves, across: Curves) -> Picture:
+def _picture(study: Study, corpus: Corpus, windows: HeldOut, nmse: BySpeed, along: BySpeed, across: BySpeed) -> Picture:
     speeds = (1e3 * windows.speeds).tolist()
     ticks = [tick for tick in SPEED_TICKS if min(speeds) / 1.15 <= tick <= 1.15 * max(speeds)]
 
-    def panel(curves: Curves, title: str, label: str) -> Panel:
+    def panel(curves: BySpeed, title: str, label: str) -> Panel:
         lines = [Line(KIND_NAMES[kind], KIND_LOOKS[kind], speeds, curves[kind]) for kind in KINDS]
         return Panel(title, "speed (mm/s)", label, lines, ticks, ratio=curves is nmse, zero=curves is not nmse)
 
