@@ -72,13 +72,17 @@ class Driver:
         named = {"topic": "linear", "speed": "linear", "patch": "map", "heading": "periodic", "edge": "category"}
         return named.get(self.kind, self.kind)
 
+    def at_push(self, session: Session) -> float | None:
+        """The number of the push from which a step acts, from 0; None for other forms."""
+        return self.place * (len(session) - 1) if self.kind == "step" else None
+
     def covariates(self, session: Session, constant: tuple[str, ...]) -> list[str]:
         """The right covariates; `constant` are those of an effect from the start of the new recording on."""
         match self.kind:
             case "constant":
                 return list(constant)
             case "step":
-                return list(MEASURES.values())
+                return [MEASURES[measure] for measure in ("pushes", "time", "distance")]
             case "linear" | "saturating":
                 own = session.progress(self.measure)
                 alike = [name for name in MEASURES if np.corrcoef(session.progress(name), own)[0, 1] > 0.99]

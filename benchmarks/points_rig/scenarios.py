@@ -84,9 +84,7 @@ def describe(scenario: Scenario, session: Session) -> dict[str, object]:
     if scenario.fault is not None:
         entries |= _describe_fault(scenario.fault)
     if scenario.effects:
-        driver = scenario.effects[0].driver
         entries |= _describe_effect(scenario.effects[0], session)
-        entries |= {"place": driver.place if driver.kind == "step" else None}
     if len(scenario.effects) > 1:
         entries |= {"second": _describe_effect(scenario.effects[1], session)}
     return entries | {"channel": motion.get(scenario.group, scenario.group)}
@@ -137,8 +135,8 @@ def _describe_effect(effect: Effect, session: Session) -> dict[str, object]:
     kind, driver = KINDS[effect.kind], effect.driver
     names = [None] if effect.kind in UNNAMED else [effect.kind]
     size = SIZES[kind.values.index(abs(effect.value))]
-    covariates = driver.covariates(session, kind.constant)
-    return _entries(effect.kind, names, covariates, driver.form, size, effect.value, kind.unit)
+    covariates, place = driver.covariates(session, kind.constant), {"place": driver.at_push(session)}
+    return _entries(effect.kind, names, covariates, driver.form, size, effect.value, kind.unit) | place
 
 
 def _entries(
