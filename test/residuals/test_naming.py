@@ -47,10 +47,18 @@ def made(
     scores: np.ndarray,
     *,
     more: Any = 0.0,
+    first: Any = 0.0,
     basis: DriverBasis = DRIFT,
 ) -> Trial:
-    """A trial with these scores (b,) of blocks; more: what the generic polynomial gains next to it."""
-    fit = SimpleNamespace(rows=SimpleNamespace(evidence=evidence), scores=scores, with_columns=lambda _: scores + more)
+    """A trial with these scores (b,) of blocks.
+
+    more, first: what the generic polynomial and the mechanism itself in the first windows gain next to it.
+    """
+
+    def with_columns(columns: np.ndarray) -> np.ndarray:
+        return np.asarray(scores + (first if columns.shape[2] == 1 else more))
+
+    fit = SimpleNamespace(rows=SimpleNamespace(evidence=evidence), scores=scores, with_columns=with_columns)
     return Trial(Candidate(mechanism, covariate, basis, np.ones((1, 3, 1))), cast("Fit", fit))
 
 
@@ -112,6 +120,13 @@ def test_a_name_stays_if_the_polynomial_explains_at_most_15_percent(
     found = naming_of(chosen, [], base())
     unknown = Naming(("elapsed_time",), (None,), False, "tilted_surface")
     assert found == (Naming(("elapsed_time",), ("tilted_surface",), True) if known else unknown)
+
+
+@pytest.mark.parametrize(("more", "first"), [(200.0, 10.0), (10.0, 200.0), (0.0, 200.0)])
+def test_a_name_goes_by_whatever_the_mechanism_cannot_do(evidence: Evidence, more: float, first: float) -> None:
+    chosen = made(evidence, "tilted_surface", "elapsed_time", 500.0 * EVEN, more=more * EVEN, first=first * EVEN)
+    assert unexplained_share(chosen, base()) == pytest.approx(200.0 / 700.0)
+    assert not naming_of(chosen, [], base()).known
 
 
 def test_a_name_is_not_withdrawn_for_what_may_be_chance(evidence: Evidence) -> None:
