@@ -268,13 +268,15 @@ def test_reset_during_a_push_ends_it(
     reset = replace(truth.recording, slider=put(slider), pusher=put(pusher) if tip_too else pusher)
     windows, counts = found_in(reset)
     after = int(min(reset.slider.stamp[reset.slider.stamp > begin], default=begin + DAY))
-    if after < begin + DAY and not (tip_too and unseen):  # otherwise it may have been pushed there
+    hidden = (pusher.stamp > begin) & (pusher.stamp < after)
+    pushed = np.hypot(np.ptp(pusher.x[hidden]), np.ptp(pusher.y[hidden])) if hidden.any() else 0.0
+    if after < begin + DAY and not (unseen and (tip_too or pushed > jump)):  # otherwise it may have been pushed there
         assert counts["resets"] >= 1
     assert all(w.end <= begin + 1 or w.start >= after for w in windows)
     if tip_too:
         assert_true(windows, truth, [(begin + 1, after - 1)])
     ids = [{w.push_id for w in windows if w.end <= begin}, {w.push_id for w in windows if w.start >= after}]
-    assert not ids[0] & ids[1] or (tip_too and unseen)
+    assert not ids[0] & ids[1] or (unseen and (tip_too or pushed > jump))
 
 
 @OFTEN
