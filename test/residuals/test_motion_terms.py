@@ -21,11 +21,12 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows
-from push_predictor.residuals.channels.motion import MotionTerm, _separable, motion_effects
+from push_predictor.residuals.channels.motion import MotionTerm, _differ, _is_left, _separable, motion_effects
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.gate import Gate
-from push_predictor.residuals.selection.search import _Search
+from push_predictor.residuals.selection.naming import Naming
+from push_predictor.residuals.selection.search import Term, _Search
 
 ALWAYS = DriverBasis("constant")
 ALONG_X = DriverBasis("linear", ("slider_x",), (0.0,), (0.1,))
@@ -70,6 +71,28 @@ def test_a_small_further_term_of_the_same_mechanism_is_a_part_and_comes_last(dep
         (("contact_friction", "elapsed_time"), False),
         (("contact_friction", "slider_x"), True),
     ]
+
+
+@pytest.mark.parametrize(("gain", "covariate", "left"), [(14.0, "x", True), (16.0, "x", False), (1.0, "y", False)])
+def test_what_gains_a_seventh_of_an_effect_along_the_same_covariate_is_left_by_its_fit(
+    gain: float, covariate: str, left: bool
+) -> None:
+    """At most 15 %."""
+
+    def term(mechanism: str, along: str, gain: float) -> Term:
+        return Term(Candidate(mechanism, along, ALWAYS, NOISE), 0.001, gain, Naming((along,), (mechanism,), True))
+
+    larger = term("contact_friction", "x", 100.0)
+    assert _is_left(term("pressure_spread", covariate, gain), [larger]) == left
+    assert _is_left(term("contact_friction", covariate, 14.0), [larger])
+    assert not _is_left(larger, [])
+
+
+@pytest.mark.parametrize(("change", "differs"), [(2.4, False), (2.7, True), (-2.7, True)])
+def test_an_effect_is_a_change_since_training_if_it_differs_from_that_there(change: float, differs: bool) -> None:
+    """By more than 2.58 standard errors of the difference."""
+    now, then = (replace(slippery(size), covariance=np.array([[0.5]])) for size in (1.0 + change, 1.0))
+    assert _differ(now, then) == differs
 
 
 def test_an_unknown_effect_on_one_output_shifts_that_one(deployed: PushModel) -> None:

@@ -138,6 +138,7 @@ def test_a_name_is_not_withdrawn_for_what_may_be_chance(evidence: Evidence) -> N
 def test_what_others_explain_is_no_gain_of_the_mechanism(evidence: Evidence) -> None:
     chosen = made(evidence, "tilted_surface", "elapsed_time", 500.0 * EVEN, more=50.0 * EVEN)
     assert unexplained_share(chosen, base(400.0)) == pytest.approx(50.0 / 150.0)
+    assert unexplained_share(chosen, base(600.0)) == 1.0  # the mechanism gains nothing
 
 
 def test_an_unknown_effect_resembles_the_mechanism_that_comes_closest(evidence: Evidence) -> None:

@@ -16,12 +16,12 @@ from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.drivers import screening_bases
+from push_predictor.residuals.evidence.drivers import at_touch, screening_bases
 from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.standardised import blocks_of, evidence_of, held_out_rows
-from push_predictor.residuals.question import Question
+from push_predictor.residuals.question import ALPHA_SHARES, Question
 from push_predictor.types import Array
 
 
@@ -178,6 +178,19 @@ def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_
     assert about_mechanics(analytical) is analytical
     informed = about_mechanics(learned)
     assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)
+
+
+def test_windows_that_begin_with_the_touch_are_known_where_its_time_was_recorded(known: PushTable) -> None:
+    since = np.where(np.arange(len(known)) % 3, 0.2, 0.01)
+    timed = replace(known, covariates={"time_since_contact": since})
+    assert at_touch(timed).tolist() == (since == 0.01).tolist()
+    assert not at_touch(replace(known, covariates={})).any()
+
+
+def test_channels_share_the_false_alarms(known: PushTable) -> None:
+    asked = Question.of(trained(known), LoadedData(square_pushes(40, 7)[0], None, square_rig()), alpha=0.02)
+    assert [asked.alpha_of(channel) for channel in ALPHA_SHARES] == [0.02 * share for share in ALPHA_SHARES.values()]
+    assert sum(ALPHA_SHARES.values()) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("pushes", "together"), [(90, 10), (27, 3), (5, 1)])
