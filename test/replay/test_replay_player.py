@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
 from threading import Condition, Event, Thread
 from time import sleep
+from typing import Any, TypeAlias
 
 import pytest
 from hypothesis import given
@@ -18,6 +20,7 @@ from push_predictor.recordings.bag.reader import RawMessage
 from push_predictor.replay.player import COARSE, SECOND, PlayerOutput, PlayRange, ReplayPlayer
 
 START = 1000 * SECOND
+Action: TypeAlias = "str | tuple[str, object]"  # a control, and its argument
 
 
 def message(seconds: float, topic: str = "/t") -> RawMessage:
@@ -39,8 +42,9 @@ class Stage:
 
     def __init__(self, messages: list[RawMessage], **options: object) -> None:
         self.time = 0
-        self.script: dict[int, list[str | tuple[str, object]]] = {}
-        self.when_stuck: list[tuple[str, object] | str] = []
+        self.script: dict[int, list[Action]] = {}
+        self.when_stuck: list[Action] = []
+        self.answers: list[object] = []
         self.log: list[tuple[float, RawMessage]] = []
         self.prepared: list[tuple[float, RawMessage]] = []
         self.states: list[str] = []
@@ -64,6 +68,7 @@ class Stage:
             self.time += duration
             return
         assert condition is not None
+        self.time += SECOND
         self.do(self.when_stuck.pop(0) if self.when_stuck else "close")
 
     def prepare(self, message: RawMessage) -> Callable[[], bool]:
@@ -77,10 +82,9 @@ class Stage:
             self.do(action)
         return sent not in self.refused
 
-    def do(self, action: str | tuple[str, object]) -> None:
+    def do(self, action: Action) -> None:
         name, *arguments = [action] if isinstance(action, str) else action
-        result = getattr(self.player, str(name))(*arguments)
-        self.answers = [*getattr(self, "answers", []), result]
+        self.answers.append(getattr(self.player, str(name))(*arguments))
 
     def run(self, what: PlayRange | None = None) -> list[float]:
         """Play, and return the recorded seconds of the published messages."""
@@ -178,19 +182,6 @@ def test_range_is_played_from_offset_to_end_inclusive(what: PlayRange, expected:
     assert stage.states[-1] == "finished"
 
 
-def test_offset_adds_no_waiting() -> None:
-    stage = Stage(TEN)
-    stage.run(PlayRange(offset=SECOND // 2))
-    assert stage.times[0] == 0.0
-
-
-def test_delay_comes_before_each_loop() -> None:
-    stage = Stage(TEN[:2], loop=True, delay=3 * SECOND)
-    stage.script[4] = ["stop"]
-    assert stage.run() == [0.0, 0.1, 0.0, 0.1]
-    assert stage.times == pytest.approx([3.0, 3.1, 6.1, 6.2])
-
-
 def test_loop_over_an_empty_range_ends() -> None:
     assert Stage([], loop=True).run() == []
 
@@ -201,43 +192,78 @@ def test_finished_is_announced_after_subscribers_received_everything() -> None:
     assert stage.settled == [10]
 
 
-def test_pause_delays_the_next_message_and_resume_publishes_it_when_due() -> None:
-    stage = Stage(TEN)
-    stage.script[3] = ["pause"]
-    stage.when_stuck = ["resume"]
-    assert stage.run() == TENTHS
-    assert stage.states == ["playing", "paused", "playing", "finished"]
-    assert stage.times == pytest.approx(TENTHS)
+@dataclass(frozen=True)
+class Case:
+    """Controls after so many messages, and in turn whenever the player would wait for ever, each a second later."""
+
+    played: list[float]
+    times: list[float]
+    states: str = "playing finished"
+    script: dict[int, list[Action]] = field(default_factory=dict)
+    stuck: tuple[Action, ...] = ()
+    answers: tuple[object, ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    what: PlayRange = field(default_factory=PlayRange)
 
 
-def test_start_paused_waits_for_play_next_and_burst() -> None:
-    stage = Stage(TEN, paused=True)
-    stage.when_stuck = ["play_next", ("burst", 3), ("burst", 0)]
-    assert stage.run() == TENTHS
-    assert stage.answers[:3] == [True, 3, 6]
-    assert stage.times == [0.0] * 10
-    assert stage.states == ["paused", "finished"]
+def at(seconds: float) -> int:
+    return START + round(seconds * SECOND)
 
 
-def test_a_seek_keeps_a_pause() -> None:
-    stage = Stage(TEN, paused=True)
-    stage.when_stuck = [("seek", START + 8 * SECOND // 10), ("burst", 0)]
-    assert stage.run() == [0.8, 0.9]
-    assert stage.states == ["paused", "finished"]
+PAUSED = {"paused": True}
+CASES = {
+    "an offset adds no waiting": Case([0.8, 0.9], [0.0, 0.1], what=PlayRange(offset=8 * SECOND // 10)),
+    "a delay comes before each loop": Case(
+        [0.0, 0.1] * 2, [3.0, 3.1, 6.1, 6.2], script={4: ["stop"]},
+        options={"loop": True, "delay": 3 * SECOND, "source": ListSource(TEN[:2])},
+    ),
+    "a pause stops the time": Case(
+        TENTHS, [0.0, 0.1, 0.2, *(1.0 + k / 10 for k in range(3, 10))], "playing paused playing finished",
+        {3: ["pause"]}, ("resume",),
+    ),
+    "play_next and burst publish at once": Case(
+        TENTHS, [1.0] + [2.0] * 3 + [3.0] * 6, "paused finished", {}, ("play_next", ("burst", 3), ("burst", 0)),
+        (True, 3, 6), PAUSED,
+    ),
+    "a seek keeps a pause": Case(
+        [0.8, 0.9], [2.0, 2.0], "paused finished", {}, (("seek", at(0.8)), ("burst", 0)), (None, 2), PAUSED
+    ),
+    "messages after a burst keep their pace": Case(
+        TENTHS, [1.0] * 5 + [2.1, 2.2, 2.3, 2.4, 2.5], "paused playing finished", {}, (("burst", 5), "resume"),
+        options=PAUSED,
+    ),
+    "play_next and burst do nothing while playing": Case(
+        TENTHS, TENTHS, script={2: ["play_next", ("burst", 3)]}, answers=(False, 0)
+    ),
+    "a seek goes forward and back without waiting": Case(
+        [0.0, 0.1, 0.8, 0.9, 0.9], [0.0, 0.1, 0.1, 0.2, 0.2], script={2: [("seek", at(0.8))], 4: [("seek", at(0.9))]}
+    ),
+    "a seek before the start goes to the start": Case(
+        [0.0, 0.1, *TENTHS], [0.0, 0.1, *(0.1 + k / 10 for k in range(10))], script={2: [("seek", 0)]}
+    ),
+    "a seek after the end plays from there": Case(
+        [*TENTHS, 0.8, 0.9], [*TENTHS, 1.9, 2.0], "playing finished playing finished", {}, (("seek", at(0.8)),)
+    ),
+    "play starts only when nothing is playing": Case(
+        [*TENTHS, 0.8, 0.9], [*TENTHS, 1.9, 2.0], "playing finished playing finished", {2: [("play", PlayRange())]},
+        (("play", PlayRange(offset=8 * SECOND // 10)),), (False, True),
+    ),
+    "stop ends the playback": Case(TENTHS[:4], TENTHS[:4], script={4: ["stop"]}),
+    "stop ends a pause": Case([], [], "paused finished", {}, ("stop",), options=PAUSED),
+    "a new rate applies from the next message": Case(
+        TENTHS, [0.0, 0.1, 0.2, 0.3, 0.4, 0.41, 0.42, 0.43, 0.44, 0.45], script={5: [("set_rate", 10.0)]}
+    ),
+}  # fmt: skip
 
 
-def test_messages_after_a_burst_keep_their_pace() -> None:
-    stage = Stage(TEN, paused=True)
-    stage.when_stuck = [("burst", 5), "resume"]
-    stage.run()
-    assert stage.times == pytest.approx([0.0] * 5 + [0.1, 0.2, 0.3, 0.4, 0.5])
-
-
-def test_play_next_and_burst_do_nothing_while_playing() -> None:
-    stage = Stage(TEN)
-    stage.script[2] = ["play_next", ("burst", 3)]
-    assert stage.run() == TENTHS
-    assert stage.answers[:2] == [False, 0]
+@pytest.mark.parametrize("name", CASES)
+def test_controls(name: str) -> None:
+    case = CASES[name]
+    stage = Stage(TEN, **case.options)
+    stage.script, stage.when_stuck = dict(case.script), list(case.stuck)
+    assert stage.run(case.what) == case.played
+    assert stage.times == pytest.approx(case.times) and stage.states == case.states.split()
+    assert tuple(stage.answers[: len(case.answers)]) == case.answers
 
 
 @pytest.mark.parametrize(
@@ -299,14 +325,6 @@ def test_controls_work_while_a_burst_waits_for_a_subscriber_that_hangs() -> None
     assert published == TEN and answers == [2], "the burst ends where the replay is resumed"
 
 
-def test_seek_goes_forward_and_back_without_waiting() -> None:
-    stage = Stage(TEN)
-    stage.script[2] = [("seek", START + 8 * SECOND // 10)]
-    stage.script[4] = [("seek", START + 9 * SECOND // 10)]
-    assert stage.run() == [0.0, 0.1, 0.8, 0.9, 0.9]
-    assert stage.times == pytest.approx([0.0, 0.1, 0.1, 0.2, 0.2])
-
-
 @pytest.mark.parametrize(
     ("control", "published"),
     [(("seek", START + 8 * SECOND // 10), [0.0, 0.1, 0.8, 0.9]), ("stop", [0.0, 0.1]), ("pause", [0.0, 0.1])],
@@ -329,53 +347,11 @@ def test_a_control_just_after_the_sleep_keeps_the_message_back(
     assert stage.run() == published
 
 
-def test_seek_before_the_start_goes_to_the_start() -> None:
-    stage = Stage(TEN)
-    stage.script[3] = [("seek", 0)]
-    assert stage.run() == [0.0, 0.1, 0.2, *TENTHS]
-
-
-def test_seek_after_the_end_plays_from_there() -> None:
-    stage = Stage(TEN)
-    stage.when_stuck = [("seek", START + 7 * SECOND // 10)]
-    assert stage.run() == [*TENTHS, 0.7, 0.8, 0.9]
-    assert stage.states == ["playing", "finished", "playing", "finished"]
-
-
-def test_play_starts_only_when_nothing_is_playing() -> None:
-    stage = Stage(TEN)
-    stage.script[2] = [("play", PlayRange())]
-    stage.when_stuck = [("play", PlayRange(offset=SECOND // 2))]
-    assert stage.run() == [*TENTHS, *TENTHS[5:]]
-    assert stage.answers[:2] == [False, True]
-
-
-def test_stop_ends_the_playback() -> None:
-    stage = Stage(TEN)
-    stage.script[4] = ["stop"]
-    assert stage.run() == TENTHS[:4]
-    assert stage.states == ["playing", "finished"]
-
-
-def test_stop_ends_a_pause() -> None:
-    stage = Stage(TEN, paused=True)
-    stage.when_stuck = ["stop"]
-    assert stage.run() == []
-    assert stage.states == ["paused", "finished"]
-
-
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
 def test_rejects_rate_that_is_not_positive(rate: float) -> None:
     stage = Stage(TEN)
     assert not stage.player.set_rate(rate)
     assert stage.player.rate == 1.0
-
-
-def test_new_rate_applies_from_the_next_message() -> None:
-    stage = Stage(TEN)
-    stage.script[5] = [("set_rate", 10.0)]
-    stage.run()
-    assert stage.times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.41, 0.42, 0.43, 0.44, 0.45])
 
 
 def test_clock_never_passes_the_next_message() -> None:
