@@ -12,7 +12,7 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import POSE
-from push_predictor.recordings.bag.messages import Notes, gathered
+from push_predictor.recordings.bag.messages import Notes
 from push_predictor.recordings.bag.reader import Bag, open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder, name_of
 from push_predictor.recordings.decoder.rules import (
@@ -73,7 +73,7 @@ def _read(bag: Bag, rig: Rig | None, chosen: Topics) -> Recording:
     decoder = StreamDecoder(chosen)
     if rig is not None:
         decoder.begin(rig)
-    for messages in gathered(bag.messages(_declared(bag, chosen, decoder, notes))):
+    for messages in bag.portions(_declared(bag, chosen, decoder, notes)):
         decoder.put(messages)
     samples = decoder.take(last=True)
     _note_poses(bag, decoder, notes)

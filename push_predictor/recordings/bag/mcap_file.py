@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple, TypeAlias
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
@@ -30,9 +31,9 @@ from mcap.records import Channel, ChunkIndex, McapRecord, Metadata, MetadataInde
 from mcap.stream_reader import StreamReader
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.compression import as_cdr
+from push_predictor.recordings.bag.compression import FRAME, as_cdr
 from push_predictor.recordings.bag.message_types import msg_of_idl
-from push_predictor.recordings.bag.messages import BagFile, RawMessage
+from push_predictor.recordings.bag.messages import PORTION, BagFile, Messages, RawMessage, gathered
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK: Final = 1 << 30  # bytes uncompressed; a foreign file must not exhaust the memory
@@ -50,7 +51,8 @@ _CHUNK_BEGIN = re.compile(rb"\x06.{6}\x00{2}.{28}(?:\x04\x00{3}zstd|\x03\x00{3}l
 _DATA_END = struct.Struct("<BQI")
 _FOOTER = struct.Struct("<BQQQI8s")
 _ENDS = {(Opcode.DATA_END, 4), (Opcode.FOOTER, 20)}
-_PLACE = struct.Struct("=4Q")  # of a message: its channel, its time, where it begins and ends
+_FIELDS: Final = 4
+_PLACE = struct.Struct(f"={_FIELDS}Q")  # of a message: its channel, its time, where it begins and ends
 _DESCRIPTIONS = {int(Opcode.SCHEMA): Schema, int(Opcode.CHANNEL): Channel, int(Opcode.METADATA): Metadata}
 _READ = frozenset({*_DESCRIPTIONS, _MESSAGE_CODE})
 _WITH_LENGTHS = (Opcode.CHUNK, Opcode.MESSAGE_INDEX)  # state their length twice, which is compared
@@ -86,6 +88,41 @@ class McapFile(BagFile):
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """See BagFile. One chunk at a time is in memory."""
+        for places, records, offset in self._found(topics):
+            yield from self._messages_at(places, records, offset, topics)
+
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """See BagFile. The messages of a chunk are not made one by one."""
+        single: list[RawMessage] = []
+        for places, records, offset in self._found(topics):
+            if alone := len(places) <= _FIELDS:  # in a file without chunks
+                single += self._messages_at(places, records, offset, topics)
+            if not alone or len(single) >= PORTION:
+                yield from gathered(single)
+                single = []
+            if not alone:
+                yield from self._chunk_portions(places, records, offset, topics)
+        yield from gathered(single)
+
+    def _chunk_portions(
+        self, places: array[int], records: _Bytes, offset: int, topics: Collection[str]
+    ) -> Iterator[Messages]:
+        table, data = np.frombuffer(places, np.int64).reshape(-1, _FIELDS), np.frombuffer(records, np.uint8)
+        if np.any(data[np.minimum(table[:, 2], len(data) - 1)] == FRAME[0]):  # messages may be compressed themselves
+            yield from gathered(self._messages_at(places, records, offset, topics))
+            return
+        for number, of in self._wanted(topics).items():
+            _, times, start, end = table[table[:, 0] == number].T
+            if not len(times):
+                continue
+            if length := int(end[0] - start[0]) if (end - start == end[0] - start[0]).all() else 0:
+                joined = np.lib.stride_tricks.sliding_window_view(data, length)[start].tobytes()
+            else:
+                joined = b"".join(records[a:b] for a, b in zip(start.tolist(), end.tolist(), strict=True))
+            yield Messages(*of, times, joined, end - start)
+
+    def _found(self, topics: Collection[str] | None) -> Iterator[tuple[array[int], _Bytes, int]]:
+        """Places, as in _PLACE, of the messages in consecutive records, these records, and their offset in the file."""
         seen, chunks = 0, list[int]()
         with self.path.open("rb") as stream:
             for opcode, offset, records in self._records(stream):
@@ -94,8 +131,8 @@ class McapFile(BagFile):
                 elif opcode == Opcode.CHUNK:
                     chunks.append(offset)
                 places = self._places(records, offset, topics)
-                seen += len(places) // 4
-                yield from self._messages_at(places, records, offset, topics)
+                seen += len(places) // _FIELDS
+                yield places, records, offset
                 del records  # before the next chunk is read
         if self._listed not in (None, seen):
             self._lost_at(self._size, f"{seen} messages were found, the summary lists {self._listed}")
@@ -143,7 +180,7 @@ class McapFile(BagFile):
                 raise ValueError(f"the last record of a chunk ends at byte {at} of {size}")
         except _UNREADABLE as error:
             self._lost_at(offset, f"a record cannot be read ({error or type(error).__name__})")
-        for number in sorted(set(places[::4])):
+        for number in sorted(set(places[::_FIELDS])):
             self._check_channel(number, topics, offset)
         return places
 

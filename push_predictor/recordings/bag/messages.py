@@ -78,6 +78,10 @@ class BagFile:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
         raise NotImplementedError
 
+    def portions(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The same of the given topics, many of a topic and type at once."""
+        return gathered(self.messages(topics))
+
     def _lost(self, what: str) -> None:
         self.notes.add(f"{self.name}: {what}", lost=True)
 

@@ -20,7 +20,6 @@ import numpy as np
 from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, yaw_of_quaternion
 from push_predictor.recordings.bag.message_types import short_name
-from push_predictor.recordings.bag.messages import gathered
 from push_predictor.recordings.bag.ros1_file import Ros1File
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.fields.columns import BlockReader
@@ -109,7 +108,7 @@ def _read(bag: Ros1File, fields: Mapping[str, Sequence[str]]) -> dict[str, _Logg
     }
     opened = len(bag.notes)  # of them some on topics that are not read
     counts, parts = Counter[str](), defaultdict[str, list[tuple[IntArray, IntArray, IntArray, Array]]](list)
-    for messages in gathered(bag.messages(fields)):
+    for messages in bag.portions(fields):
         topic = messages.topic
         for block in readers[topic].blocks(messages):
             if block.layout.numbers.keys() >= set(fields[topic]):
