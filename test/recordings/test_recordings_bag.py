@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
@@ -20,6 +21,7 @@ from mcap.writer import CompressionType, Writer
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.message_types import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.messages import encode
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.write import write_recording
@@ -98,6 +100,38 @@ def test_any_damage_gives_a_note_or_a_recording_error(hits: list[tuple[float, in
             return
         assert len(read.slider) <= N
         assert len(read.slider) == N or read.notes or len(hits) > 1  # the summary may be hit as well
+
+
+@given(
+    rows=st.lists(st.tuples(st.sampled_from("ab"), st.binary(max_size=3), st.booleans()), max_size=40),
+    chunked=st.booleans(),
+    alike=st.booleans(),
+)
+def test_portions_have_the_messages_of_each_topic_in_their_order(
+    rows: list[tuple[str, bytes, bool]], chunked: bool, alike: bool
+) -> None:
+    """Of equal length or not, empty, compressed one by one, in chunks and without."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.mcap"
+        with path.open("wb") as stream:
+            writer = Writer(stream, chunk_size=300, use_chunking=chunked)
+            writer.start()
+            schema = writer.register_schema("std_msgs/msg/Byte", "ros2msg", b"byte data\n")
+            channels = {name: writer.register_channel(f"/{name}", "cdr", schema) for name in "ab"}
+            for time, (name, content, packed) in enumerate(rows):
+                data = b"\0\1\0\0" + content.ljust(3 * alike) if content or alike else b""
+                data = zstandard.ZstdCompressor().compress(data) if packed else data
+                writer.add_message(channels[name], time, data, time)
+            writer.finish()
+        bag = open_bag(path)
+        each = list(bag.messages())
+        assert len(each) == len(rows) and not bag.notes
+        for topic in ("/a", "/b"):
+            parts = list(bag.portions([topic, "/none"]))
+            expected = [message for message in each if message.topic == topic]
+            assert [time for part in parts for time in part.times.tolist()] == [m.log_time for m in expected]
+            assert [size for part in parts for size in part.length.tolist()] == [len(m.data) for m in expected]
+            assert b"".join(part.buffer for part in parts) == b"".join(m.data for m in expected)
 
 
 @pytest.mark.parametrize(
