@@ -29,8 +29,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
 from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
-from push_predictor.residuals.channels.clocks import NAMES, clock_errors, clock_notes
 from push_predictor.residuals.channels.contrast import ChannelEffect
+from push_predictor.residuals.channels.measurement import CLOCKS, clock_errors, clock_notes
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
@@ -74,7 +74,7 @@ def trace_data(
     clocks: tuple[Finding, ...] = ()
     if checks is not None:
         checks.judged_by(data, loaded.table, loaded.rig)
-        clocks = checks.found(*NAMES)
+        clocks = checks.found(*CLOCKS)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch, clocks=clocks)
 
 

@@ -21,7 +21,7 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.checks.check import DataChecks
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.channels.clocks import NAMES, clock_errors
+from push_predictor.residuals.channels.measurement import CLOCKS, clock_errors
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.outcome import Trace, trace_json
 from push_predictor.residuals.reporting.sentences import answer
@@ -74,5 +74,5 @@ def test_what_the_checks_find_about_clocks_reaches_the_trace(tmp_path: Path) -> 
 
 
 def test_every_finding_about_clocks_has_a_size() -> None:
-    every = [replace(LATE, name=name, values={"size": Value(-0.03, "s")}) for name in NAMES]
-    assert [effect.values for effect in clock_errors(every)] == [(-0.03,)] * len(NAMES)
+    every = [replace(LATE, name=name, values={"size": Value(-0.03, "s")}) for name in CLOCKS]
+    assert [effect.values for effect in clock_errors(every)] == [(-0.03,)] * len(CLOCKS)

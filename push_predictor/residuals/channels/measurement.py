@@ -14,6 +14,7 @@ shows it at rest. Later windows are valid under acceleration too; v is the speed
 
 An error is corrected in the stream where it occurred, so that the windows can be cut again: the tracker's stream is
 moved to the robot's frame and clock, a tool offset is subtracted from the pusher's stream, a bias from the wrench.
+Clocks that `check` found off are not corrected.
 """
 
 from __future__ import annotations
@@ -23,10 +24,13 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import ndtri
+from scipy.stats import norm
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
@@ -47,6 +51,7 @@ from push_predictor.residuals.channels.contrast import (
 from push_predictor.residuals.evidence.drivers import CONSTANT, at_touch
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES
+from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
 NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")
@@ -58,6 +63,13 @@ PARAMETERS = {
 ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
 MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
 CORNER = 0.002  # m; guards against a wrong normal: contacts closer to a corner may be on either side of it
+CLOCKS = {  # findings of check about clocks
+    "clocks_apart": "lateness of the slider's stamps",
+    "clock_step": "step of the slider's stamps",
+    "clock_drift": "drift of the slider's stamps",
+    "wrench_lag": "lateness of the force's stamps",
+}
+UNTRUSTED = "A clock that is off changes windows and forces: effects on them are not trusted, and no model is extended."
 
 
 def measurement_errors(
@@ -91,6 +103,16 @@ def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
         "frame_rotation": -np.sum(outward * turned, axis=1)[:, None],
         "frame_shift": -outward,
     }
+
+
+def clock_errors(findings: Sequence[Finding]) -> tuple[ChannelEffect, ...]:
+    """The clocks that `check` found off, as measurement errors with their sizes."""
+    return tuple(map(_error, findings))
+
+
+def clock_notes(findings: Sequence[Finding]) -> tuple[str, ...]:
+    """What was found about clocks, and that nothing is learnt from it."""
+    return (*(finding.text for finding in findings), UNTRUSTED) if findings else ()
 
 
 def _gap_of(both: Stacked, outline: Outline) -> Quantity:
@@ -199,3 +221,11 @@ CORRECTIONS: dict[str, Callable[..., Recording]] = {
     "tool_offset": lambda recording, x, y: replace(recording, pusher=_moved(recording.pusher, x, y)),
     "wrench_bias": _bias,
 }
+
+
+def _error(finding: Finding) -> ChannelEffect:
+    size = next(iter(finding.values.values()), Value(0.0, "s"))
+    half = float(ndtri(0.975)) * (size.sd or 0.0)
+    sized = Sized(CLOCKS[finding.name], size.value, size.value - half, size.value + half, size.unit)
+    p_value = 2.0 * float(norm.sf(abs(size.value) / size.sd)) if size.sd else 0.0
+    return ChannelEffect("clock_offset", CONSTANT, "constant", (sized,), p_value)
