@@ -21,7 +21,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.joint_fit import Fit, FitRows
-from push_predictor.residuals.channels.motion import MotionTerm, _differ, _is_left, _separable, motion_effects
+from push_predictor.residuals.channels.motion import MotionTerm, _as_one, _differ, _is_left, _separable, motion_effects
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.gate import Gate
@@ -86,6 +86,23 @@ def test_what_gains_a_seventh_of_an_effect_along_the_same_covariate_is_left_by_i
     assert _is_left(term("pressure_spread", covariate, gain), [larger]) == left
     assert _is_left(term("contact_friction", covariate, 14.0), [larger])
     assert not _is_left(larger, [])
+
+
+@pytest.mark.parametrize(("parts", "one"), [("", False), ("p", False), ("n", True), ("np", True)])
+def test_more_than_two_changes_at_once_are_one_that_the_library_lacks(parts: str, one: bool) -> None:
+    """Two terms, and further ones that are parts (p) or not (n)."""
+    mechanisms = ("tilted_surface", "pressure_spread", "contact_friction", "inertia")[: 2 + len(parts)]
+    terms = tuple(
+        MotionTerm(
+            Candidate(name, "x", ALWAYS, NOISE), 0.001, 9.0 - k, Naming(("x", "y"), (name, "other"), True),
+            ("dx",), 0.1, False, False, k > 1 and parts[k - 2] == "p",
+        )
+        for k, name in enumerate(mechanisms)
+    )  # fmt: skip
+    first, *others = _as_one(terms)
+    assert (first.mechanism, first.naming.resembles) == ((None, "tilted_surface") if one else ("tilted_surface", None))
+    assert first.naming.covariates == ("x", "y") and not first.part
+    assert [term.part for term in others] == [one or was.part for was in terms[1:]]
 
 
 @pytest.mark.parametrize(("change", "differs"), [(2.4, False), (2.7, True), (-2.7, True)])

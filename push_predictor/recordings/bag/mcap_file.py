@@ -90,6 +90,7 @@ class McapFile(BagFile):
         """See BagFile. One chunk at a time is in memory."""
         for places, records, offset in self._found(topics):
             yield from self._messages_at(places, records, offset, topics)
+            del records  # before the next chunk is read
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """See BagFile. The messages of a chunk are not made one by one."""
@@ -102,6 +103,7 @@ class McapFile(BagFile):
                 single = []
             if not alone:
                 yield from self._chunk_portions(places, records, offset, topics)
+            del records  # before the next chunk is read
         yield from gathered(single)
 
     def _chunk_portions(
@@ -133,7 +135,7 @@ class McapFile(BagFile):
                 places = self._places(records, offset, topics)
                 seen += len(places) // _FIELDS
                 yield places, records, offset
-                del records  # before the next chunk is read
+                del records
         if self._listed not in (None, seen):
             self._lost_at(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 

@@ -29,6 +29,7 @@ from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
 DIFFERENT = 0.01  # probability that an effect which differs from that in training is the same
+MOST_AT_ONCE = 2  # changes since training: guards against one outside the library, which a sum of its effects imitates
 LEFT = 0.15  # of the gain of a larger effect: less is what its fit leaves
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
@@ -39,7 +40,7 @@ class MotionTerm(Term):
 
     outputs: those that it shifts. share: of the sum of squares of the standardised residual. own: whether it lies in
     the inputs of a learnt base, so that a refit learns it. since_training: whether a constant effect is a change since
-    training. part: whether it is what the fit of a larger one leaves, rather than an effect.
+    training. part: whether it belongs to a larger one, rather than being an effect of its own.
     """
 
     outputs: tuple[str, ...]
@@ -145,7 +146,18 @@ def _judged(found: SearchResult, evidence: Evidence, inputs: InputsBasis, baseli
         )
         for k, (term, gain, part, own) in enumerate(zip(found.terms, gains, fit.parts, changed, strict=True))
     ]
-    return tuple(sorted(terms, key=lambda term: term.part))
+    in_order = tuple(sorted(terms, key=lambda term: term.part))
+    return _as_one(in_order) if inputs.learnt else in_order
+
+
+def _as_one(terms: tuple[MotionTerm, ...]) -> tuple[MotionTerm, ...]:
+    """Terms about a learnt base, the largest first; more than MOST_AT_ONCE are one effect without a name."""
+    if sum(not term.part for term in terms) <= MOST_AT_ONCE:
+        return terms
+    first, *others = terms
+    resembles = first.naming.resembles or first.best.mechanism
+    naming = replace(first.naming, mechanisms=(None,), known=False, resembles=resembles)
+    return (replace(first, naming=naming), *(replace(term, part=True) for term in others))
 
 
 def _is_left(term: Term, larger: Sequence[Term]) -> bool:
