@@ -41,7 +41,7 @@ NEEDS_ROS = re.compile(
 LONGEST = {  # files that take six seconds of processor time or more, or that wait as long: a third of the workers' time
     "test_adaptation", "test_alarm", "test_checks", "test_cli", "test_extended_model", "test_gym",
     "test_measured_end_to_end", "test_mpc",
-    "test_outline_causes", "test_paper_report", "test_prior_model", "test_residual_search", "test_tabulated_model",
+    "test_outline_causes", "test_paper_report", "test_prior_model", "test_tabulated_model",
     "test_trace_verdicts",
     "test_faults_bags", "test_faults_kill", "test_faults_load", "test_faults_network_security", "test_node_lab_topics",
     "test_node_predict_server", "test_node_push_alarm", "test_node_push_recorder", "test_node_push_replay",

@@ -6,7 +6,7 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.ladder --data FOLDER [--kind mit-square|mlab] [--base BASE]
 
 FOLDER has mit_square and mlab. `trace` is called as by its command, with the covariates of the data. It holds out a
-third of the pushes (residuals/evidence/split.py) and uses them once, at the end. BASE is the textbook model (an
+third of the pushes (residuals/evidence/standardised.py) and uses them once, at the end. BASE is the textbook model (an
 ellipsoidal limit surface, contact friction 0.3) or `exact`: the exact forward model with the textbook's parameters and,
 where the names of the recordings state them, the support points. No base is fitted, only its covariance is.
 """

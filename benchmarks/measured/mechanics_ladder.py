@@ -5,7 +5,7 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.mechanics_ladder --data FOLDER [--kind mit-square|mlab]
 
-FOLDER has mit_square and mlab. A third of the pushes (residuals/evidence/split.py), the same as in
+FOLDER has mit_square and mlab. A third of the pushes (residuals/evidence/standardised.py), the same as in
 benchmarks/measured/ladder.py, is held out. The ladder is fitted to all the others, as the command does it, and each of
 its steps is scored on the held-out pushes.
 """

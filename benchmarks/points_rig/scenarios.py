@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from benchmarks.points_rig.drivers import MEASURES, draw_driver
+from benchmarks.points_rig.drivers import Driver, draw_driver
 from benchmarks.points_rig.effects import KINDS, LIBRARY, UNNAMED, WRENCH, Effect, Kind
 from benchmarks.points_rig.rigs import Rig
 from benchmarks.points_rig.sessions import InputShift, Session
@@ -82,7 +82,7 @@ def describe(scenario: Scenario, session: Session) -> dict[str, object]:
         size = SIZES[RATIOS.index(scenario.noise_ratio)]
         entries |= _entries("noise", [None], ["session", "model_inputs"], "constant", size, scenario.noise_ratio, "1")
     if scenario.fault is not None:
-        entries |= _describe_fault(scenario.fault)
+        entries |= _describe_fault(scenario.fault, session)
     if scenario.effects:
         entries |= _describe_effect(scenario.effects[0], session)
     if len(scenario.effects) > 1:
@@ -122,13 +122,13 @@ def _draw_fault(random: np.random.Generator, size: int) -> Fault:
     return Fault(kind, sign * FAULTS[kind][0][size], float(random.uniform(-np.pi, np.pi)), round(begin, 3))
 
 
-def _describe_fault(fault: Fault) -> dict[str, object]:
+def _describe_fault(fault: Fault, session: Session) -> dict[str, object]:
     values, unit = FAULTS[fault.kind]
     late = fault.begin > 0.0
-    covariates = list(MEASURES.values()) if late else ["session", "model_inputs"]
-    form, size = "step" if late else "constant", SIZES[values.index(abs(fault.value))]
-    place = {"place": fault.begin if late else None}
-    return _entries(fault.kind, [fault.kind], covariates, form, size, fault.value, unit) | place
+    driver = Driver("step" if late else "constant", place=fault.begin)
+    covariates = driver.covariates(session, ("session", "model_inputs"))
+    size, place = SIZES[values.index(abs(fault.value))], {"place": driver.at_push(session)}
+    return _entries(fault.kind, [fault.kind], covariates, driver.form, size, fault.value, unit) | place
 
 
 def _describe_effect(effect: Effect, session: Session) -> dict[str, object]:

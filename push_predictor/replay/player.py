@@ -344,9 +344,9 @@ class ReplayPlayer:
         return None if self._next is None or (last is not None and self._next.log_time > last) else self._next
 
     def _go_to(self, time: int) -> None:
-        self._ahead = sorted_within(self._source.messages(time), self._window)
-        self._read()
-        self._time = time
+        ahead = sorted_within(self._source.messages(time), self._window)
+        head = next(ahead, None)  # before anything is changed: reading may fail
+        self._ahead, self._next, self._time = ahead, head, time
         self._clock.jump(time)
 
     def _read(self) -> None:

@@ -4,7 +4,7 @@
 """Properties of every push, pose and sampling, checked by hypothesis.
 
 Round trips of single messages are in test_msg_adapters.py, rigid motions of the world in test_windows.py, sides of a
-square in test_push_model.py and test_served_model.py: here is what these leave open.
+square in test_push_model.py: here is what these leave open.
 """
 
 from __future__ import annotations

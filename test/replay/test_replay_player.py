@@ -134,6 +134,38 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     assert stage.player.published == 10
 
 
+def test_the_player_says_how_far_it_is_behind() -> None:
+    stage, seen = Stage(TEN), list[float]()
+    stage.cost = round(0.15 * SECOND)
+    publish = stage.publish
+
+    def watched(sent: RawMessage) -> bool:
+        seen.append(stage.player.behind / SECOND)
+        return publish(sent)
+
+    stage.publish = watched  # type: ignore[method-assign]
+    stage.run()
+    assert seen == pytest.approx([0.05 * k for k in range(10)])
+
+
+def test_a_seek_to_what_cannot_be_read_changes_nothing() -> None:
+    class Broken(ListSource):
+        def messages(self, start: int) -> Iterator[RawMessage]:
+            if start == at(0.7):
+                raise OSError("the disk is gone")
+            return super().messages(start)
+
+    stage = Stage(TEN, source=Broken(TEN))
+
+    def fails() -> None:
+        with pytest.raises(OSError, match="disk"):
+            stage.player.seek(at(0.7))
+
+    stage.player.fails = fails  # type: ignore[attr-defined]
+    stage.script = {4: ["fails"]}
+    assert stage.run() == TENTHS
+
+
 def test_each_message_is_prepared_before_its_time() -> None:
     stage = Stage(TEN, rate=10.0)
     stage.run()

@@ -95,13 +95,15 @@ def test_more_than_two_changes_at_once_are_one_that_the_library_lacks(parts: str
     terms = tuple(
         MotionTerm(
             Candidate(name, "x", ALWAYS, NOISE), 0.001, 9.0 - k, Naming(("x", "y"), (name, "other"), True),
-            ("dx",), 0.1, False, False, k > 1 and parts[k - 2] == "p",
+            (("dx", "dy", "dtheta")[k % 3],), 0.1, False, False, k > 1 and parts[k - 2] == "p",
         )
         for k, name in enumerate(mechanisms)
     )  # fmt: skip
     first, *others = _as_one(terms)
     assert (first.mechanism, first.naming.resembles) == ((None, "tilted_surface") if one else ("tilted_surface", None))
     assert first.naming.covariates == ("x", "y") and not first.part
+    assert first.outputs == (("dx", "dy", "dtheta") if one else ("dx",))
+    assert first.share == pytest.approx(0.1 * len(terms) if one else 0.1)
     assert [term.part for term in others] == [one or was.part for was in terms[1:]]
 
 

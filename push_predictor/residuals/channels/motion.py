@@ -157,7 +157,9 @@ def _as_one(terms: tuple[MotionTerm, ...]) -> tuple[MotionTerm, ...]:
     first, *others = terms
     resembles = first.naming.resembles or first.best.mechanism
     naming = replace(first.naming, mechanisms=(None,), known=False, resembles=resembles)
-    return (replace(first, naming=naming), *(replace(term, part=True) for term in others))
+    outputs = tuple(name for name in OUTPUTS if any(name in term.outputs for term in terms))
+    whole = replace(first, naming=naming, outputs=outputs, share=sum(term.share for term in terms))
+    return (whole, *(replace(term, part=True) for term in others))
 
 
 def _is_left(term: Term, larger: Sequence[Term]) -> bool:
