@@ -1,7 +1,4 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Step 9 and 10: the refit, the model with its effects, their size, and the gain on held-out pushes.
-
-Import `extended_model` and `held_out_gain`.
-"""
+"""The refit, the model with its effects, and the gain on held-out pushes."""
