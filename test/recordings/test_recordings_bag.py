@@ -134,6 +134,39 @@ def test_portions_have_the_messages_of_each_topic_in_their_order(
             assert b"".join(part.buffer for part in parts) == b"".join(m.data for m in expected)
 
 
+@pytest.mark.parametrize("missing", [1, 3])
+def test_of_an_lz4_chunk_that_is_cut_off_all_that_can_be_decoded_is_used(tmp_path: Path, missing: int) -> None:
+    """The last bytes of a frame are its end mark alone."""
+    path = random_messages(tmp_path / "cut.mcap", CompressionType.LZ4)
+    data = path.read_bytes()
+    end = data.index(b"lz4") + 3
+    end += 8 + int.from_bytes(data[end : end + 8], "little")
+    path.write_bytes(data[: end - missing])
+    assert len(list(open_bag(path).messages())) == 300
+
+
+def test_metadata_under_another_name_than_in_the_index_are_noted(tmp_path: Path) -> None:
+    path = random_messages(tmp_path / "named.mcap", CompressionType.NONE)
+    path.write_bytes(path.read_bytes().replace(b"push_rig", b"qush_rig", 1))
+    notes = open_bag(path).notes
+    assert any("is named 'qush_rig', but 'push_rig' in the index" in note for note in notes)
+
+
+def random_messages(path: Path, compression: CompressionType) -> Path:
+    """300 messages of random bytes in one chunk, and a metadata record after it."""
+    rng = np.random.default_rng(1)
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=compression, chunk_size=1 << 20, enable_data_crcs=False)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Byte", "ros2msg", b"byte data\n")
+        channel = writer.register_channel("/a", "cdr", schema)
+        for time in range(300):
+            writer.add_message(channel, time, b"\0\1\0\0" + rng.bytes(100), time)
+        writer.add_metadata("push_rig", {"shape": "square"})
+        writer.finish()
+    return path
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [

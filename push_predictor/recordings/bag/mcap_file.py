@@ -96,7 +96,7 @@ class McapFile(BagFile):
         """See BagFile. The messages of a chunk are not made one by one."""
         single: list[RawMessage] = []
         for places, records, offset in self._found(topics):
-            if alone := len(places) <= _FIELDS:  # in a file without chunks
+            if alone := len(places) <= _FIELDS:  # a record of a file without chunks
                 single += self._messages_at(places, records, offset, topics)
             if not alone or len(single) >= PORTION:
                 yield from gathered(single)
@@ -326,10 +326,13 @@ class McapFile(BagFile):
             length = place.length - _HEAD.size
             if _read_at(stream, place.offset, _HEAD.size) != _HEAD.pack(Opcode.METADATA, length):
                 raise ValueError("the metadata index points to a place without a metadata record")
-            self._add(_parsed(Metadata, stream.read(length)), place.offset)
+            record = _parsed(Metadata, stream.read(length))
+            if record.name != place.name:
+                raise ValueError(f"a metadata record is named {record.name!r}, but {place.name!r} in the index")
         except _UNREADABLE as error:
             self._note(place.offset, f"{error or type(error).__name__}; a metadata record is expected there")
             return False
+        self._add(record, place.offset)
         return True
 
     def _check_end(self, stream: BinaryIO, end: int, chunks: list[int]) -> None:
@@ -497,14 +500,30 @@ def _unpacked(head: _ChunkHead, data: bytes) -> _Bytes:
     elif head.compression == b"zstd" and not cut and zstandard.frame_content_size(data) == head.size:
         found = zstandard.ZstdDecompressor().decompress(data)  # libzstd's stream takes a window of twice a chunk
     else:
-        found, zstd = bytearray(), zstandard.ZstdDecompressor()
-        is_zstd = head.compression == b"zstd"
-        reader = zstd.stream_reader(data, read_across_frames=True) if is_zstd else lz4.frame.LZ4FrameFile(BytesIO(data))
-        with suppress(EOFError):  # of lz4, at a cut
-            while len(found) <= head.size and (piece := reader.read(_PIECE)):
-                found += piece
+        found = bytearray()
+        for piece in _zstd_pieces(data) if head.compression == b"zstd" else _lz4_pieces(data):
+            found += piece
+            if len(found) > head.size:
+                break
     if len(found) != head.size and not cut:
         raise ValueError(f"a chunk does not contain the {head.size} bytes that it claims")
     if head.crc and not cut and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
     return found
+
+
+def _zstd_pieces(data: bytes) -> Iterator[bytes]:
+    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    while piece := reader.read(_PIECE):
+        yield piece
+
+
+def _lz4_pieces(data: bytes) -> Iterator[bytes]:
+    """All that can be decoded before a cut; in pieces, since incompressible data would take almost twice the memory."""
+    reader = lz4.frame.LZ4FrameDecompressor()
+    for begin in range(0, len(data), _PIECE):
+        if reader.eof:
+            return
+        yield reader.decompress(data[begin : begin + _PIECE], max_length=_PIECE)
+        while not (reader.needs_input or reader.eof):
+            yield reader.decompress(b"", max_length=_PIECE)
