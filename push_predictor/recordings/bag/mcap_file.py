@@ -113,10 +113,8 @@ class McapFile(BagFile):
         if np.any(data[np.minimum(table[:, 2], len(data) - 1)] == FRAME[0]):  # messages may be compressed themselves
             yield from gathered(self._messages_at(places, records, offset, topics))
             return
-        for number, of in self._wanted(topics).items():
+        for number, of in self._wanted(places, topics).items():
             _, times, start, end = table[table[:, 0] == number].T
-            if not len(times):
-                continue
             if length := int(end[0] - start[0]) if (end - start == end[0] - start[0]).all() else 0:
                 joined = np.lib.stride_tricks.sliding_window_view(data, length)[start].tobytes()
             else:
@@ -143,7 +141,7 @@ class McapFile(BagFile):
         self, places: array[int], records: _Bytes, offset: int, topics: Collection[str] | None
     ) -> Iterator[RawMessage]:
         """The wanted messages at places in consecutive records."""
-        undone, wanted = 0, self._wanted(topics) if places else {}
+        undone, wanted = 0, self._wanted(places, topics)
         for number, time, start, end in _PLACE.iter_unpack(places):
             if number not in wanted:
                 continue
@@ -259,12 +257,13 @@ class McapFile(BagFile):
 
     # --- descriptions ---
 
-    def _wanted(self, topics: Collection[str] | None) -> dict[int, tuple[str, str]]:
-        """Topic and type by CDR channel, of all topics or of the given ones."""
+    def _wanted(self, places: array[int], topics: Collection[str] | None) -> dict[int, tuple[str, str]]:
+        """Topic and type by CDR channel of the messages at these places, of all topics or of the given ones."""
+        known = (self._channels.get(number) for number in sorted({*places[::_FIELDS]}))
         return {
             channel.id: (channel.topic, self._types.get(channel.schema_id) or self.topics[channel.topic])
-            for channel in self._channels.values()
-            if channel.message_encoding == "cdr" and (topics is None or channel.topic in topics)
+            for channel in known
+            if channel and channel.message_encoding == "cdr" and (topics is None or channel.topic in topics)
         }
 
     def _check_channel(self, channel: int, topics: Collection[str] | None, offset: int) -> None:

@@ -76,7 +76,7 @@ class BagFile:
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of file has its own
 
     def portions(self, topics: Collection[str]) -> Iterator[Messages]:
         """The same of the given topics, many of a topic and type at once."""

@@ -64,7 +64,7 @@ class Portions:
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        raise NotImplementedError
+        raise NotImplementedError  # each repair has its own
 
     def _with(self, new: OrderedSamples) -> OrderedSamples:
         """The kept samples and further ones."""
