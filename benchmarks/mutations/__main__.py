@@ -72,6 +72,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutations", description=__doc__)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--within", default="", help="only files whose path begins so, as push_predictor/models")
     parser.add_argument("--again", type=Path, help="the mutants of a file written before")
     parser.add_argument("--survivors", action="store_true", help="with --again: only those that survived")
     parser.add_argument(
@@ -83,7 +84,9 @@ def main() -> int:
     if not options.calls.is_dir():
         make_map(options.calls.resolve(), options.cores)
     tests = Map(options.calls)
-    mutants = read(options.again, options.survivors) if options.again else drawn(options.count, options.seed)
+    mutants = (
+        read(options.again, options.survivors) if options.again else drawn(options.count, options.seed, options.within)
+    )
     judged = judge(mutants, tests, options.cores, options.out)
     print(table(judged))
     return 0

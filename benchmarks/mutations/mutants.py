@@ -67,10 +67,10 @@ class Mutant:
         return "\n".join(lines)
 
 
-def drawn(count: int, seed: int) -> list[Mutant]:
-    """`count` mutants: files by their length, then kinds evenly, so that constants do not outnumber checks."""
+def drawn(count: int, seed: int, within: str = "") -> list[Mutant]:
+    """`count` mutants of the files whose path begins with `within`: files by their length, then kinds evenly, so that constants do not outnumber checks."""
     rng = np.random.default_rng(seed)
-    by_file = {path: kinds for path in sources() if (kinds := _by_kind(path))}
+    by_file = {path: kinds for path in sources(within) if (kinds := _by_kind(path))}
     sizes = np.array([sum(map(len, kinds.values())) for kinds in by_file.values()], dtype=float)
     chosen: dict[Mutant, None] = {}
     while len(chosen) < count:
@@ -80,10 +80,11 @@ def drawn(count: int, seed: int) -> list[Mutant]:
     return list(chosen)
 
 
-def sources() -> list[Path]:
+def sources(within: str = "") -> list[Path]:
     """The Python files that are not compiled: the changed text of a compiled one would not run."""
     files = [path for folder in SOURCES for path in sorted((ROOT / folder).rglob("*.py")) if "build" not in path.parts]
-    return [path for path in files if "import cython" not in path.read_text()]
+    chosen = [path for path in files if str(path.relative_to(ROOT)).startswith(within)]
+    return [path for path in chosen if "import cython" not in path.read_text()]
 
 
 def _by_kind(path: Path) -> dict[str, list[Mutant]]:
