@@ -68,12 +68,15 @@ class Mutant:
 
 
 def drawn(count: int, seed: int, within: str = "") -> list[Mutant]:
-    """`count` mutants of the files whose path begins with `within`: files by their length, then kinds evenly, so that constants do not outnumber checks."""
+    """At most `count` mutants of the files whose path begins with `within`.
+
+    Long files have more of them. All kinds of a file are equally likely: constants would outnumber checks.
+    """
     rng = np.random.default_rng(seed)
     by_file = {path: kinds for path in sources(within) if (kinds := _by_kind(path))}
     sizes = np.array([sum(map(len, kinds.values())) for kinds in by_file.values()], dtype=float)
     chosen: dict[Mutant, None] = {}
-    while len(chosen) < count:
+    while len(chosen) < min(count, sum(sizes)):
         kinds = list(by_file.values())[rng.choice(len(sizes), p=sizes / sizes.sum())]
         of_kind = kinds[sorted(kinds)[rng.integers(len(kinds))]]
         chosen[of_kind[rng.integers(len(of_kind))]] = None
