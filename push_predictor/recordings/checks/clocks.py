@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
-from push_predictor.recordings.checks.geometry import contacts_of
 from push_predictor.recordings.checks.motion import SPANS, in_time, motion_of, moving_slider, noise_of, values_at
-from push_predictor.recordings.checks.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart, time_apart
-from push_predictor.recordings.checks.outline_fit import MEDIAN_SD, TIE, fit_outline
+from push_predictor.recordings.checks.outline_findings import clocks_apart, time_apart
+from push_predictor.recordings.checks.outline_fit import DOUBT, LAG_ALLOWANCE, MEDIAN_SD, TIE, contacts_of, fit_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.regular_stamps import SD

@@ -19,26 +19,35 @@ from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image, transformed, transformed_points
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
-    LAG_ALLOWANCE,
     LARGEST_SIZE_CHANGE,
     LARGEST_TIP_CHANGE,
-    LENGTH_ALLOWANCE,
     TIP_POSE,
-    frames_apart,
+    further_cause,
     outline_findings,
-    tip_offset,
     unchecked,
 )
-from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.outline_fit import (
+    FEWEST_CONTACTS,
+    LAG,
+    LAG_ALLOWANCE,
+    LENGTH_ALLOWANCE,
+    SIZE,
+    TIE,
+    Contacts,
+    OutlineFit,
+    X,
+    Y,
+    contacts_of,
+    fit_outline,
+)
 from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
-FEWEST_CONTACTS = 20  # samples
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
@@ -142,7 +151,7 @@ def _findings_of_large_gap(
         mirror = MIRRORS[best]
         return [_falling(best, f"{mirror.mistake} With it corrected", mirror.advice, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
-    if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
+    if another and all(further_cause(each, contacts, rig, fit) is None for each in ("frames_apart", "tip_offset")):
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
@@ -153,17 +162,6 @@ def _findings_of_large_gap(
 def swapped(recording: Recording) -> Recording:
     """The recording with slider and pusher exchanged."""
     return replace(recording, slider=recording.pusher, pusher=recording.slider)
-
-
-def contacts_of(motion: Motion | None) -> Contacts | None:
-    """The samples in contact, None if there are too few."""
-    if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
-        return None
-    touch = motion.touching
-    tips = to_body(motion.tip, motion.slider)[touch]
-    tool = None if motion.tool is None else motion.tool[touch]
-    velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]
-    return Contacts(tips, velocities, push, poses, motion.noise, tool=tool)
 
 
 def _too_brief(motion: Motion, rig: Rig) -> int | None:
