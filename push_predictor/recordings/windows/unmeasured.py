@@ -20,8 +20,8 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.streams import PoseStream, taken
-from push_predictor.recordings.windows.resolution import LEVER, Resolution, changes, lengths
+from push_predictor.recordings.streams import taken
+from push_predictor.recordings.windows.resolution import changes, lengths
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -145,12 +145,14 @@ class HeldPoses(Portions):
 class ContinuedPoses(Portions):
     """Takes the samples of one stream in order and returns them without continued ones.
 
-    A sample waits for the next one, those on a line for its end. The result does not depend on the portions.
+    A sample waits for the next one, those on a line for its end. The result does not depend on the portions. lost:
+    number of continued samples; runs: of lines that they are on.
     """
 
     def __init__(self, angle: int | None) -> None:
         """Of a stream whose last column is the resolution, m; angle: index of one with an unwrapped heading, rad."""
         super().__init__()
+        self.lost = self.runs = 0
         self._angle = angle
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
@@ -160,15 +162,11 @@ class ContinuedPoses(Portions):
         lost, decided = _judged(samples.stamp, pose, samples.values[:, -1], first)
         decided = len(lost) if final else max(decided, first)
         rows = np.arange(first, decided)
+        self.lost += int(np.sum(lost[rows]))
+        self.runs += int(np.sum(np.diff(lost[rows], prepend=False) & lost[rows]))
         kept = max(decided - JUDGING, 0)
         self._keep(samples, slice(kept, None), decided - kept)
         return taken(samples, rows[~lost[rows]])
-
-
-def continued(stream: PoseStream, angle: bool) -> BoolArray:
-    """Which poses (n,) of a stream are continued, not measured; angle: whether its headings count."""
-    pose = np.column_stack([stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])])
-    return _judged(stream.stamp, pose, np.max(Resolution(pose.shape[1]).take(pose), axis=1, initial=0.0), 0)[0]
 
 
 def _judged(stamp: IntArray, pose: Array, quantum: Array, first: int) -> tuple[BoolArray, int]:
