@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
 from push_predictor.recordings.checks.motion import SPANS, in_time, motion_of, moving_slider, noise_of, values_at
-from push_predictor.recordings.checks.outline_findings import clocks_apart, time_apart
+from push_predictor.recordings.checks.outline_findings import clocks_apart
 from push_predictor.recordings.checks.outline_fit import DOUBT, LAG_ALLOWANCE, MEDIAN_SD, TIE, contacts_of, fit_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
@@ -158,7 +158,7 @@ def _findings(course: Course) -> list[Finding]:
 
 def _steps(steps: tuple[Step, ...]) -> Finding:
     stated = ", and ".join(
-        f"{_clock(step)} by {time_apart(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
+        f"{_clock(step)} by {1e3 * abs(step.size):.0f} ms (sd {1e3 * step.sd:.2g}), {step.time:.1f} s after the start"
         for step in steps
     )
     sentence = f"A clock was set during the recording: {stated}."

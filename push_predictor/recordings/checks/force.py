@@ -209,14 +209,11 @@ def _missing(motion: Motion) -> Finding | None:
     share = 1.0 - float(np.mean(known[motion.contact]))
     if share <= MISSING:
         return None
-    where, whole = "it has gaps or NaN", motion.time[-1]
-    if known.any():
-        begin, end = motion.time[known][[0, -1]]
-        if begin > MISSING * whole:
-            where = f"it begins {begin:.0f} s after the slider's poses"
-        elif end < (1.0 - MISSING) * whole:
-            where = f"it ends after {end:.0f} s of {whole:.0f} s"
-    sentence = f"The force is missing in {100.0 * share:.0f} % of the contacts: {where}."
+    begin, end = motion.time[known][[0, -1]] if known.any() else (0.0, 0.0)
+    sentence = (
+        f"The force is missing in {100.0 * share:.0f} % of the contacts: it begins after {begin:.0f} s, ends after "
+        f"{end:.0f} s of {motion.time[-1]:.0f} s, or has gaps or NaN."
+    )
     return Finding("wrench_missing", "warning", sentence, f"{DRIVER} {BY_GEOMETRY}", {"share": Value(share, "1")})
 
 

@@ -45,7 +45,6 @@ from push_predictor.types import Array
 Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "tip_offset", "proportions"]
 # What may be wrong besides the outline's pose and size, by the parameters that it adds; the first of equally good ones.
 FURTHER: dict[Name, tuple[int, ...]] = {"frames_apart": FRAMES, "tip_offset": TOOL, "proportions": (STRETCH,)}
-SLOWEST_FILTER = 0.2  # s of delay
 SEPARATE = 0.0002  # m; sd of size and tip radius, fitted together, above which the contacts do not separate them
 FINE = 0.0001  # m; a spread of the pushes below it leaves nothing to explain
 LARGEST_TIP_CHANGE = 0.55  # relative; a diameter given as the radius is a change of 0.5
@@ -102,10 +101,9 @@ def _turned(yaw: Value) -> Finding:
 def _shifted(fit: OutlineFit, rig: Rig) -> Finding:
     x, y, given = fit.value(X, "m"), fit.value(Y, "m"), 1e3 * rig.outline.centroid
     centre = np.round(given + 1e3 * np.array([x.value, y.value]), 1) + 0.0  # without a negative zero
-    origin = f"({given[0]:.1f}, {given[1]:.1f}) mm" if np.any(np.abs(given) > 0.05) else "its origin"
     sentence = (
         f"The slider's centre is at ({centre[0]:.1f}, {centre[1]:.1f}) mm in the tracked frame "
-        f"(sd {1e3 * (x.sd or 0.0):.1g}, {1e3 * (y.sd or 0.0):.1g}), not at {origin}."
+        f"(sd {1e3 * (x.sd or 0.0):.1g}, {1e3 * (y.sd or 0.0):.1g}), not at ({given[0]:.1f}, {given[1]:.1f})."
     )
     advice = "Move the tracked frame's origin there, or the outline in the rig (`rig --from` writes that rig)."
     if fit.sd[SIZE] == 0.0:  # the contacts are on one side
@@ -235,18 +233,12 @@ def _tip_offset(fit: OutlineFit) -> Finding:
 def clocks_apart(lag: Value, the: str = "The") -> Finding:
     """The finding that the slider's stamps are late (s), or early."""
     side, sd = "late" if lag.value > 0.0 else "early", 1e3 * (lag.sd or 0.0)
-    sentence = f"{the} slider's stamps are {time_apart(lag.value)} {side} (sd {sd:.2g} ms) against the pusher's."
-    advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
-    if 0.0 < lag.value < SLOWEST_FILTER:
-        advice += (
-            " A filter of the tracker has the same effect, and so has a commanded pose of the tip: record neither."
-        )
+    sentence = f"{the} slider's stamps are {1e3 * abs(lag.value):.0f} ms {side} (sd {sd:.2g} ms) against the pusher's."
+    advice = (
+        "Synchronise the clocks (chrony, PTP), or correct the stamps. A filter of the tracker has the effect of late "
+        "ones, and so has a commanded pose of the tip: record neither."
+    )
     return Finding("clocks_apart", "warning", sentence, advice, {"lag": lag})
-
-
-def time_apart(seconds: float) -> str:
-    """By how much clocks differ, in words, without the sign."""
-    return f"{1e3 * abs(seconds):.0f} ms" if abs(seconds) < 10.0 else f"{abs(seconds):.1f} s"
 
 
 # --- the cause --------------------------------------------------------------------------------------------------------

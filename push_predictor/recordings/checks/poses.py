@@ -40,7 +40,6 @@ NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a 
 FEWEST_HOLDS = FEWEST_RUNS = 2
 LEAST_BURSTS = 0.5  # of the blocks of a stream
 UNSEEN = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
-DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
 LEAST_SHARE = 1.0 / 6.0  # of the poses in motion are repeats: the source is slower than its messages
 MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
 FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is estimated
@@ -73,17 +72,17 @@ def _lines(name: str, facts: StreamFacts) -> Finding | None:
 def _resolution(name: str, facts: StreamFacts) -> Finding | None:
     if not facts.coarse:
         return None
-    sentence = f"The {name}'s positions have a resolution of {_step(facts.quantum)}"
+    sentence = f"The {name}'s positions have a resolution of {1e3 * facts.quantum:.2g} mm"
     if facts.heading_quantum > 0.0:
         sentence += f", its headings of {np.degrees(facts.heading_quantum):.2g} degrees"
-    values = {"quantum": Value(facts.quantum, "m"), "fit_span": Value(facts.fit_span, "s")}
-    if facts.fit_span > TWO_LINES * WINDOW:
-        sentence += f": too coarse for speeds and displacements in a window of {WINDOW:g} s."
-        advice = "Record the numbers as measured, with at least 5 decimals of a metre and 4 of a radian."
-        return Finding(f"resolution_{name}", "refused", sentence, advice, values)
     sentence += f": speeds need lines over {1e3 * facts.fit_span:.0f} ms, in place of 20 ms."
-    advice = "Windows use such lines. Better: write at least 5 decimals of a metre and 4 of a radian."
-    return Finding(f"resolution_{name}", "warning", sentence, advice, values)
+    advice = (
+        f"Windows use such lines up to {1e3 * TWO_LINES * WINDOW:.0f} ms. Better: write at least 5 decimals of a metre "
+        "and 4 of a radian."
+    )
+    severity: Severity = "refused" if facts.fit_span > TWO_LINES * WINDOW else "warning"
+    values = {"quantum": Value(facts.quantum, "m"), "fit_span": Value(facts.fit_span, "s")}
+    return Finding(f"resolution_{name}", severity, sentence, advice, values)
 
 
 def _source(name: str, facts: StreamFacts) -> Finding | None:
@@ -113,15 +112,14 @@ def _rate(name: str, facts: StreamFacts) -> Finding | None:
     count = WINDOW / facts.source_period
     if count > ENOUGH:
         return None
-    rate, least = 1.0 / facts.source_period, FEWEST_SAMPLES / WINDOW
-    sentence = f"The {name} has {rate:.3g} poses a second: {count:.1f} in a window of {WINDOW:g} s"
-    values = {"rate": Value(rate, "Hz")}
-    advice = f"At least {least:.0f} Hz are needed; 100 Hz are usual."
-    if count < FEWEST_SAMPLES - 0.5:
-        sentence += f", fewer than the {FEWEST_SAMPLES} that a speed and the begin and end of a push need."
-        return Finding(f"rate_{name}", "refused", sentence, advice, values)
-    sentence += f". Begin and end of a push are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
-    return Finding(f"rate_{name}", "warning", sentence, advice, values)
+    rate = 1.0 / facts.source_period
+    sentence = (
+        f"The {name} has {rate:.3g} poses a second, {count:.1f} in a window of {WINDOW:g} s: begin and end of a push "
+        f"are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
+    )
+    advice = f"At least {FEWEST_SAMPLES / WINDOW:.0f} Hz are needed; 100 Hz are usual."
+    severity: Severity = "refused" if count < FEWEST_SAMPLES - 0.5 else "warning"
+    return Finding(f"rate_{name}", severity, sentence, advice, {"rate": Value(rate, "Hz")})
 
 
 def _noise(name: str, facts: StreamFacts) -> Finding | None:
@@ -148,14 +146,6 @@ def _speed_noise(facts: StreamFacts) -> Finding | None:
     advice = "Take the tip's pose from the robot's joints in place of a camera, or filter it without delay."
     severity: Severity = "warning" if noise < TOO_NOISY else "refused"
     return Finding("speed_noise", severity, sentence, advice, {"speed": Value(float(noise), "m/s")})
-
-
-def _step(quantum: float) -> str:
-    """A resolution in words, by decimals where it is one."""
-    for decimals, step in enumerate(DECIMALS):
-        if abs(quantum / step - 1.0) < 0.01:
-            return f"{decimals} decimals ({1e3 * step:g} mm)"
-    return f"{1e3 * quantum:.2g} mm"
 
 
 # --- what a stream of poses is by itself ------------------------------------------------------------------------------

@@ -34,8 +34,6 @@ LEAST_SHARE = 0.05  # of the samples are repeats; single ones are usual
 SECOND = 1_000_000_000  # ns
 SPAN = 3  # s of whole seconds in a stream, from which its fractions are judged
 SMALL = 0.01  # of a second: no fraction of a stream over several seconds stays below
-ZONE, SAME_ZONE = 1800 * SECOND, 0.04  # ns of which time zones differ; share of it in which the streams begin
-EPOCH = 86400 * 365 * SECOND  # ns: an earlier time is counted from the start of a machine or a simulation
 LOG = "`--stamp log` takes the recorder's time in place of the header's."
 Stamps = dict[str, IntArray]
 LOST = 0.02  # share of the time in dropouts, from which irregular stamps are named
@@ -150,30 +148,20 @@ def clocks_never_meet(stamps: Stamps) -> list[Finding]:
     if "slider" not in stamps:
         return []
     first, last = int(stamps["slider"].min()), int(stamps["slider"].max())
-    apart = {name: stamp for name, stamp in stamps.items() if stamp.max() < first or stamp.min() > last}
-    if not apart:
+    late = {name: int(of.min()) - first for name, of in stamps.items() if of.max() < first or of.min() > last}
+    if not late:
         return []
-    told = ", ".join(f"the {name}'s begin {_time(int(of.min()) - first)} the slider's" for name, of in apart.items())
-    early = [name for name, of in {**apart, "slider": stamps["slider"]}.items() if of.max() < EPOCH]
-    cause = (
-        f" The time of {' and '.join(early)} counts from the start of a simulation or a machine."
-        if 0 < len(early) <= len(apart)
-        else ""
+    told = ", ".join(
+        f"the {name}'s begin {1e-9 * abs(apart):.0f} s {'after' if apart > 0 else 'before'} the slider's"
+        for name, apart in late.items()
     )
-    zones = {(int(of.min()) - first) / ZONE for of in apart.values()}
-    if not cause and all(abs(each - round(each)) < SAME_ZONE for each in zones):
-        cause = " These are whole half hours: the clocks are set to different time zones."
-    sentence = f"The streams have no time in common, their stamps last {1e-9 * (last - first):.0f} s: {told}.{cause}"
-    values = {f"{name}_apart": Value(1e-9 * (int(of.min()) - first), "s") for name, of in apart.items()}
+    sentence = (
+        f"The streams have no time in common, their stamps last {1e-9 * (last - first):.0f} s: {told}. They are of two "
+        "clocks, as of simulation and wall time, or of two time zones."
+    )
+    values = {f"{name}_apart": Value(1e-9 * apart, "s") for name, apart in late.items()}
     advice = f"Stamp all streams by one clock (`use_sim_time` for all nodes or for none). {LOG}"
     return [Finding("clocks_never_meet", "refused", sentence, advice, values)]
-
-
-def _time(apart: int) -> str:
-    """A time apart, ns, in words."""
-    seconds = 1e-9 * abs(apart)
-    size = f"{seconds:.0f} s" if seconds < 86400 else f"{seconds / 86400:.0f} days"
-    return f"{size} {'after' if apart > 0 else 'before'}"
 
 
 def _wrong(stamp: IntArray) -> str:
