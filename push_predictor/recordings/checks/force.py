@@ -14,7 +14,7 @@ from push_predictor.recordings.checks.finding import Evidence, Finding, Value
 from push_predictor.recordings.checks.force_direction import FEWEST_PUSHES, TOPIC, direction_findings
 from push_predictor.recordings.checks.geometry import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
-from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.dropouts import NANOSECOND, usual_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream, taken
 from push_predictor.recordings.windows.contact import SLOWEST
@@ -287,8 +287,8 @@ def unseen_finding(delays: list[float]) -> Finding | None:
 
 def rate_finding(wrench: WrenchStream) -> Finding | None:
     """A finding if the force is sampled too seldom to show when a contact begins."""
-    step = np.diff(np.unique(wrench.stamp))
-    rate = 1.0 / (float(np.median(step)) * NANOSECOND) if len(step) else 0.0
+    usual = usual_interval(wrench.stamp)
+    rate = 1.0 / usual if usual else 0.0
     if rate >= LOWEST_RATE:
         return None
     sentence = (

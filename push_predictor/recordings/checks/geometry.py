@@ -141,7 +141,7 @@ def _findings_of_large_gap(
     """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
     far = FAR * rig.outline.reach
     explained = min(BETTER * fit.gap, far)
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < explained:
+    if _fits_swapped(recording, rig, motion, explained):
         return [_swapped(fit.gap)]
     mirrors = _mirror_gaps(contacts, rig)
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
@@ -191,13 +191,16 @@ def _fit_on_one_clock(recording: Recording, rig: Rig, contacts: Contacts) -> tup
     return (replace(again, lag=lag), better) if better.cost < fit.cost else (contacts, fit)
 
 
-def _gap(recording: Recording, rig: Rig) -> float:
-    """The gap (m) that the best plausible correction leaves, infinity without one."""
-    contacts = contacts_of(motion_of(recording, rig))
-    return np.inf if contacts is None else _gap_of(contacts, rig)
+def _fits_swapped(recording: Recording, rig: Rig, motion: Motion | None, most: float) -> bool:
+    """Whether the tip follows the slider, and the streams exchanged, corrected at best, leave less than `most` m."""
+    if not tip_follows(motion, recording, rig):
+        return False
+    contacts = contacts_of(motion_of(swapped(recording), rig))
+    return contacts is not None and _gap_of(contacts, rig) < most
 
 
 def _gap_of(contacts: Contacts, rig: Rig) -> float:
+    """The gap (m) that the best plausible correction leaves, infinity without one."""
     fit = fit_outline(contacts.drawn(FEW_SAMPLES), rig)
     return np.inf if _is_implausible(fit, rig) else fit.gap
 
@@ -259,7 +262,7 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
 
 
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
+    if _fits_swapped(recording, rig, motion, LARGE_GAP):
         return [_swapped(np.inf)]
     if motion is not None and (height := _pushing_height(recording, motion)) is not None:
         lowered = replace(recording.pusher, z=recording.pusher.z - height)

@@ -12,7 +12,7 @@ import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
 from push_predictor.recordings.checks.motion import noise_of
-from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.dropouts import usual_interval
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.cut import FIT_SAMPLES
@@ -202,7 +202,7 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
     if bursts := in_bursts(samples.stamp):
         samples = RegularStamps().take(samples, final=True)
     values, pose = samples.values, lengths(samples.values, column)
-    period = float(np.median(np.diff(samples.stamp))) * NANOSECOND
+    period = usual_interval(samples.stamp)
     samples = SmoothedPoses(column).take(held.take(samples, final=True), final=True)
     source_period = _source_period(pose, quantum, period, len(held.dropouts))
     measured = values[changes(pose)] if source_period > period else values

@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval, usual_interval
 from push_predictor.recordings.streams import taken
 from push_predictor.recordings.windows.resolution import changes, lengths
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
@@ -86,7 +86,7 @@ class HeldPoses(Portions):
                 usual = first[: run + len(self._before) + 2][-USUAL - 1 :]
                 interval = float(stamp[end] - stamp[begin]) * NANOSECOND
                 self.stale += len(rows)
-                slow = interval <= longest_interval(float(np.median(np.diff(usual))) * NANOSECOND)
+                slow = interval <= longest_interval(usual_interval(usual))
                 if slow:
                     share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
                     values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
