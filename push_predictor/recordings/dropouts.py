@@ -18,7 +18,8 @@ CLOCK_SET = 1_000_000_000  # ns by which stamps go back where a replay loops, or
 def usual_interval(stamp: IntArray) -> float:
     """The median interval (s) of stamps (n,) ns, of which repeated and earlier ones count none; 0 without any."""
     step = np.diff(stamp)
-    return float(np.median(step[step > 0])) * NANOSECOND if np.any(step > 0) else 0.0
+    step = step[step > 0]
+    return float(np.median(step)) * NANOSECOND if len(step) else 0.0
 
 
 def longest_interval(period: float) -> float:
