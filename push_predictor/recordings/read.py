@@ -54,7 +54,8 @@ def read_recording(path: str | os.PathLike[str], *, rig: Rig | None = None, topi
     decoder/rules.py are discarded; the notes count them. rig replaces the recorded one.
 
     Raises RecordingError for a file that is not a recording, and for a topic that is missing, empty or of a type that
-    does not fit, with the option, its value and what the bag contains; RigError for an invalid push_rig record.
+    does not fit, with the option, its value and what the bag contains; RigError for an invalid push_rig record;
+    RequestError if slider and pusher come from one place.
     """
     bag, chosen = open_bag(Path(path)), topics.over(load_topics(Path(path)))
     rig = rig if rig is not None else recorded_rig(bag)

@@ -24,6 +24,7 @@ BIASES = (FREE_MOTION, NO_BIAS)
 HEADER_STAMPS, LOG_STAMPS = "header", "log"
 STAMPS = (HEADER_STAMPS, LOG_STAMPS)
 UP = f"{', '.join(UP_AXES[:-1])} or {UP_AXES[-1]}, of some streams STREAM=AXIS,STREAM=AXIS"
+ANOTHER_BODY = "another than slider_topic (--slider-topic, --pusher-topic): slider and tip would have the same poses"
 _FIELDS = {  # of Topics, by their names in NAME.recording.yaml, as parameters and as options
     **{f"{name}_topic": name for name in STREAMS},
     "covariate_topics": "covariates",
@@ -46,7 +47,7 @@ class Topics:
     the axes of the wrench, `world`, `tip`, or a frame in tf. wrench_bias: `free_motion` to estimate and subtract it,
     `none` not to. stamp: `header`, or `log` for the time at which messages were recorded or received. up: the axis of
     the world that points up, as in `y`, or of single streams, as in `slider=y,wrench=y`. Raises RequestError for other
-    values.
+    values, and for slider and pusher from one place.
     """
 
     slider: str = ""
@@ -66,6 +67,9 @@ class Topics:
             raise RequestError("stamp", self.stamp, " or ".join(STAMPS))
         if self.up and not all(axis in UP_AXES and stream in ("", *STREAMS) for stream, axis in self._ups):
             raise RequestError("up", self.up, UP)
+        one, other = (given.replace(":/", ":").strip("/") for given in (self.slider, self.pusher))
+        if one and one == other:
+            raise RequestError("pusher_topic", self.pusher, ANOTHER_BODY)
 
     @property
     def wrench_axes(self) -> str:

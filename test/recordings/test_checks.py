@@ -152,6 +152,13 @@ def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
     assert f"{1e3 * abs(estimate.value):.0f} ms {'late' if lag > 0.0 else 'early'} (sd " in finding.sentence
 
 
+def test_a_wrong_outline_is_judged_with_corrected_stamps() -> None:
+    """Else the pushes of another moment are off it, as if its shape were wrong."""
+    findings = found(late(tracked(bag("hexagon_delrin"), 0.0, (0.004, -0.003)), -0.4), rig_of("hexagon_delrin"))
+    assert list(findings) == ["outline_shifted", "clocks_apart"]
+    assert findings["clocks_apart"].values["lag"].value == pytest.approx(-0.4, abs=0.005)
+
+
 def test_the_tilt_of_a_tracker_is_no_finding() -> None:
     recording = bag(SMALL)
     tracked_in_space = slider_stream(recording.slider.stamp, spatial_rows(recording.slider))
@@ -213,8 +220,10 @@ def test_a_shifted_world_frame_is_no_exchange_of_topics(name: str, shift: float)
     assert findings and {each.severity for each in findings.values()} == {"warning"}
 
 
-def test_a_wrench_in_the_sliders_frame_is_named() -> None:
-    assert list(found(force_in_slider_frame(bag("circle_pu")), rig_of("circle_pu"))) == ["wrench_frame"]
+@pytest.mark.parametrize("name", ["circle_pu", "hexagon_delrin"])  # the second hardly turns
+def test_a_wrench_in_the_sliders_frame_is_named(name: str) -> None:
+    findings = found(force_in_slider_frame(bag(name)), rig_of(name))
+    assert list(findings) == ["wrench_frame"] and "those of the slider" in findings["wrench_frame"].sentence
 
 
 @pytest.mark.parametrize("name", PUSHED)

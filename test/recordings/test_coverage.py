@@ -88,11 +88,11 @@ def sticking(share: float, slip: float) -> PushTable:
         (pushes(7), SQUARE, "few_pushes", "warning", "at least 23 more"),
         (pushes(8), SQUARE, "few_pushes", "note", "at least 22 more"),
         (pushes(29), SQUARE, "few_pushes", "note", "at least 1 more"),
-        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "sides 1 and 3 of 4, counter-clockwise"),
-        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "Push sides 2 and 4 too"),
-        (on_sides(pushes(), 0, 2), RECTANGLE, "few_sides", "warning", "sides 1 and 3"),  # the long sides alone
-        (on_sides(pushes(), 0, 1), RECTANGLE, "few_sides", "note", "sides 1 and 2"),
-        (on_sides(pushes(), 0, 1), shape_outline("ellip3"), "few_sides", "note", "quarters 1 and 2 of 4"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "sides 1, 3 of 4, counter-clockwise"),
+        (on_sides(pushes(), 0, 2), SQUARE, "few_sides", "note", "Push sides 2, 4 too"),
+        (on_sides(pushes(), 0, 2), RECTANGLE, "few_sides", "warning", "sides 1, 3"),  # the long sides alone
+        (on_sides(pushes(), 0, 1), RECTANGLE, "few_sides", "note", "sides 1, 2"),
+        (on_sides(pushes(), 0, 1), shape_outline("ellip3"), "few_sides", "note", "quarters 1, 2 of 4"),
         (with_inputs(pushes(), 0, 0.01, 0.02), SQUARE, "one_speed", "note", "mm/s"),
         (with_inputs(pushes(), 2, 0.2), SQUARE, "few_angles", "warning", "-60 to 60 degrees"),
         (with_inputs(pushes(), 2, 0.4), SQUARE, "few_angles", "note", "-60 to 60 degrees"),

@@ -138,8 +138,8 @@ def with_gaps(wrench: WrenchStream) -> WrenchStream:
 @pytest.mark.parametrize(
     ("name", "alter", "finding", "words", "values"),
     [
-        (NAME, lambda of: taken(of, slice(len(of) // 3)), "wrench_missing", "it ends after", {}),
-        (NAME, lambda of: taken(of, slice(len(of) // 2, None)), "wrench_missing", "it begins", {}),
+        (NAME, lambda of: taken(of, slice(len(of) // 3)), "wrench_missing", "ends after 9 s of 26 s", {}),
+        (NAME, lambda of: taken(of, slice(len(of) // 2, None)), "wrench_missing", "begins after 13 s", {}),
         (NAME, with_gaps, "wrench_missing", "NaN", {}),
         (NAME, stuck(0.0), "wrench_constant", "(1.5, -0.5) N", {"share": 1.0}),
         (NAME, stuck(0.6), "wrench_constant", "(1.5, -0.5) N", {"share": 0.4}),

@@ -22,6 +22,7 @@ from lab_bags import Lab, pose_rows, robot_in_tf, short_recording
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.bag.messages import Messages
+from push_predictor.recordings.checks.check import checked_data
 from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.fields.sources import POSE_TARGET, TF_TYPES, FieldReader, definitions_of
@@ -131,6 +132,21 @@ def test_poses_are_given_in_the_chosen_frame(tmp_path: Path) -> None:
 def test_an_unknown_frame_is_an_error_that_names_the_frames(tmp_path: Path, topics: Topics, message: str) -> None:
     with pytest.raises(RecordingError, match=message):
         read_recording(tf_lab().mcap(tmp_path / "lab"), topics=topics)
+
+
+@pytest.mark.parametrize(
+    ("slider", "pusher", "named"),
+    [
+        ("/tf:block", "/tf:block", "/tf:block"),
+        ("/tf:block", "tf:/block", "tf:/block"),
+        ("/pusher/pose", "", "pusher/pose"),
+    ],
+)
+def test_one_frame_or_topic_for_slider_and_tip_is_refused(tmp_path: Path, slider: str, pusher: str, named: str) -> None:
+    words = rf"pusher_topic: '{named}' .*give another than slider_topic \(--slider-topic, --pusher-topic\)"
+    with pytest.raises(RequestError, match=words):
+        checked_data(tf_lab().mcap(tmp_path / "lab", original().rig), topics=Topics(slider, pusher))
+    assert Topics("/tf:block", "/tf:tip").over(Topics("/tf:tip", "/tf:block")).pusher == "/tf:tip"
 
 
 def test_frames_that_are_not_connected_or_have_two_parents_are_an_error(tmp_path: Path) -> None:

@@ -30,10 +30,19 @@ from push_predictor.geometry.shapes import (
 )
 from push_predictor.recordings.checks.check import check_recording
 from push_predictor.recordings.checks.finding import Finding, Severity
-from push_predictor.recordings.checks.geometry import contacts_of, corrected_rig
+from push_predictor.recordings.checks.geometry import corrected_rig
 from push_predictor.recordings.checks.motion import motion_of
-from push_predictor.recordings.checks.outline_findings import half_size, outline_findings
-from push_predictor.recordings.checks.outline_fit import SIMILARITY, SIZE, SMALLEST, WEAK, Problem, fit_outline
+from push_predictor.recordings.checks.outline_findings import outline_findings
+from push_predictor.recordings.checks.outline_fit import (
+    SIMILARITY,
+    SIZE,
+    SMALLEST,
+    WEAK,
+    Problem,
+    contacts_of,
+    fit_outline,
+    half_size,
+)
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording

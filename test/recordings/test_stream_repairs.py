@@ -21,7 +21,7 @@ from push_predictor.recordings.windows.resolution import SPEED_ERROR, Resolution
 from push_predictor.recordings.windows.slow import SlowPoses
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, uninterrupted
 from push_predictor.recordings.windows.track import Track
-from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses, continued
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
 from push_predictor.types import Array, IntArray
 
 MS = 1_000_000
@@ -155,6 +155,15 @@ def on_a_line(x: Array, begin: int, count: int) -> Array:
     return x
 
 
+def continued(x: Array) -> list[int]:
+    """The samples that are left out."""
+    step, rows = ContinuedPoses(None), np.column_stack([x, np.zeros((len(x), 2)), Resolution(1).take(x[:, None])])
+    kept = step.take(uninterrupted(body(x).stamp, rows), final=True).stamp
+    lost = np.flatnonzero(~np.isin(body(x).stamp, kept)).tolist()
+    assert step.lost == len(lost)
+    return lost
+
+
 @pytest.mark.parametrize("portion", [1, 7])
 def test_continued_poses_are_left_out_portion_by_portion(portion: int) -> None:
     """From the first on, where a coincidence is excluded."""
@@ -166,9 +175,9 @@ def test_continued_poses_are_left_out_portion_by_portion(portion: int) -> None:
         found.append(step.take(uninterrupted(stream.stamp[now], rows[now])))
         assert step.waiting <= 31
     found.append(step.take(uninterrupted(stream.stamp[:0], rows[:0]), final=True))
-    wanted = ~continued(stream, angle=False)
-    assert np.array_equal(np.flatnonzero(~wanted), [*range(50, 56), *range(120, 150)]) and step.waiting == 0
-    assert np.array_equal(np.concatenate([each.stamp for each in found]), stream.stamp[wanted])
+    left_out = [*range(50, 56), *range(120, 150)]
+    assert continued(stream.x) == left_out and (step.lost, step.runs) == (36, 2) and step.waiting == 0
+    assert np.array_equal(np.concatenate([each.stamp for each in found]), np.delete(stream.stamp, left_out))
 
 
 def test_a_line_of_over_two_seconds_is_a_motion_and_is_not_waited_for() -> None:
@@ -177,22 +186,22 @@ def test_a_line_of_over_two_seconds_is_a_motion_and_is_not_waited_for() -> None:
     step = ContinuedPoses(None)
     given = [step.take(uninterrupted(stream.stamp[k : k + 1], rows[k : k + 1])) for k in range(300)]
     assert step.waiting <= 1 and sum(len(each.stamp) for each in given) >= 299
-    assert not continued(stream, angle=False).any()
+    assert not continued(stream.x)
 
 
 def test_repeated_and_rounded_poses_and_a_steady_motion_without_noise_are_not_continued() -> None:
-    assert not continued(body(steps((100, 0.0), (100, 0.5), (100, 0.0))), False).any()
+    assert not continued(steps((100, 0.0), (100, 0.5), (100, 0.0)))
     still = measured()
     still[50:70] = still[50]
-    assert not continued(body(still), False).any()
+    assert not continued(still)
     counts = [*np.random.default_rng(0).integers(0, 4, 80), *[1] * 12, 9, 0]
-    assert not continued(body(MM * np.cumsum(counts)), False).any()
+    assert not continued(MM * np.cumsum(counts))
 
 
 def test_poses_on_a_line_between_two_measured_ones_are_not_continued() -> None:
     x, inner, ends = measured(), np.arange(50, 58), [49, 58]
     x[inner] = np.interp(inner, ends, x[ends])
-    assert not continued(body(x), False).any()
+    assert not continued(x)
 
 
 # --- resolution -------------------------------------------------------------------------------------------------------

@@ -67,8 +67,7 @@ def loss_stage(evidence: Evidence) -> Evidence:
     losses = evidence.recording.losses
     if not losses:
         return evidence
-    further = f" There are {len(losses) - LISTED} further losses." if len(losses) > LISTED else ""
-    sentence = f"Data of the recording are missing: {'; '.join(losses[:LISTED])}.{further}"
+    sentence = f"Data of the recording are missing (losses: {len(losses)}): {'; '.join(losses[:LISTED])}."
     values = {"losses": Value(float(len(losses)), "1")}
     return evidence.found([Finding("data_lost", "warning", sentence, ADVICE, values)])
 

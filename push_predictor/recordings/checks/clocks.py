@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
-from push_predictor.recordings.checks.geometry import contacts_of
-from push_predictor.recordings.checks.motion import SPANS, in_time, motion_of, moving_slider, noise_of, values_at
-from push_predictor.recordings.checks.outline_findings import DOUBT, LAG_ALLOWANCE, clocks_apart, time_apart
-from push_predictor.recordings.checks.outline_fit import MEDIAN_SD, TIE, fit_outline
+from push_predictor.recordings.checks.motion import SPANS, in_time, motion_of, noise_of, slider_motion, values_at
+from push_predictor.recordings.checks.outline_findings import clocks_apart
+from push_predictor.recordings.checks.outline_fit import DOUBT, LAG_ALLOWANCE, MEDIAN_SD, TIE, contacts_of, fit_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.regular_stamps import SD
@@ -159,7 +158,7 @@ def _findings(course: Course) -> list[Finding]:
 
 def _steps(steps: tuple[Step, ...]) -> Finding:
     stated = ", and ".join(
-        f"{_clock(step)} by {time_apart(step.size)} (sd {1e3 * step.sd:.2g} ms), {step.time:.1f} s after the start"
+        f"{_clock(step)} by {1e3 * abs(step.size):.0f} ms (sd {1e3 * step.sd:.2g}), {step.time:.1f} s after the start"
         for step in steps
     )
     sentence = f"A clock was set during the recording: {stated}."
@@ -268,7 +267,7 @@ def push_lags(recording: Recording, rig: Rig) -> PushLags | None:
     origin = int(slider.stamp[0])
     time, pose = in_time(slider.stamp, origin, slider.x, slider.y, np.unwrap(slider.heading))
     tip_time, tip = in_time(pusher.stamp, origin, pusher.x, pusher.y)
-    rows = _rows(time, moving_slider(time, pose, rig))
+    rows = _rows(time, slider_motion(time, pose, rig)[0])
     if not len(rows):
         return None
     at = time[rows]

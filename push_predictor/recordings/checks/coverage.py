@@ -27,7 +27,6 @@ LARGEST_SLIP = 1.5  # of the tip's path: rows with more are not consecutive
 FEWEST_STEPS = 20  # from one window of a push to the next
 MOST_SIDES = 12  # an outline with more vertices is divided into quarters
 MIDDLE = (5.0, 95.0)  # percentiles
-NAMED = 4  # sides
 OFF = 0.001  # m from the outline
 MEANING = "The results are valid only for the part of the domain that was pushed."
 
@@ -151,12 +150,7 @@ def _missing_sides(coverage: Coverage) -> Finding | None:
 
 
 def _listed(side: str, numbers: IntArray) -> str:
-    shown = [str(number) for number in numbers.tolist()]
-    if len(shown) == 1:
-        return f"{side} {shown[0]}"
-    if len(shown) > NAMED:
-        return f"{len(shown)} {side}s"
-    return f"{side}s {', '.join(shown[:-1])} and {shown[-1]}"
+    return f"{side}{'' if len(numbers) == 1 else 's'} {', '.join(map(str, numbers))}"
 
 
 def _speeds(coverage: Coverage) -> Finding | None:

@@ -14,7 +14,7 @@ from push_predictor.recordings.checks.finding import Evidence, Finding, Value
 from push_predictor.recordings.checks.force_direction import FEWEST_PUSHES, TOPIC, direction_findings
 from push_predictor.recordings.checks.geometry import MIRRORS
 from push_predictor.recordings.checks.motion import Motion, motion_of
-from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.dropouts import NANOSECOND, usual_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording, WrenchStream, taken
 from push_predictor.recordings.windows.contact import SLOWEST
@@ -209,14 +209,11 @@ def _missing(motion: Motion) -> Finding | None:
     share = 1.0 - float(np.mean(known[motion.contact]))
     if share <= MISSING:
         return None
-    where, whole = "it has gaps or NaN", motion.time[-1]
-    if known.any():
-        begin, end = motion.time[known][[0, -1]]
-        if begin > MISSING * whole:
-            where = f"it begins {begin:.0f} s after the slider's poses"
-        elif end < (1.0 - MISSING) * whole:
-            where = f"it ends after {end:.0f} s of {whole:.0f} s"
-    sentence = f"The force is missing in {100.0 * share:.0f} % of the contacts: {where}."
+    begin, end = motion.time[known][[0, -1]] if known.any() else (0.0, 0.0)
+    sentence = (
+        f"The force is missing in {100.0 * share:.0f} % of the contacts: it begins after {begin:.0f} s, ends after "
+        f"{end:.0f} s of {motion.time[-1]:.0f} s, or has gaps or NaN."
+    )
     return Finding("wrench_missing", "warning", sentence, f"{DRIVER} {BY_GEOMETRY}", {"share": Value(share, "1")})
 
 
@@ -290,8 +287,8 @@ def unseen_finding(delays: list[float]) -> Finding | None:
 
 def rate_finding(wrench: WrenchStream) -> Finding | None:
     """A finding if the force is sampled too seldom to show when a contact begins."""
-    step = np.diff(np.unique(wrench.stamp))
-    rate = 1.0 / (float(np.median(step)) * NANOSECOND) if len(step) else 0.0
+    usual = usual_interval(wrench.stamp)
+    rate = 1.0 / usual if usual else 0.0
     if rate >= LOWEST_RATE:
         return None
     sentence = (

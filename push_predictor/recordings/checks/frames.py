@@ -138,17 +138,12 @@ def up_findings(recording: Recording, rig: Rig) -> list[Finding]:
     advice = f"Turn the poses until z points up: `--up={option}`."
     if both and recording.wrench is not None:
         advice += f" If the force is along the axes of that world, too: `--up={option},wrench={option}`."
-    return [Finding("world_up", "refused", _raised(wrong), advice, values)]
-
-
-def _raised(wrong: dict[str, Up]) -> str:
-    """What shows that another axis is up."""
-    named = [f"in the {name}'s frame {up.axis}" for name, up in wrong.items()]
-    if all(up.axis == "-z" for up in wrong.values()):
-        frames = " and ".join(f"the {name}'s frame" for name in wrong)
-        shown = "the tip is lifted towards negative z" if "pusher" in wrong else "the slider moves as seen from below"
-        return f"z points down in {frames}: {shown}. Contacts would be mirrored."
-    return f"The axis that points up is {' and '.join(named)}, not z: it is normal to the plane of the pushes."
+    named = " and ".join(f"in the {name}'s frame {up.axis}" for name, up in wrong.items())
+    sentence = (
+        f"The axis that points up is {named}, not z: the pushes are in the plane normal to it, and the tip is lifted "
+        "along it. Contacts would be mirrored, or none."
+    )
+    return [Finding("world_up", "refused", sentence, advice, values)]
 
 
 def _tilted(wrong: dict[str, Up], values: dict[str, Value]) -> Finding:

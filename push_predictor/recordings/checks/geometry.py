@@ -19,26 +19,35 @@ from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import has_mirror_symmetry, mirror_image, transformed, transformed_points
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
-from push_predictor.recordings.checks.motion import Motion, body_velocity, motion_of
+from push_predictor.recordings.checks.motion import Motion, motion_of
 from push_predictor.recordings.checks.outline_findings import (
     FEWEST_PUSHES,
-    LAG_ALLOWANCE,
     LARGEST_SIZE_CHANGE,
     LARGEST_TIP_CHANGE,
-    LENGTH_ALLOWANCE,
     TIP_POSE,
-    frames_apart,
+    further_cause,
     outline_findings,
-    tip_offset,
     unchecked,
 )
-from push_predictor.recordings.checks.outline_fit import LAG, SIZE, TIE, Contacts, OutlineFit, X, Y, fit_outline
+from push_predictor.recordings.checks.outline_fit import (
+    FEWEST_CONTACTS,
+    LAG,
+    LAG_ALLOWANCE,
+    LENGTH_ALLOWANCE,
+    SIZE,
+    TIE,
+    Contacts,
+    OutlineFit,
+    X,
+    Y,
+    contacts_of,
+    fit_outline,
+)
 from push_predictor.recordings.checks.units import orientation_finding
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
-FEWEST_CONTACTS = 20  # samples
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
 BETTER = 0.4  # a hypothesis is named if it leaves less than this share of the gap
 LARGEST_GROWTH = 0.5  # relative: a larger correction of the size means another slider
@@ -132,7 +141,7 @@ def _findings_of_large_gap(
     """The first hypothesis that leaves a clearly smaller gap than the corrected outline; else what that shows."""
     far = FAR * rig.outline.reach
     explained = min(BETTER * fit.gap, far)
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < explained:
+    if _fits_swapped(recording, rig, motion, explained):
         return [_swapped(fit.gap)]
     mirrors = _mirror_gaps(contacts, rig)
     best = next(name for name, gap in mirrors.items() if gap <= TIE * min(mirrors.values()))
@@ -142,7 +151,7 @@ def _findings_of_large_gap(
         mirror = MIRRORS[best]
         return [_falling(best, f"{mirror.mistake} With it corrected", mirror.advice, fit.gap, mirrors[best])]
     another = fit.gap > far or _is_implausible(fit, rig)
-    if another and frames_apart(contacts, rig, fit) is None and tip_offset(contacts, rig, fit) is None:
+    if another and all(further_cause(each, contacts, rig, fit) is None for each in ("frames_apart", "tip_offset")):
         recorded = _gap_as_recorded(contacts, rig)
         return [_another_body(recorded) if recorded > far else _unexplained(recorded)]
     found = outline_findings(contacts, rig, fit)
@@ -153,17 +162,6 @@ def _findings_of_large_gap(
 def swapped(recording: Recording) -> Recording:
     """The recording with slider and pusher exchanged."""
     return replace(recording, slider=recording.pusher, pusher=recording.slider)
-
-
-def contacts_of(motion: Motion | None) -> Contacts | None:
-    """The samples in contact, None if there are too few."""
-    if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
-        return None
-    touch = motion.touching
-    tips = to_body(motion.tip, motion.slider)[touch]
-    tool = None if motion.tool is None else motion.tool[touch]
-    velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]
-    return Contacts(tips, velocities, push, poses, motion.noise, tool=tool)
 
 
 def _too_brief(motion: Motion, rig: Rig) -> int | None:
@@ -193,13 +191,16 @@ def _fit_on_one_clock(recording: Recording, rig: Rig, contacts: Contacts) -> tup
     return (replace(again, lag=lag), better) if better.cost < fit.cost else (contacts, fit)
 
 
-def _gap(recording: Recording, rig: Rig) -> float:
-    """The gap (m) that the best plausible correction leaves, infinity without one."""
-    contacts = contacts_of(motion_of(recording, rig))
-    return np.inf if contacts is None else _gap_of(contacts, rig)
+def _fits_swapped(recording: Recording, rig: Rig, motion: Motion | None, most: float) -> bool:
+    """Whether the tip follows the slider, and the streams exchanged, corrected at best, leave less than `most` m."""
+    if not tip_follows(motion, recording, rig):
+        return False
+    contacts = contacts_of(motion_of(swapped(recording), rig))
+    return contacts is not None and _gap_of(contacts, rig) < most
 
 
 def _gap_of(contacts: Contacts, rig: Rig) -> float:
+    """The gap (m) that the best plausible correction leaves, infinity without one."""
     fit = fit_outline(contacts.drawn(FEW_SAMPLES), rig)
     return np.inf if _is_implausible(fit, rig) else fit.gap
 
@@ -261,7 +262,7 @@ def _mirror_image_findings(contacts: Contacts, rig: Rig, gap: float, most: float
 
 
 def _without_contact(recording: Recording, rig: Rig, motion: Motion | None) -> list[Finding]:
-    if tip_follows(motion, recording, rig) and _gap(swapped(recording), rig) < LARGE_GAP:
+    if _fits_swapped(recording, rig, motion, LARGE_GAP):
         return [_swapped(np.inf)]
     if motion is not None and (height := _pushing_height(recording, motion)) is not None:
         lowered = replace(recording.pusher, z=recording.pusher.z - height)

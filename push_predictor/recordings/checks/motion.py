@@ -81,15 +81,15 @@ def motion_of(recording: Recording, rig: Rig) -> Motion | None:
     tip_speed = np.hypot(*tip_velocity.T)
     lowered = tip[:, 2] - height < options.lift
     pushing = tip_speed[lowered & (tip_speed > options.least_speed)]
-    slider_speed = _SliderSpeed(time, pose, rig, MOVING_SHARE * float(np.median(pushing)) if len(pushing) else MOVING)
-    moving = slider_speed.moving
+    slowest = MOVING_SHARE * float(np.median(pushing)) if len(pushing) else MOVING
+    moving, steady, span = slider_motion(time, pose, rig, slowest)
     contact = moving & lowered & (tip_speed > options.least_speed)
-    steady = contact & slider_speed.steady & _is_steady(*_halves(time, tip[:, :2], SPANS[0]), STEADY_TIP)
+    steady = contact & steady & _is_steady(*_halves(time, tip[:, :2], SPANS[0]), STEADY_TIP)
     force = _force(recording, origin, time)
     noise = float(np.hypot(np.max(noise_of(pose[:, :2])), np.sqrt(rig.outline.polar_moment) * noise_of(pose)[2]))
     raised, number = tip[:, 2] - np.nanmin(tip[:, 2]), _number(time, contact)
     measured = (time, pose, tip[:, :2], raised, tip_velocity, tip_speed, force)
-    return Motion(*measured, moving, contact, steady, number, noise, slider_speed.span, tool)
+    return Motion(*measured, moving, contact, steady, number, noise, span, tool)
 
 
 def body_velocity(motion: Motion) -> Array:
@@ -140,27 +140,21 @@ def _is_steady(before: Array, after: Array, share: float, noise: float = 0.0) ->
     return np.asarray(np.linalg.norm(after - before, axis=1) < share * largest + noise)
 
 
-class _SliderSpeed:
-    """Which samples (n,) of a slider's poses (n, 3) move, and which move steadily; turns count at the outline.
+def slider_motion(time: Array, pose: Array, rig: Rig, wanted: float = MOVING) -> tuple[BoolArray, BoolArray, float]:
+    """Which samples (n,) of a slider move, which move steadily, and the span (s) on both sides that shows it.
 
-    span: s before and after a sample that determine its speed.
+    time (n,) s, pose (n, 3): x, y m, heading rad, unwrapped: turns count at the outline. wanted: speed (m/s) that noise
+    is not to hide.
     """
-
-    def __init__(self, time: Array, pose: Array, rig: Rig, wanted: float = MOVING) -> None:
-        place = pose * [1.0, 1.0, np.sqrt(rig.outline.polar_moment)]
-        wanted = min(wanted, MOVING)
-        self.span = next((span for span in SPANS if NOISE * _speed_noise(place, span) < wanted), SPANS[-1])
-        noise = _speed_noise(place, self.span)
-        least = max(NOISE * noise, WindowOptions().least_speed)
-        self.moving = np.linalg.norm(mean_velocity(time, place, self.span), axis=1) > least
-        before, after = _halves(time, place, self.span)
-        both = np.minimum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)) > least
-        self.steady = self.moving & both & _is_steady(before, after, STEADY, NOISE * noise)
-
-
-def moving_slider(time: Array, pose: Array, rig: Rig) -> BoolArray:
-    """Which samples (n,) of a slider move; time (n,) s, pose (n, 3): x, y m, heading rad, unwrapped."""
-    return np.asarray(_SliderSpeed(time, pose, rig).moving)
+    place = pose * [1.0, 1.0, np.sqrt(rig.outline.polar_moment)]
+    wanted = min(wanted, MOVING)
+    span = next((span for span in SPANS if NOISE * _speed_noise(place, span) < wanted), SPANS[-1])
+    noise = _speed_noise(place, span)
+    least = max(NOISE * noise, WindowOptions().least_speed)
+    moving = np.linalg.norm(mean_velocity(time, place, span), axis=1) > least
+    before, after = _halves(time, place, span)
+    both = np.minimum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)) > least
+    return moving, moving & both & _is_steady(before, after, STEADY, NOISE * noise), span
 
 
 def noise_of(values: Array, order: int = 2) -> Array:

@@ -17,10 +17,14 @@ import numpy as np
 from push_predictor.geometry.frames import rotate
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.checks.outline_fit import (
+    DOUBT,
     FRAME_X,
     FRAME_Y,
     FRAME_YAW,
+    FRAMES,
     LAG,
+    LAG_ALLOWANCE,
+    LENGTH_ALLOWANCE,
     SCALE,
     SIZE,
     STRETCH,
@@ -32,17 +36,15 @@ from push_predictor.recordings.checks.outline_fit import (
     OutlineFit,
     X,
     Y,
-    fit_frames,
-    fit_tool,
+    half_size,
     refit,
 )
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array
 
 Name: TypeAlias = Literal["outline", "tip_radius", "frames_apart", "tip_offset", "proportions"]
-DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
-LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
-SLOWEST_FILTER = 0.2  # s of delay
+# What may be wrong besides the outline's pose and size, by the parameters that it adds; the first of equally good ones.
+FURTHER: dict[Name, tuple[int, ...]] = {"frames_apart": FRAMES, "tip_offset": TOOL, "proportions": (STRETCH,)}
 SEPARATE = 0.0002  # m; sd of size and tip radius, fitted together, above which the contacts do not separate them
 FINE = 0.0001  # m; a spread of the pushes below it leaves nothing to explain
 LARGEST_TIP_CHANGE = 0.55  # relative; a diameter given as the radius is a change of 0.5
@@ -65,25 +67,20 @@ def outline_findings(contacts: Contacts, rig: Rig, fit: OutlineFit) -> list[Find
     found = [_frames_apart(cause.fit)] if cause.name == "frames_apart" else []
     if cause.name == "tip_offset":
         found.append(_tip_offset(cause.fit))
-    if _is_turned(cause.fit):
-        found.append(_turned(value_of(cause.fit, YAW, "rad")))
-    if _is_shifted(cause.fit) and _shift_explains(contacts, rig, cause):
+    if cause.fit.shows(YAW):
+        found.append(_turned(cause.fit.value(YAW, "rad")))
+    if cause.fit.shows(X, Y) and _shift_explains(contacts, rig, cause):
         found.append(_shifted(cause.fit, rig))
     if cause.name == "proportions":
         found.append(_proportions(cause.fit, rig))
-    elif _is_resized(cause.fit, rig):
+    elif cause.fit.shows(SIZE):
         found.append(_size(contacts, rig, cause))
     if cause.name == "tip_radius":
         found.append(_tip(cause, rig))
-    lag = value_of(cause.fit, LAG, "s", contacts.lag)
+    lag = cause.fit.value(LAG, "s", contacts.lag)
     if abs(lag.value) > DOUBT * (lag.sd or 0.0) + LAG_ALLOWANCE:
         found.append(clocks_apart(lag))
     return [*found, *_shape_findings(cause.fit, rig)]
-
-
-def value_of(fit: OutlineFit, parameter: int, unit: str, offset: float = 0.0) -> Value:
-    """A fitted parameter, plus an offset, with its standard deviation."""
-    return Value(float(fit.estimate[parameter]) + offset, unit, float(fit.sd[parameter]))
 
 
 def unchecked(pushes: int) -> Finding:
@@ -102,12 +99,11 @@ def _turned(yaw: Value) -> Finding:
 
 
 def _shifted(fit: OutlineFit, rig: Rig) -> Finding:
-    x, y, given = value_of(fit, X, "m"), value_of(fit, Y, "m"), 1e3 * rig.outline.centroid
+    x, y, given = fit.value(X, "m"), fit.value(Y, "m"), 1e3 * rig.outline.centroid
     centre = np.round(given + 1e3 * np.array([x.value, y.value]), 1) + 0.0  # without a negative zero
-    origin = f"({given[0]:.1f}, {given[1]:.1f}) mm" if np.any(np.abs(given) > 0.05) else "its origin"
     sentence = (
         f"The slider's centre is at ({centre[0]:.1f}, {centre[1]:.1f}) mm in the tracked frame "
-        f"(sd {1e3 * (x.sd or 0.0):.1g}, {1e3 * (y.sd or 0.0):.1g}), not at {origin}."
+        f"(sd {1e3 * (x.sd or 0.0):.1g}, {1e3 * (y.sd or 0.0):.1g}), not at ({given[0]:.1f}, {given[1]:.1f})."
     )
     advice = "Move the tracked frame's origin there, or the outline in the rig (`rig --from` writes that rig)."
     if fit.sd[SIZE] == 0.0:  # the contacts are on one side
@@ -117,7 +113,7 @@ def _shifted(fit: OutlineFit, rig: Rig) -> Finding:
 
 def _size(contacts: Contacts, rig: Rig, cause: Cause) -> Finding:
     """The size if the tip's radius is right, and the radius if the size is right where the contacts fit both."""
-    scale = value_of(cause.fit, SIZE, "1", 1.0)
+    scale = cause.fit.value(SIZE, "1", 1.0)
     sentence = (
         f"The slider is {scale.value:.3f} times as large as its outline (sd {scale.sd or 0.0:.1g}), "
         f"{1e3 * (scale.value - 1.0) * half_size(rig):.1f} mm a side"
@@ -125,9 +121,9 @@ def _size(contacts: Contacts, rig: Rig, cause: Cause) -> Finding:
     advice = f"Multiply the outline by {scale.value:.3f}"
     values = {"scale": scale}
     if cause.name != "tip_radius":
-        tip = refit(cause.fit, contacts, rig, TIP, without=SIZE)
+        tip = refit(cause.fit, contacts, rig, (TIP,), without=SIZE)
         if tip.cost <= TIE * cause.fit.cost:
-            radius = value_of(tip, TIP, "m", rig.pusher_radius)
+            radius = tip.value(TIP, "m", rig.pusher_radius)
             values["radius_if_size_is_right"] = radius
             sentence += f", if the tip's radius is right. If the sizes are right, {_radius(radius, rig)}"
             more = 1e3 * float(tip.estimate[TIP])
@@ -136,7 +132,7 @@ def _size(contacts: Contacts, rig: Rig, cause: Cause) -> Finding:
 
 
 def _tip(cause: Cause, rig: Rig) -> Finding:
-    radius = value_of(cause.fit, TIP, "m", rig.pusher_radius)
+    radius = cause.fit.value(TIP, "m", rig.pusher_radius)
     sentence, advice = _radius(radius, rig), "Correct pusher_radius in the rig"
     if cause.rival is not None:
         advice += f", or, if it is right, the sizes: {_sizes(cause.rival, rig)[0]}. {UNSEPARATED.capitalize()}"
@@ -196,14 +192,14 @@ def _shape_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
 
 def _frames_apart(fit: OutlineFit) -> Finding:
     """The pose of the pusher's world frame in the slider's: p' = turn(p) + shift, and the ratio of their lengths."""
-    yaw = value_of(fit, FRAME_YAW, "rad")
+    yaw = fit.value(FRAME_YAW, "rad")
     shift = fit.centre + fit.estimate[[FRAME_X, FRAME_Y]] - rotate(fit.centre, np.array(yaw.value))
     sd = np.hypot(fit.sd[[FRAME_X, FRAME_Y]], np.abs(fit.centre[::-1]) * fit.sd[FRAME_YAW])
     degrees, (x, y) = np.degrees(yaw.value), np.round(1e3 * shift, 1) + 0.0
     frame = {f"frame_{name}": Value(float(s), "m", float(d)) for name, s, d in zip("xy", shift, sd, strict=True)}
     values = {"frame_yaw": yaw, **frame}
-    if _is_scaled(fit):
-        share = value_of(fit, SCALE, "1")
+    if fit.shows(SCALE):
+        share = fit.value(SCALE, "1")
         scale = Value(1.0 / (1.0 - share.value), "1", share.sd)
         sentence = (
             f"The slider's world is {scale.value:.4f} times (sd {scale.sd or 0.0:.1g}) as large as the pusher's: "
@@ -220,13 +216,13 @@ def _frames_apart(fit: OutlineFit) -> Finding:
         f"Calibrate tracker and robot again, or turn the pusher's positions by {degrees:.1f} degrees about the world "
         f"origin and add ({x:.1f}, {y:.1f}) mm."
     )
-    if not _exceeds(fit, FRAME_YAW, ANGLE_ALLOWANCE):
+    if not fit.shows(FRAME_YAW):
         advice += f" Or the tracked point of the pusher is so far from its tip: {TIP_POSE}"
     return Finding("frames_apart", "warning", sentence, advice, values)
 
 
 def _tip_offset(fit: OutlineFit) -> Finding:
-    x, y = (value_of(fit, each, "m") for each in TOOL)
+    x, y = (fit.value(each, "m") for each in TOOL)
     sentence = (
         f"The tip is at ({1e3 * x.value:.1f}, {1e3 * y.value:.1f}) mm (sd {1e3 * (x.sd or 0.0):.1g}, "
         f"{1e3 * (y.sd or 0.0):.1g}) from the tracked point of the pusher, along its own axes, and turns with them."
@@ -237,18 +233,15 @@ def _tip_offset(fit: OutlineFit) -> Finding:
 def clocks_apart(lag: Value, the: str = "The") -> Finding:
     """The finding that the slider's stamps are late (s), or early."""
     side, sd = "late" if lag.value > 0.0 else "early", 1e3 * (lag.sd or 0.0)
-    sentence = f"{the} slider's stamps are {time_apart(lag.value)} {side} (sd {sd:.2g} ms) against the pusher's."
-    advice = "Synchronise the clocks (chrony, PTP), or correct the stamps."
-    if 0.0 < lag.value < SLOWEST_FILTER:
-        advice += (
-            " A filter of the tracker has the same effect, and so has a commanded pose of the tip: record neither."
-        )
+    sentence = f"{the} slider's stamps are {1e3 * abs(lag.value):.0f} ms {side} (sd {sd:.2g} ms) against the pusher's."
+    advice = (
+        "Synchronise the clocks (chrony, PTP), or correct the stamps. A filter of the tracker has the effect of late "
+        "ones, and so has a commanded pose of the tip: record neither."
+    )
     return Finding("clocks_apart", "warning", sentence, advice, {"lag": lag})
 
 
-def time_apart(seconds: float) -> str:
-    """By how much clocks differ, in words, without the sign."""
-    return f"{1e3 * abs(seconds):.0f} ms" if abs(seconds) < 10.0 else f"{abs(seconds):.1f} s"
+# --- the cause --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,57 +255,50 @@ class Cause:
 
 def cause_of(contacts: Contacts, rig: Rig, fit: OutlineFit) -> Cause:
     """The cause of the gaps between contacts and outline, from the fit of yaw, shift, size and clock lag alone."""
-    if fit.spread < FINE and not (_is_resized(fit, rig) or _is_turned(fit) or _is_shifted(fit)):
+    if fit.spread < FINE and not fit.shows(SIZE, YAW, X, Y):
         return Cause("outline", fit)
-    axes = refit(fit, contacts, rig, STRETCH) if _has_two_sizes(rig) and fit.sd[SIZE] > 0.0 else None
-    known: dict[Name, OutlineFit | None] = {
-        "tip_radius": _with_tip(contacts, rig, fit),
-        "frames_apart": frames_apart(contacts, rig, fit),
-        "tip_offset": tip_offset(contacts, rig, fit),
-        "proportions": axes if axes is not None and _has_other_proportions(axes, rig) else None,
-    }
-    tried = {name: each for name, each in known.items() if each is not None}
-    least = min([_penalised(fit), *map(_penalised, tried.values())])
-    name = next((name for name, each in tried.items() if _penalised(each) <= TIE * least), None)
-    if name is None or (name != "tip_radius" and _penalised(fit) <= TIE * _penalised(tried[name])):
-        return Cause("outline", fit)
-    rival = axes if name == "tip_radius" and axes is not None and axes.cost <= TIE * tried[name].cost else None
-    return Cause(name, tried[name], rival)
+    tried = {name: each for name in FURTHER if (each := further_cause(name, contacts, rig, fit)) is not None}
+    tip = _with_tip(contacts, rig, fit)
+    least = min([fit.penalised, *(each.penalised for each in tried.values())])
+    if tip is not None and tip.penalised <= TIE * min(least, tip.penalised):
+        axes = _refitted("proportions", contacts, rig, fit)
+        return Cause("tip_radius", tip, axes if axes is not None and axes.cost <= TIE * tip.cost else None)
+    name = next((name for name, each in tried.items() if each.penalised <= TIE * least), None)
+    return Cause("outline", fit) if name is None else Cause(name, tried[name])
 
 
-def frames_apart(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
-    """The fit with the world frames of slider and pusher apart, None unless they are and it explains the contacts."""
-    apart = fit_frames(fit, contacts, rig)
-    scaled = refit(apart, contacts, rig, SCALE)
-    if _is_scaled(scaled) and TIE * _penalised(scaled) < _penalised(apart):
-        apart = scaled
-    explained = apart.spread < LENGTH_ALLOWANCE + contacts.noise and TIE * _penalised(apart) < _penalised(fit)
-    return apart if explained and (_is_moved(apart) or _is_scaled(apart)) else None
+def further_cause(name: Name, contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
+    """The fit with a cause of FURTHER, None unless it is shown and leaves clearly less."""
+    found = _refitted(name, contacts, rig, fit)
+    if found is None:
+        return None
+    shown = FURTHER[name]
+    if name == "frames_apart":
+        shown, scaled = (*shown, SCALE), refit(found, contacts, rig, (SCALE,))
+        if scaled.shows(SCALE) and TIE * scaled.penalised < found.penalised:
+            found = scaled
+    explained = found.spread < LENGTH_ALLOWANCE + contacts.noise and TIE * found.penalised < fit.penalised
+    return found if explained and found.shows(*shown) else None
 
 
-def tip_offset(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
-    """The fit with the tip away from the tracked point of the tool, None unless that explains the contacts."""
-    if contacts.tool is None or np.ptp(contacts.tool) < LEAST_TURN:
+def _refitted(name: Name, contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
+    """The fit with a cause of FURTHER, None where it cannot be."""
+    if name == "tip_offset" and (contacts.tool is None or np.ptp(contacts.tool) < LEAST_TURN):
         return None  # along the axes of a tool that does not turn, it is a shift of the world frame
-    away = fit_tool(fit, contacts, rig)
-    explained = away.spread < LENGTH_ALLOWANCE + contacts.noise and TIE * _penalised(away) < _penalised(fit)
-    return away if explained and any(_exceeds(away, each, LENGTH_ALLOWANCE) for each in TOOL) else None
-
-
-def half_size(rig: Rig) -> float:
-    """Distance from the centre to a side, m, of a regular outline with this area and perimeter."""
-    return 2.0 * rig.outline.area / rig.outline.perimeter
+    if name == "proportions" and not (_has_two_sizes(rig) and fit.sd[SIZE] > 0.0):
+        return None
+    return refit(fit, contacts, rig, FURTHER[name])
 
 
 def _with_tip(contacts: Contacts, rig: Rig, fit: OutlineFit) -> OutlineFit | None:
     """With the tip's radius too, if the size is wrong, and the contacts show both, by a plausible amount."""
-    if not _is_resized(fit, rig):
+    if not fit.shows(SIZE):
         return None
-    both = refit(fit, contacts, rig, TIP)
+    both = refit(fit, contacts, rig, (TIP,))
     separate = both.sd[SIZE] > 0.0 and max(float(both.sd[SIZE]) * half_size(rig), float(both.sd[TIP])) < SEPARATE
     thicker, growth = abs(both.estimate[TIP]), abs(both.estimate[SIZE])
     plausible = thicker <= LARGEST_TIP_CHANGE * rig.pusher_radius and growth <= LARGEST_SIZE_CHANGE
-    return both if separate and plausible and _exceeds(both, TIP, LENGTH_ALLOWANCE) else None
+    return both if separate and plausible and both.shows(TIP) else None
 
 
 def _has_two_sizes(rig: Rig) -> bool:
@@ -325,50 +311,11 @@ def _has_two_sizes(rig: Rig) -> bool:
     return len(sides) == 4 and bool(np.all(along > 1.0 - RIGHT_ANGLE))
 
 
-def _has_other_proportions(axes: OutlineFit, rig: Rig) -> bool:
-    return axes.spread < LENGTH_ALLOWANCE and _exceeds(axes, STRETCH, LENGTH_ALLOWANCE / half_size(rig))
-
-
-def _is_resized(fit: OutlineFit, rig: Rig) -> bool:
-    return _exceeds(fit, SIZE, LENGTH_ALLOWANCE / half_size(rig))
-
-
-def _is_shifted(fit: OutlineFit) -> bool:
-    return _exceeds(fit, X, LENGTH_ALLOWANCE) or _exceeds(fit, Y, LENGTH_ALLOWANCE)
-
-
 def _shift_explains(contacts: Contacts, rig: Rig, cause: Cause) -> bool:
     """Whether the contacts lie farther off without a component of the shift.
 
     Along a single side they do not, up to its corner: a fit that ends there has a small standard deviation.
     """
-    shifts = [each for each in (X, Y) if _exceeds(cause.fit, each, LENGTH_ALLOWANCE)]
-    same = TIP if cause.name == "tip_radius" else LAG
-    without = [refit(cause.fit, contacts, rig, same, without=each) for each in shifts]
-    return any(_penalised(cause.fit) < _penalised(each) for each in without)
-
-
-def _is_turned(fit: OutlineFit) -> bool:
-    return _exceeds(fit, YAW, ANGLE_ALLOWANCE)
-
-
-def _is_moved(apart: OutlineFit) -> bool:
-    """Whether the world frames are turned or shifted against each other."""
-    shifted = any(_exceeds(apart, each, LENGTH_ALLOWANCE) for each in (FRAME_X, FRAME_Y))
-    return shifted or _exceeds(apart, FRAME_YAW, ANGLE_ALLOWANCE)
-
-
-def _is_scaled(apart: OutlineFit) -> bool:
-    """Whether the lengths in one world frame differ from those in the other, as far as the slider was pushed."""
-    return _exceeds(apart, SCALE, LENGTH_ALLOWANCE / max(apart.extent, LENGTH_ALLOWANCE))
-
-
-def _penalised(fit: OutlineFit) -> float:
-    """The mean gap that other pushes would have, by generalised cross-validation with pushes as observations."""
-    spare = fit.pushes - np.count_nonzero(fit.sd)
-    return fit.cost * fit.pushes / spare if spare > 0 else np.inf
-
-
-def _exceeds(fit: OutlineFit, parameter: int, allowance: float) -> bool:
-    """Whether a parameter differs from 0 beyond doubt."""
-    return bool(abs(fit.estimate[parameter]) > DOUBT * fit.sd[parameter] + allowance)
+    same = (TIP,) if cause.name == "tip_radius" else ()
+    without = [refit(cause.fit, contacts, rig, same, without=each) for each in (X, Y) if cause.fit.shows(each)]
+    return any(cause.fit.penalised < each.penalised for each in without)

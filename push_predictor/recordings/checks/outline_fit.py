@@ -21,7 +21,8 @@ from scipy.optimize import least_squares
 from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.geometry.shapes import near_symmetry, stretched, transformed
-from push_predictor.recordings.checks.motion import sums_by_push
+from push_predictor.recordings.checks.finding import Value
+from push_predictor.recordings.checks.motion import Motion, body_velocity, sums_by_push
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -29,6 +30,9 @@ YAW, X, Y, SIZE, LAG, TIP, FRAME_YAW, FRAME_X, FRAME_Y, STRETCH, SCALE, TOOL_X, 
 SIMILARITY = (YAW, X, Y, SIZE, LAG)
 FRAMES = (FRAME_YAW, FRAME_X, FRAME_Y)
 TOOL = (TOOL_X, TOOL_Y)
+DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
+LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
+FEWEST_CONTACTS = 20  # samples
 # Prior sd of what the contacts do not determine, in the units of OutlineFit.
 WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02, 1.0, 0.05, 0.05, 0.3, 0.1, 0.1, 0.1])
 SMALLEST = -0.9  # relative correction of the size: a smaller slider is none
@@ -76,6 +80,17 @@ class Contacts:
         return self.at(np.unique(np.linspace(0, len(self.tips) - 1, count).astype(np.int64)))
 
 
+def contacts_of(motion: Motion | None) -> Contacts | None:
+    """The samples in contact, None if there are too few."""
+    if motion is None or np.sum(motion.contact) < FEWEST_CONTACTS:
+        return None
+    touch = motion.touching
+    tips = to_body(motion.tip, motion.slider)[touch]
+    tool = None if motion.tool is None else motion.tool[touch]
+    velocities, push, poses = body_velocity(motion)[touch], motion.push[touch], motion.slider[touch]
+    return Contacts(tips, velocities, push, poses, motion.noise, tool=tool)
+
+
 @dataclass(frozen=True, eq=False)
 class OutlineFit:
     """A correction of the outline in the slider's frame, and its uncertainty.
@@ -84,16 +99,17 @@ class OutlineFit:
     size minus 1, lag of the slider's stamps (s), correction of the tip's radius (m); turn (rad, about `centre`) and
     shift (m, m) that bring the tip from the pusher's world frame to the slider's; relative length along the outline's x
     minus that along its y; relative length of the slider's world frame over the pusher's, minus 1; place of the tip (m,
-    m) along the tool's axes. estimate and sd are 0 where a parameter was not fitted.
+    m) along the tool's axes. estimate and sd are 0 where a parameter was not fitted. allowance (13,): what a sound
+    laboratory has of each.
 
     gap: median absolute gap that is left, m; cost: its mean, m; push_gaps (pushes,): the median of each push, m,
     signed, push_contacts (pushes,) where it is on the outline, push_samples (pushes,) of how many samples, push_noise
-    (pushes,) its standard deviation by the tracker's noise, m. centre (2,): mean place of the tip, m, world frame;
-    extent: distance (m) from there that few of the slider's places exceed.
+    (pushes,) its standard deviation by the tracker's noise, m. centre (2,): mean place of the tip, m, world frame.
     """
 
     estimate: Array
     sd: Array
+    allowance: Array
     gap: float
     cost: float
     push_gaps: Array
@@ -101,7 +117,6 @@ class OutlineFit:
     push_samples: IntArray
     push_noise: Array
     centre: Array
-    extent: float
 
     @property
     def pushes(self) -> int:
@@ -112,6 +127,21 @@ class OutlineFit:
     def spread(self) -> float:
         """The gap (m) that all pushes but one in five keep below: what the correction leaves unexplained."""
         return float(np.quantile(np.abs(self.push_gaps), MOST_PUSHES))
+
+    @property
+    def penalised(self) -> float:
+        """The mean gap that other pushes would have, by generalised cross-validation with pushes as observations."""
+        spare = self.pushes - np.count_nonzero(self.sd)
+        return self.cost * self.pushes / spare if spare > 0 else np.inf
+
+    def shows(self, *parameters: int) -> bool:
+        """Whether one of the parameters differs from 0 beyond doubt."""
+        each = list(parameters)
+        return bool(np.any(np.abs(self.estimate[each]) > DOUBT * self.sd[each] + self.allowance[each]))
+
+    def value(self, parameter: int, unit: str, offset: float = 0.0) -> Value:
+        """A parameter, plus an offset, with its standard deviation."""
+        return Value(float(self.estimate[parameter]) + offset, unit, float(self.sd[parameter]))
 
     def off(self, outline: Outline, allowance: float) -> BoolArray:
         """Which pushes (pushes,) have a larger gap (m), by more than the noise of their samples explains.
@@ -132,45 +162,25 @@ def fit_outline(contacts: Contacts, rig: Rig) -> OutlineFit:
     return fit if fit.sd[SIZE] < UNKNOWN_SIZE else _fit(contacts, rig, set(SIMILARITY) - {SIZE}, _turned_starts)
 
 
-def refit(first: OutlineFit, contacts: Contacts, rig: Rig, further: int, without: int | None = None) -> OutlineFit:
-    """Fit a further parameter too, or in place of another. Large sd show what is not separable.
+def refit(
+    first: OutlineFit, contacts: Contacts, rig: Rig, further: Sequence[int], without: int | None = None
+) -> OutlineFit:
+    """Fit further parameters too, or in place of another. Large sd show what is not separable.
 
-    With the tip's radius, contacts at corners are dropped: real corners are rounded, and would decide.
+    Frames and tools may be far from where they are meant to be: where the first fit leaves much, they are sought there
+    too. With the tip's radius, contacts at corners are dropped: real corners are rounded, and would decide.
     """
-    parameters = [each for each in (*_fitted(first), further) if each != without]
-    if further == TIP:
+
+    def starts(problem: Problem) -> list[Array]:
+        far = _far_corrections(contacts, further if first.spread > DISTURBED else ())
+        return [first.estimate, *problem.two_best(far)]
+
+    if TIP in further:
         problem = Problem(contacts, rig, ())
         _, size, nearest = problem.placed(first.estimate)
         sides = size * _away_from_corners(problem.outline, nearest.contact) >= CORNER
         contacts = contacts.at(sides) if sides.any() else contacts
-    return _fit(contacts, rig, parameters, lambda problem: [first.estimate])
-
-
-def fit_frames(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
-    """Fit turn and shift between the world frames of slider and pusher too, from the first fit and from afar."""
-    rows = np.zeros((STARTS, len(WEAK)))  # turns with a shift that brings tip and slider together
-    rows[:, FRAME_YAW] = wrap_angle(np.arange(STARTS) * 2.0 * np.pi / STARTS)
-    tips = to_world(contacts.tips, contacts.poses)
-    rows[:, [FRAME_X, FRAME_Y]] = contacts.poses[:, :2].mean(axis=0) - tips.mean(axis=0)
-    return _fit_from_afar(first, contacts, rig, FRAMES, rows)
-
-
-def fit_tool(first: OutlineFit, contacts: Contacts, rig: Rig) -> OutlineFit:
-    """Fit the place of the tip along the tool's axes too, from the first fit and from afar; contacts know the tool."""
-    assert contacts.tool is not None
-    apart = contacts.poses[:, :2] - to_world(contacts.tips, contacts.poses)
-    start = np.zeros((1, len(WEAK)))
-    start[0, list(TOOL)] = rotate(apart, -contacts.tool).mean(axis=0)
-    return _fit_from_afar(first, contacts, rig, TOOL, start)
-
-
-def _fit_from_afar(first: OutlineFit, contacts: Contacts, rig: Rig, further: tuple[int, ...], far: Array) -> OutlineFit:
-    """Fit further parameters from the first fit, and where that leaves much from the best corrections far (n, 13)."""
-
-    def starts(problem: Problem) -> list[Array]:
-        return [first.estimate, *([] if first.spread <= DISTURBED else problem.two_best(far))]
-
-    return _fit(contacts, rig, {*_fitted(first), *further}, starts)
+    return _fit(contacts, rig, {*np.flatnonzero(first.sd).tolist(), *further} - {without}, starts)
 
 
 def _turned_starts(problem: Problem) -> list[Array]:
@@ -182,8 +192,16 @@ def _turned_starts(problem: Problem) -> list[Array]:
     return [rows[0], *problem.two_best(rows[1:])]
 
 
-def _fitted(fit: OutlineFit) -> list[int]:
-    return [int(each) for each in np.flatnonzero(fit.sd)]
+def _far_corrections(contacts: Contacts, further: Sequence[int]) -> Array:
+    """Corrections (n, 13) of world frames or tool that bring tip and slider together; none of other parameters."""
+    rows = np.zeros((STARTS if FRAME_YAW in further else 1 if TOOL_X in further else 0, len(WEAK)))
+    apart = contacts.poses[:, :2] - to_world(contacts.tips, contacts.poses)
+    if FRAME_YAW in further:
+        rows[:, FRAME_YAW] = wrap_angle(np.arange(STARTS) * 2.0 * np.pi / STARTS)
+        rows[:, [FRAME_X, FRAME_Y]] = apart.mean(axis=0)
+    elif contacts.tool is not None:
+        rows[:, list(TOOL)] = rotate(apart, -contacts.tool).mean(axis=0)
+    return rows
 
 
 def _away_from_corners(outline: Outline, contact: Array) -> Array:
@@ -204,10 +222,23 @@ def _fit(
     sd, cost, samples = problem.deviation(estimate), problem.cost(estimate), np.array([len(each) for each in rows])
     if turns := problem.outline.rotational_symmetry:
         estimate[YAW] = wrap_angle(np.asarray(estimate[YAW] * turns)) / turns
-    gap, noise = float(np.median(np.abs(gaps))), MEDIAN_SD * contacts.noise / np.sqrt(samples)
     return OutlineFit(
-        estimate, sd, gap, cost, gaps[middle], nearest.contact[middle], samples, noise, problem.centre, problem.extent
+        estimate=estimate,
+        sd=sd,
+        allowance=problem.allowance,
+        gap=float(np.median(np.abs(gaps))),
+        cost=cost,
+        push_gaps=gaps[middle],
+        push_contacts=nearest.contact[middle],
+        push_samples=samples,
+        push_noise=MEDIAN_SD * contacts.noise / np.sqrt(samples),
+        centre=problem.centre,
     )
+
+
+def half_size(rig: Rig) -> float:
+    """Distance from the centre to a side, m, of a regular outline with this area and perimeter."""
+    return 2.0 * rig.outline.area / rig.outline.perimeter
 
 
 class Placed(NamedTuple):
@@ -221,8 +252,8 @@ class Placed(NamedTuple):
 class Problem:
     """Gaps (n,) m between the contacts and the corrected outline of a rig, and the fit of some of the parameters.
 
-    A correction (13,) is that of OutlineFit. outline: the rig's, with its centroid as the origin: a turn about it
-    shifts nothing, so that both are known as well as they can be.
+    A correction and its allowance (13,) are those of OutlineFit. outline: the rig's, with its centroid as the origin: a
+    turn about it shifts nothing, so that both are known as well as they can be.
     """
 
     def __init__(self, contacts: Contacts, rig: Rig, parameters: Collection[int]) -> None:
@@ -232,7 +263,11 @@ class Problem:
         self._tool = np.zeros(len(contacts.push)) if contacts.tool is None else contacts.tool
         self._world = to_world(contacts.tips, contacts.poses)
         self.centre = np.asarray(self._world.mean(axis=0))
-        self.extent = float(np.quantile(np.linalg.norm(contacts.poses[:, :2] - self.centre, axis=1), MOST_PUSHES))
+        extent = float(np.quantile(np.linalg.norm(contacts.poses[:, :2] - self.centre, axis=1), MOST_PUSHES))
+        self.allowance = np.full(len(WEAK), LENGTH_ALLOWANCE)
+        self.allowance[[YAW, FRAME_YAW]], self.allowance[LAG] = ANGLE_ALLOWANCE, LAG_ALLOWANCE
+        self.allowance[[SIZE, STRETCH]] /= half_size(rig)
+        self.allowance[SCALE] /= max(extent, LENGTH_ALLOWANCE)
         self._free = np.isin(np.arange(len(WEAK)), list(parameters))
         self._free[YAW] &= self.outline.rotational_symmetry != 0
         self._last: tuple[bytes, Placed] | None = None
@@ -280,7 +315,7 @@ class Problem:
         return float(np.mean(np.minimum(np.abs(self.gaps(correction)), LARGEST)))
 
     def two_best(self, rows: Array) -> list[Array]:
-        """The two of the corrections (n, 13) with the smallest residuals."""
+        """The two of the corrections (n, 13) with the smallest residuals, none of none."""
         return list(rows[np.argsort([float(np.sum(np.abs(self.residuals(row[self._free])))) for row in rows])[:2]])
 
     def best(self, starts: Sequence[Array]) -> Array:

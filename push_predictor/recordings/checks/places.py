@@ -11,7 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.finding import Finding, Severity, Value
 from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.flips import HeadingFlips, flip_steps
@@ -34,9 +34,10 @@ FIXED_SHARE = 0.7  # of the large steps; of random ones, as of headings in degre
 COMMON = 0.1  # share of the flips by an angle that is listed
 OFTEN = 0.2  # share of the samples: the slider may begin anew with a flipped heading
 SAME = 1e-3  # m between an outline and the same after a turn that is its symmetry
-PLACE = "lace the markers so that no turn of the body maps them onto each other."
-ADVICE = f"The windows undo them. P{PLACE}"
-UNKNOWN = f"The true heading is not known. P{PLACE}"
+ADVICE = (
+    "Windows undo them, unless they are so many that the true heading is not known. Place the markers so that no turn "
+    "of the body maps them onto each other."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +88,12 @@ def two_bodies(name: str, places: Places) -> Finding | None:
         f"{1e3 * places.distance:.0f} mm apart ({100.0 * places.share:.0f} % of the samples are elsewhere): "
         "two bodies, or two nodes, publish on its topic."
     )
-    often = places.share > HALF
     advice = (
-        "Give each body its own topic, or name the one to read (`ros2 topic info --verbose` lists the publishers)."
-        if often
-        else "The samples elsewhere are discarded. Stop the second publisher (`ros2 topic info --verbose` lists both)."
+        "Give each body its own topic, and stop a second publisher (`ros2 topic info --verbose` lists both). Few "
+        "samples elsewhere are discarded."
     )
     values = {"share": Value(places.share, "1"), "distance": Value(places.distance, "m")}
-    return Finding(f"two_bodies_{name}", "refused" if often else "warning", sentence, advice, values)
+    return Finding(f"two_bodies_{name}", _severity(places.share), sentence, advice, values)
 
 
 def exchanged(recording: Recording, slider: Places, pusher: Places) -> Finding | None:
@@ -120,14 +119,14 @@ def exchanged(recording: Recording, slider: Places, pusher: Places) -> Finding |
         f"Slider and tip take each other's place {len(times)} time{'' if len(times) == 1 else 's'}, both in one "
         f"instant, first after {begin:.1f} s, and are exchanged for {100.0 * share:.0f} % of the time."
     )
-    often = share > HALF
-    advice = "Give the bodies marker patterns that differ more. " + (
-        "Use the recording up to the exchange; the rest with the topics exchanged."
-        if often
-        else "The windows break there."
-    )
+    advice = "Give the bodies marker patterns that differ more. The windows break there."
     values = {"exchanges": Value(len(times), "1"), "share": Value(share, "1"), "begin": Value(begin, "s")}
-    return Finding("bodies_exchanged", "refused" if often else "warning", sentence, advice, values)
+    return Finding("bodies_exchanged", _severity(share), sentence, advice, values)
+
+
+def _severity(share: float) -> Severity:
+    """By the share of the samples that are elsewhere."""
+    return "refused" if share > HALF else "warning"
 
 
 def _near(one: Array, other: Array, before: Array) -> BoolArray:
@@ -167,8 +166,7 @@ def without_flips(recording: Recording, outline: Outline) -> tuple[Finding | Non
     )
     values = {"flips": Value(float(len(flips)), "1"), "share": Value(share, "1")}
     unknown = share > OFTEN and not all(_symmetric(outline, np.radians(angle)) for angle in angles)
-    advice = UNKNOWN if unknown else ADVICE
-    found = Finding("heading_flips", "refused" if unknown else "warning", sentence, advice, values)
+    found = Finding("heading_flips", "refused" if unknown else "warning", sentence, ADVICE, values)
     return found, replace(recording, slider=replace(slider, heading=wrap_angle(slider.heading - turned)))
 
 

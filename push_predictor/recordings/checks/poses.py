@@ -12,11 +12,12 @@ import numpy as np
 
 from push_predictor.recordings.checks.finding import Finding, Severity, Value
 from push_predictor.recordings.checks.motion import noise_of
-from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.dropouts import usual_interval
 from push_predictor.recordings.streams import PoseStream
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.cut import FIT_SAMPLES
 from push_predictor.recordings.windows.push_window import WindowOptions
+from push_predictor.recordings.windows.regular_stamps import DECIDING, RegularStamps, burst_period
 from push_predictor.recordings.windows.resolution import (
     LEVER,
     SHORTEST,
@@ -26,9 +27,9 @@ from push_predictor.recordings.windows.resolution import (
     fit_span,
     lengths,
 )
-from push_predictor.recordings.windows.stamp_order import OrderedSamples, uninterrupted
-from push_predictor.recordings.windows.unmeasured import HeldPoses
-from push_predictor.types import Array
+from push_predictor.recordings.windows.stamp_order import uninterrupted
+from push_predictor.recordings.windows.unmeasured import ContinuedPoses, HeldPoses
+from push_predictor.types import Array, IntArray
 
 WINDOW = WindowOptions().duration  # s
 TWO_LINES = 0.5  # of a window: longer lines at its begin and its end have samples in common
@@ -36,9 +37,9 @@ FEWEST_SAMPLES = 3  # in a window: with two, one push in thirty loses a window
 ENOUGH = FIT_SAMPLES - 0.1  # samples in a window, for the line of its velocity
 SPEED_NOISE, TOO_NOISY = 0.006, 0.01  # m/s of the tip: a third and half of those of a slow push
 NOISY = 3e-4  # m: three times this is the gap below which a tip touches, and a window's outcome has 1.4 times this
-FEWEST_HOLDS = 2
+FEWEST_HOLDS = FEWEST_RUNS = 2
+LEAST_BURSTS = 0.5  # of the blocks of a stream
 UNSEEN = "No window spans them. Let the tracker send nothing, or NaN, while it does not see the body."
-DECIMALS = (1.0, 0.1, 0.01, 0.001, 0.0001, 0.00001)
 LEAST_SHARE = 1.0 / 6.0  # of the poses in motion are repeats: the source is slower than its messages
 MOST_HOLDS = 0.2  # of the runs of repeats are longer than usual
 FEWEST_MOVING = 100  # samples in motion, from which the rate of the source is estimated
@@ -49,27 +50,39 @@ ROUNDED = np.sqrt(12.0)  # standard deviations of a rounding error in one step
 
 def quality_findings(facts: Mapping[str, StreamFacts]) -> list[Finding]:
     """Findings about streams of poses, by name."""
-    every = (_resolution, _source, _holds, _rate, _noise)
+    every = (_lines, _resolution, _source, _holds, _rate, _noise)
     found = [of(name, each) for name, each in facts.items() for of in every]
     if "pusher" in facts:
         found.append(_speed_noise(facts["pusher"]))
     return [finding for finding in found if finding is not None]
 
 
+def _lines(name: str, facts: StreamFacts) -> Finding | None:
+    if facts.lines < FEWEST_RUNS:
+        return None
+    share = facts.lost / facts.samples
+    sentence = (
+        f"The {name}'s pose is continued on an exact line {facts.lines} times, without the noise of a measurement: "
+        f"{100.0 * share:.1f} % of the samples are extrapolated."
+    )
+    values = {"runs": Value(float(facts.lines), "1"), "share": Value(share, "1")}
+    return Finding(f"continued_poses_{name}", "warning", sentence, UNSEEN, values)
+
+
 def _resolution(name: str, facts: StreamFacts) -> Finding | None:
     if not facts.coarse:
         return None
-    sentence = f"The {name}'s positions have a resolution of {_step(facts.quantum)}"
+    sentence = f"The {name}'s positions have a resolution of {1e3 * facts.quantum:.2g} mm"
     if facts.heading_quantum > 0.0:
         sentence += f", its headings of {np.degrees(facts.heading_quantum):.2g} degrees"
-    values = {"quantum": Value(facts.quantum, "m"), "fit_span": Value(facts.fit_span, "s")}
-    if facts.fit_span > TWO_LINES * WINDOW:
-        sentence += f": too coarse for speeds and displacements in a window of {WINDOW:g} s."
-        advice = "Record the numbers as measured, with at least 5 decimals of a metre and 4 of a radian."
-        return Finding(f"resolution_{name}", "refused", sentence, advice, values)
     sentence += f": speeds need lines over {1e3 * facts.fit_span:.0f} ms, in place of 20 ms."
-    advice = "Windows use such lines. Better: write at least 5 decimals of a metre and 4 of a radian."
-    return Finding(f"resolution_{name}", "warning", sentence, advice, values)
+    advice = (
+        f"Windows use such lines up to {1e3 * TWO_LINES * WINDOW:.0f} ms. Better: write at least 5 decimals of a metre "
+        "and 4 of a radian."
+    )
+    severity: Severity = "refused" if facts.fit_span > TWO_LINES * WINDOW else "warning"
+    values = {"quantum": Value(facts.quantum, "m"), "fit_span": Value(facts.fit_span, "s")}
+    return Finding(f"resolution_{name}", severity, sentence, advice, values)
 
 
 def _source(name: str, facts: StreamFacts) -> Finding | None:
@@ -99,15 +112,14 @@ def _rate(name: str, facts: StreamFacts) -> Finding | None:
     count = WINDOW / facts.source_period
     if count > ENOUGH:
         return None
-    rate, least = 1.0 / facts.source_period, FEWEST_SAMPLES / WINDOW
-    sentence = f"The {name} has {rate:.3g} poses a second: {count:.1f} in a window of {WINDOW:g} s"
-    values = {"rate": Value(rate, "Hz")}
-    advice = f"At least {least:.0f} Hz are needed; 100 Hz are usual."
-    if count < FEWEST_SAMPLES - 0.5:
-        sentence += f", fewer than the {FEWEST_SAMPLES} that a speed and the begin and end of a push need."
-        return Finding(f"rate_{name}", "refused", sentence, advice, values)
-    sentence += f". Begin and end of a push are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
-    return Finding(f"rate_{name}", "warning", sentence, advice, values)
+    rate = 1.0 / facts.source_period
+    sentence = (
+        f"The {name} has {rate:.3g} poses a second, {count:.1f} in a window of {WINDOW:g} s: begin and end of a push "
+        f"are uncertain by a part of {1e3 * facts.source_period:.0f} ms."
+    )
+    advice = f"At least {FEWEST_SAMPLES / WINDOW:.0f} Hz are needed; 100 Hz are usual."
+    severity: Severity = "refused" if count < FEWEST_SAMPLES - 0.5 else "warning"
+    return Finding(f"rate_{name}", severity, sentence, advice, {"rate": Value(rate, "Hz")})
 
 
 def _noise(name: str, facts: StreamFacts) -> Finding | None:
@@ -136,14 +148,6 @@ def _speed_noise(facts: StreamFacts) -> Finding | None:
     return Finding("speed_noise", severity, sentence, advice, {"speed": Value(float(noise), "m/s")})
 
 
-def _step(quantum: float) -> str:
-    """A resolution in words, by decimals where it is one."""
-    for decimals, step in enumerate(DECIMALS):
-        if abs(quantum / step - 1.0) < 0.01:
-            return f"{decimals} decimals ({1e3 * step:g} mm)"
-    return f"{1e3 * quantum:.2g} mm"
-
-
 # --- what a stream of poses is by itself ------------------------------------------------------------------------------
 
 
@@ -154,7 +158,8 @@ class StreamFacts:
     period: median interval of the stamps, s; source_period: of the poses behind them, the same unless the stream
     repeats them. quantum: resolution of the positions (m), heading_quantum (rad), 0 where it is unknown. fit_span: the
     span (s) that lines need for a speed in this resolution. noise (m), heading_noise (rad): standard deviations of a
-    sample. held: number of stale poses; holds: how often, beyond the usual interval, they were held.
+    sample. lost: number of poses that were continued on a line; lines: how many of these. held: number of stale poses;
+    holds: how long, beyond the usual interval, each was held, s.
     """
 
     samples: int
@@ -165,6 +170,8 @@ class StreamFacts:
     fit_span: float
     noise: float
     heading_noise: float
+    lost: int
+    lines: int
     held: int
     holds: tuple[float, ...]
 
@@ -180,20 +187,23 @@ class StreamFacts:
 
 
 def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream]:
-    """The facts of a stream of at least two poses, and the stream as repaired; angle: whether headings count.
+    """The facts of a stream of at least two poses, and the stream as windows repair it; angle: whether headings count.
 
     The stamps must increase.
     """
-    values = np.column_stack([stream.x, stream.y, stream.z, np.unwrap(stream.heading)])
     column = 3 if angle else None
-    pose = lengths(values, column)
-    quanta = Resolution(pose.shape[1]).take(pose)
+    tilt = np.zeros(len(stream)) if stream.tilt is None else stream.tilt
+    values = np.column_stack([stream.x, stream.y, stream.z, np.unwrap(stream.heading), tilt])
+    quanta = Resolution(2 + angle).take(lengths(values, column))
     quantum = float(np.max(quanta[-1]))
+    continued, held = ContinuedPoses(column), HeldPoses(column)
     samples = uninterrupted(stream.stamp, np.column_stack([values, np.max(quanta, axis=1)]))
-    held = HeldPoses(column)
-    kept = held.take(samples, final=True)
-    smoothed = SmoothedPoses(column).take(kept, final=True)
-    period = float(np.median(np.diff(stream.stamp))) * NANOSECOND
+    samples = continued.take(samples, final=True)
+    if bursts := in_bursts(samples.stamp):
+        samples = RegularStamps().take(samples, final=True)
+    values, pose = samples.values, lengths(samples.values, column)
+    period = usual_interval(samples.stamp)
+    samples = SmoothedPoses(column).take(held.take(samples, final=True), final=True)
     source_period = _source_period(pose, quantum, period, len(held.dropouts))
     measured = values[changes(pose)] if source_period > period else values
     noise = noise_of(measured[:, [0, 1, 3]], order=3)  # of third differences: motion hardly changes them
@@ -206,17 +216,23 @@ def pose_facts(stream: PoseStream, angle: bool) -> tuple[StreamFacts, PoseStream
         fit_span=float(fit_span(quantum, period)),
         noise=float(max(*noise[:2], np.max(quanta[-1, :2]) / ROUNDED)),
         heading_noise=float(noise[2]) if angle else 0.0,
+        lost=continued.lost,
+        lines=continued.runs,
         held=held.stale,
         holds=tuple(held.dropouts),
     )
-    return facts, _with(stream, smoothed) if held.stale or facts.coarse else stream
+    if not (bursts or held.stale or facts.coarse or facts.lines >= FEWEST_RUNS):
+        return facts, stream
+    x, y, z, heading, tilt, _ = samples.values.T
+    tilted = None if stream.tilt is None else tilt
+    return facts, replace(stream, stamp=samples.stamp, x=x, y=y, z=z, heading=heading, tilt=tilted)
 
 
-def _with(stream: PoseStream, samples: OrderedSamples) -> PoseStream:
-    rows = np.searchsorted(stream.stamp, samples.stamp)
-    x, y, z, heading = samples.values[:, :4].T
-    tilt = None if stream.tilt is None else stream.tilt[rows]
-    return replace(stream, stamp=samples.stamp, x=x, y=y, z=z, heading=heading, tilt=tilt)
+def in_bursts(stamp: IntArray) -> bool:
+    """Whether most blocks of a stream are of a regular capture with stamps in bursts."""
+    blocks = stamp[: len(stamp) // DECIDING * DECIDING].reshape(-1, DECIDING)
+    found = [burst_period(block) is not None for block in blocks]
+    return bool(found) and float(np.mean(found)) >= LEAST_BURSTS
 
 
 def _source_period(pose: Array, quantum: float, period: float, holds: int) -> float:

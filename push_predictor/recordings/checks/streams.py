@@ -15,7 +15,7 @@ import numpy as np
 
 from push_predictor.recordings.checks.finding import Evidence, Finding, Value
 from push_predictor.recordings.checks.places import exchanged, places_of, two_bodies, without_flips
-from push_predictor.recordings.checks.poses import UNSEEN, StreamFacts, pose_facts, quality_findings
+from push_predictor.recordings.checks.poses import StreamFacts, in_bursts, pose_facts, quality_findings
 from push_predictor.recordings.checks.units import has_heading, stream_rates, stream_units
 from push_predictor.recordings.dropouts import CLOCK_SET, NANOSECOND, longest_interval
 from push_predictor.recordings.streams import PoseStream, Recording, Stream, repeated, taken
@@ -23,26 +23,19 @@ from push_predictor.recordings.windows.regular_stamps import (
     DECIDING,
     LEAST_TOGETHER,
     TOGETHER,
-    RegularStamps,
-    burst_period,
     stamp_noise,
 )
-from push_predictor.recordings.windows.stamp_order import StampOrder, uninterrupted
+from push_predictor.recordings.windows.stamp_order import StampOrder
 from push_predictor.recordings.windows.track import Track
-from push_predictor.recordings.windows.unmeasured import continued
 from push_predictor.types import IntArray
 
-FEWEST_RUNS = 2
 FEWEST = 10  # samples of a stream that is judged
 LEAST_SHARE = 0.05  # of the samples are repeats; single ones are usual
 SECOND = 1_000_000_000  # ns
 SPAN = 3  # s of whole seconds in a stream, from which its fractions are judged
 SMALL = 0.01  # of a second: no fraction of a stream over several seconds stays below
-ZONE, SAME_ZONE = 1800 * SECOND, 0.04  # ns of which time zones differ; share of it in which the streams begin
-EPOCH = 86400 * 365 * SECOND  # ns: an earlier time is counted from the start of a machine or a simulation
 LOG = "`--stamp log` takes the recorder's time in place of the header's."
 Stamps = dict[str, IntArray]
-LEAST_BURSTS = 0.5  # of the blocks of a stream
 LOST = 0.02  # share of the time in dropouts, from which irregular stamps are named
 REGULAR = "Windows use regular stamps in their place."
 BETTER = "Stamp each sample when it is measured, not at receipt."
@@ -66,28 +59,9 @@ def stream_stage(evidence: Evidence) -> Evidence:
         return evidence.found(found)
     if wrong_units := stream_units(sound, rig):
         return evidence.found([*found, *wrong_units])
-    lost, sound = _without_continued(sound, headed)
-    found += lost
     facts, sound = _facts(sound, headed)
     found += [*quality_findings(facts), *stamp_findings(stamps)]
     return evidence.found(found, sound)
-
-
-def _without_continued(recording: Recording, headed: bool) -> tuple[list[Finding], Recording]:
-    """Warnings about poses that a tracker continued while it did not see the body, and the recording without them."""
-    found, sound = list[Finding](), dict[str, Any]()
-    for name, stream in recording.poses.items():
-        lost = continued(stream, headed and name == "slider")
-        if (runs := int(np.sum(np.diff(lost, prepend=False) & lost))) < FEWEST_RUNS:
-            continue
-        sentence = (
-            f"The {name}'s pose is continued on an exact line {runs} times, without the noise of a measurement: "
-            f"{100.0 * float(lost.mean()):.1f} % of the samples are extrapolated."
-        )
-        values = {"runs": Value(float(runs), "1"), "share": Value(float(lost.mean()), "1")}
-        found.append(Finding(f"continued_poses_{name}", "warning", sentence, UNSEEN, values))
-        sound[name] = taken(stream, ~lost)
-    return found, replace(recording, **sound) if sound else recording
 
 
 def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], Recording]:
@@ -96,9 +70,8 @@ def _facts(recording: Recording, headed: bool) -> tuple[dict[str, StreamFacts], 
     for name, stream in recording.poses.items():
         if len(poses := in_order(stream)) < FEWEST:
             continue
-        regular = regular_in_bursts(poses)
-        facts[name], sound = pose_facts(regular, angle=headed and name == "slider")
-        if sound is not regular or regular is not poses:  # others judge late samples: a clock that was set back
+        facts[name], sound = pose_facts(poses, angle=headed and name == "slider")
+        if sound is not poses:  # others judge late samples: a clock that was set back
             repaired[name] = sound
     return facts, replace(recording, **repaired) if repaired else recording
 
@@ -175,30 +148,20 @@ def clocks_never_meet(stamps: Stamps) -> list[Finding]:
     if "slider" not in stamps:
         return []
     first, last = int(stamps["slider"].min()), int(stamps["slider"].max())
-    apart = {name: stamp for name, stamp in stamps.items() if stamp.max() < first or stamp.min() > last}
-    if not apart:
+    late = {name: int(of.min()) - first for name, of in stamps.items() if of.max() < first or of.min() > last}
+    if not late:
         return []
-    told = ", ".join(f"the {name}'s begin {_time(int(of.min()) - first)} the slider's" for name, of in apart.items())
-    early = [name for name, of in {**apart, "slider": stamps["slider"]}.items() if of.max() < EPOCH]
-    cause = (
-        f" The time of {' and '.join(early)} counts from the start of a simulation or a machine."
-        if 0 < len(early) <= len(apart)
-        else ""
+    told = ", ".join(
+        f"the {name}'s begin {1e-9 * abs(apart):.0f} s {'after' if apart > 0 else 'before'} the slider's"
+        for name, apart in late.items()
     )
-    zones = {(int(of.min()) - first) / ZONE for of in apart.values()}
-    if not cause and all(abs(each - round(each)) < SAME_ZONE for each in zones):
-        cause = " These are whole half hours: the clocks are set to different time zones."
-    sentence = f"The streams have no time in common, their stamps last {1e-9 * (last - first):.0f} s: {told}.{cause}"
-    values = {f"{name}_apart": Value(1e-9 * (int(of.min()) - first), "s") for name, of in apart.items()}
+    sentence = (
+        f"The streams have no time in common, their stamps last {1e-9 * (last - first):.0f} s: {told}. They are of two "
+        "clocks, as of simulation and wall time, or of two time zones."
+    )
+    values = {f"{name}_apart": Value(1e-9 * apart, "s") for name, apart in late.items()}
     advice = f"Stamp all streams by one clock (`use_sim_time` for all nodes or for none). {LOG}"
     return [Finding("clocks_never_meet", "refused", sentence, advice, values)]
-
-
-def _time(apart: int) -> str:
-    """A time apart, ns, in words."""
-    seconds = 1e-9 * abs(apart)
-    size = f"{seconds:.0f} s" if seconds < 86400 else f"{seconds / 86400:.0f} days"
-    return f"{size} {'after' if apart > 0 else 'before'}"
 
 
 def _wrong(stamp: IntArray) -> str:
@@ -219,14 +182,6 @@ def _wrong(stamp: IntArray) -> str:
 # --- bursts and jitter ------------------------------------------------------------------------------------------------
 
 
-def regular_in_bursts(stream: PoseStream) -> PoseStream:
-    """The stream with the stamps that windows use, if its own are in bursts; its stamps must increase."""
-    if not _in_bursts(stream.stamp):
-        return stream
-    rows = np.arange(len(stream), dtype=np.float64)[:, None]
-    return replace(stream, stamp=RegularStamps().take(uninterrupted(stream.stamp, rows), final=True).stamp)
-
-
 def stamp_findings(stamps: Stamps) -> list[Finding]:
     """Findings about streams with stamps in bursts, and with other jitter; empty without any."""
     bursts = {name: found for name, stamp in stamps.items() if (found := _burst_finding(name, stamp)) is not None}
@@ -243,7 +198,7 @@ def _burst_finding(name: str, stamp: IntArray) -> Finding | None:
     together = float(np.mean(step < TOGETHER * mean))
     lost = float(np.sum(step[step > longest_interval(mean)]) / np.sum(step))
     values = {"together": Value(together, "1"), "lost": Value(lost, "1")}
-    if together < LEAST_TOGETHER or (not (regular := _in_bursts(stamp)) and lost < LOST):
+    if together < LEAST_TOGETHER or (not (regular := in_bursts(stamp)) and lost < LOST):
         return None
     sentence = (
         f"The {name}'s stamps come in bursts: {100.0 * together:.0f} % of the intervals are under a quarter of their "
@@ -252,13 +207,6 @@ def _burst_finding(name: str, stamp: IntArray) -> Finding | None:
     if not regular:
         sentence += f" {100.0 * lost:.0f} % of the time are gaps, which no window spans."
     return Finding("stamp_bursts", "warning", sentence, f"{REGULAR} {BETTER}" if regular else BETTER, values)
-
-
-def _in_bursts(stamp: IntArray) -> bool:
-    """Whether most blocks of a stream are of a regular capture with stamps in bursts."""
-    blocks = stamp[: len(stamp) // DECIDING * DECIDING].reshape(-1, DECIDING)
-    found = [burst_period(block) is not None for block in blocks]
-    return bool(found) and float(np.mean(found)) >= LEAST_BURSTS
 
 
 def _jitter_finding(stamps: Stamps) -> Finding | None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.dropouts import usual_interval
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.table import PushTable
@@ -66,11 +67,7 @@ def _rig_length(rig: Rig) -> Finding | None:
 
 
 def _rate(name: str, stream: PoseStream) -> Finding | None:
-    step = np.diff(stream.stamp)
-    if not np.any(step > 0):
-        return None
-    rate = 1.0 / (1e-9 * float(np.median(step[step > 0])))  # a sample that was sent twice adds none
-    if LOWEST_RATE <= rate <= HIGHEST_RATE:
+    if not (usual := usual_interval(stream.stamp)) or LOWEST_RATE <= (rate := 1.0 / usual) <= HIGHEST_RATE:
         return None
     sentence = f"The {name}'s stamps give {rate:.3g} samples a second: the unit of the stamps is probably ms or us."
     advice = "Give stamps in seconds and nanoseconds."
@@ -149,9 +146,7 @@ def turn_and_path(slider: PoseStream) -> tuple[float, float]:
 
 def every(stream: PoseStream, span: float) -> slice:
     """Samples about `span` s apart."""
-    step = np.diff(stream.stamp)
-    period = 1e-9 * float(np.median(step[step > 0])) if np.any(step > 0) else span
-    return slice(None, None, max(1, round(span / max(period, 1e-6))))
+    return slice(None, None, max(1, round(span / max(usual_interval(stream.stamp) or span, 1e-6))))
 
 
 def _tilted(slider: PoseStream, rig: Rig, tilt: float) -> Finding:

@@ -234,19 +234,27 @@ def missing_before(stamp: IntArray, noise: StampNoise) -> IntArray:
     A missing sample makes all later stamps a period later: the step from the mean of `width` stamps to that of the next
     exceeds the steps next to it. Zero for the first and last two widths, and where a larger step is within a width.
     """
-    w, n = width(noise), len(stamp)
-    found = np.zeros(n, np.int64)
-    if n < 4 * w + 1:
-        return found
+    w = width(noise)
+    if len(stamp) < 4 * w + 1:
+        return np.zeros(len(stamp), np.int64)
     sums = np.concatenate([[0], np.cumsum(stamp - stamp[0])])  # of integers, so that their rounding depends on nothing
     means = sums[w:] - sums[:-w]  # of `width` stamps from each on, times the width
     step = means[w:] - means[:-w]  # at a place w later
     excess = 2 * step[w:-w] - step[: -2 * w] - step[2 * w :]  # at a place 2 w later, times twice the width
-    largest = sliding_window_view(np.pad(excess, w, constant_values=np.iinfo(np.int64).min), 2 * w + 1).max(axis=1)
-    count = np.rint(excess * NANOSECOND / (2 * w * noise.period)).astype(np.int64)
-    peak = (excess == largest) & (count > 0)
-    found[2 * w : 2 * w + len(excess)] = np.where(peak, count, 0)
-    return found
+    return _at_peaks(excess * NANOSECOND / (2 * w * noise.period), w, 2 * w)
+
+
+def _at_peaks(missing: Array, reach: int, before: int) -> IntArray:
+    """The whole numbers of missing samples where they are the largest within a reach, else 0.
+
+    missing (m,): as steps of the stamps show it, from the sample with the index `before` on; as many after them are not
+    judged, but one.
+    """
+    largest = sliding_window_view(np.pad(missing, reach, constant_values=-np.inf), 2 * reach + 1).max(axis=1)
+    count = np.rint(missing).astype(np.int64)
+    peak = (missing == largest) & (count > 0)
+    peak[1:] &= ~peak[:-1]
+    return np.pad(np.where(peak, count, 0), (before, before - 1))
 
 
 # --- bursts -----------------------------------------------------------------------------------------------------------
@@ -269,18 +277,11 @@ def burst_period(stamp: IntArray) -> float | None:
 def missing_in_bursts(stamp: IntArray, period: float) -> IntArray:
     """How many samples of the grid are missing before each of n samples; zero for the first and last WIDTH."""
     n = len(stamp)
-    found = np.zeros(n, np.int64)
     if n < 2 * WIDTH + 1:
-        return found
+        return np.zeros(n, np.int64)
     late = (stamp - stamp[0]) * NANOSECOND - period * np.arange(n)
     low = np.percentile(sliding_window_view(late, WIDTH), LOW, axis=1)
-    step = low[WIDTH:] - low[:-WIDTH]  # at a place WIDTH later
-    largest = sliding_window_view(np.pad(step, WIDTH, constant_values=-np.inf), 2 * WIDTH + 1).max(axis=1)
-    count = np.rint(step / period).astype(np.int64)
-    peak = (step == largest) & (count > 0)
-    peak[1:] &= ~peak[:-1]
-    found[WIDTH : WIDTH + len(step)] = np.where(peak, count, 0)
-    return found
+    return _at_peaks((low[WIDTH:] - low[:-WIDTH]) / period, WIDTH, WIDTH)
 
 
 def low_of(late: Array, inside: BoolArray) -> Array:

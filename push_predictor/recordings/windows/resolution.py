@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.dropouts import NANOSECOND, usual_interval
 from push_predictor.recordings.streams import taken
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, IntArray
@@ -121,8 +121,7 @@ class SmoothedPoses(Portions):
 
     def _halves(self, values: Array) -> Array:
         """Half the span (n,) s of the lines at samples (n, k), 0 for a fine resolution."""
-        period = float(np.median(np.diff(self._first))) * NANOSECOND if len(self._first) > 1 else 0.0
-        span = fit_span(values[:, -1], period)
+        span = fit_span(values[:, -1], usual_interval(self._first))
         if len(span):
             self.resolution = float(values[-1, -1]) if span[-1] > SHORTEST else 0.0
         return np.where(span > SHORTEST, 0.5 * np.minimum(span, LONGEST), 0.0)

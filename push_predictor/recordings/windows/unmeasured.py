@@ -19,9 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
-from push_predictor.recordings.streams import PoseStream, taken
-from push_predictor.recordings.windows.resolution import LEVER, Resolution, changes, lengths
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval, usual_interval
+from push_predictor.recordings.streams import taken
+from push_predictor.recordings.windows.resolution import changes, lengths
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, Portions
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -49,50 +49,51 @@ class HeldPoses(Portions):
 
     def __init__(self, angle: int | None = None) -> None:
         """Of a stream with columns as Track passes them on; angle: index of one with a heading (rad)."""
-        super().__init__()  # keeps the first sample of the pose that waits
+        super().__init__()  # keeps the first and the last sample of the poses before the one that waits
         self.stale = 0
         self.dropouts: list[float] = []
         self._angle = angle
-        self._before = np.empty(0, np.int64)  # stamps (ns) at which the poses before the kept ones began
-        self._pose: Array | None = None  # the one before these
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
         """Add samples and return those that are decided; with `final` all are."""
-        samples = self._with(new)
+        if not len(samples := self._with(new)):
+            return samples
         pose = lengths(samples.values, self._angle)
         begins = changes(pose)
-        keep, values, decided = self._judge(samples, pose, begins, final)
+        ends = np.append(begins[1:], len(pose))
+        keep, values, decided = self._judge(samples, pose, begins, ends, final)
         rows = np.arange(self._returned, decided)
-        samples = replace(samples, values=values)
-        self._forget(samples, pose, begins, decided)
-        return taken(samples, rows[keep[rows]])
+        found = taken(replace(samples, values=values), rows[keep[rows]])
+        last = int(np.searchsorted(begins, decided - 1, side="right")) - 1  # the pose that waits
+        before = slice(max(last - USUAL, 0), last)
+        known = [*begins[before], *(ends[before] - 1), begins[last], decided - 1]
+        rows = np.unique([*known, *range(decided, len(pose))])
+        self._keep(samples, rows, int(np.sum(rows < decided)))
+        return found
 
     def _judge(
-        self, samples: OrderedSamples, pose: Array, begins: IntArray, final: bool
+        self, samples: OrderedSamples, pose: Array, begins: IntArray, ends: IntArray, final: bool
     ) -> tuple[BoolArray, Array, int]:
-        """Which samples (n,) are kept, their values, and how many are decided; begins: of the runs of one pose."""
-        stamp, ends = samples.stamp, np.append(begins[1:], len(pose))
+        """Which samples (n,) are kept, their values, and how many are decided; begins, ends: of the runs of a pose."""
+        stamp = samples.stamp
         keep, values = np.ones(len(pose), dtype=np.bool_), samples.values.copy()
-        first = np.concatenate([self._before, stamp[begins]])
-        changes = np.append(np.linalg.norm(pose[begins[1:]] - pose[begins[:-1]], axis=1) > HARMLESS, False)
-        for run in np.flatnonzero(ends - begins > 1).tolist():
+        for run in np.flatnonzero((ends - begins > 1) & (ends > self._returned)).tolist():
             begin, end = int(begins[run]), int(ends[run])
             if stamp[end - 1] - stamp[begin] > LONGEST_HOLD:
                 continue
             if not final and not self._decidable(stamp, begins, run):
                 return keep, values, max(begin + 1, self._returned)
-            if changes[run] and self._is_stale(stamp, pose, begins, run, float(values[end, -1])):
-                rows = np.arange(max(begin + 1, self._returned), end)
-                usual = first[: run + len(self._before) + 2][-USUAL - 1 :]
-                interval = float(stamp[end] - stamp[begin]) * NANOSECOND
-                self.stale += len(rows)
-                slow = interval <= longest_interval(float(np.median(np.diff(usual))) * NANOSECOND)
-                if slow:
-                    share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
-                    values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
-                else:
-                    self.dropouts.append(interval)
-                    keep[rows] = False
+            if not self._is_stale(stamp, pose, begins, run, samples.values):
+                continue
+            rows = np.arange(max(begin + 1, self._returned), end)
+            interval = float(stamp[end] - stamp[begin]) * NANOSECOND
+            self.stale += len(rows)
+            if interval <= longest_interval(usual_interval(stamp[begins[: run + 2][-USUAL - 1 :]])):
+                share = (stamp[rows] - stamp[begin]) / (stamp[end] - stamp[begin])
+                values[rows] = values[begin] + share[:, None] * (values[end] - values[begin])
+            else:
+                self.dropouts.append(interval)
+                keep[rows] = False
         return keep, values, len(pose)
 
     def _decidable(self, stamp: IntArray, begins: IntArray, run: int) -> bool:
@@ -101,42 +102,24 @@ class HeldPoses(Portions):
             return True
         return run + 1 < len(begins) and int(stamp[-1] - stamp[begins[run + 1]]) > LONGEST_HOLD
 
-    def _is_stale(self, stamp: IntArray, pose: Array, begins: IntArray, run: int, quantum: float) -> bool:
+    def _is_stale(self, stamp: IntArray, pose: Array, begins: IntArray, run: int, values: Array) -> bool:
         """Whether the body moved on during a run: the change after it is too large for one interval."""
         if run + 2 >= len(begins):
             return False
         begin, now, later = (int(at) for at in begins[run : run + 3])
         change = float(np.linalg.norm(pose[now] - pose[begin]))
         rests = int(stamp[later - 1] - stamp[now]) > LONGEST_HOLD
-        after = (
-            0.0 if rests else float(np.linalg.norm(pose[later] - pose[now])) / int(stamp[later] - stamp[now])
-        )  # m/ns
-        if change > CONTINUES * after * int(stamp[now] - stamp[begin]):
+        after = 0.0 if rests else _speed(stamp, pose, now, later)
+        if change <= HARMLESS or change > CONTINUES * after * int(stamp[now] - stamp[begin]):
             return False
-        one = MARGIN * max(after, self._speed_before(stamp, pose, begins, run)) * int(stamp[now] - stamp[now - 1])
-        return change > HARMLESS + MARGIN * quantum + one
+        before = _speed(stamp, pose, int(begins[run - 1]), begin) if run else 0.0
+        one = MARGIN * max(after, before) * int(stamp[now] - stamp[now - 1])
+        return change > HARMLESS + MARGIN * float(values[now, -1]) + one
 
-    def _speed_before(self, stamp: IntArray, pose: Array, begins: IntArray, run: int) -> float:
-        """From the pose before that of a run to it, m/ns; 0 for the first."""
-        if run:
-            last, since = pose[begins[run - 1]], int(stamp[begins[run - 1]])
-        elif self._pose is not None:
-            last, since = self._pose, int(self._before[-1])
-        else:
-            return 0.0
-        return float(np.linalg.norm(pose[begins[run]] - last)) / int(stamp[begins[run]] - since)
 
-    def _forget(self, samples: OrderedSamples, pose: Array, begins: IntArray, decided: int) -> None:
-        """Keep the samples that wait, and the first and the last one before them that have the same pose."""
-        if not len(pose):
-            return
-        run = int(np.searchsorted(begins, max(decided - 1, 0), side="right")) - 1
-        begin = int(begins[run])
-        if run:
-            self._pose = pose[begins[run - 1]]
-        self._before = np.concatenate([self._before, samples.stamp[begins[:run]]])[-USUAL:]
-        rows = np.unique([begin, decided - 1, *range(decided, len(pose))])
-        self._keep(samples, rows, int(np.sum(rows < decided)))
+def _speed(stamp: IntArray, pose: Array, first: int, last: int) -> float:
+    """From one row of poses (n, k) to another, m/ns."""
+    return float(np.linalg.norm(pose[last] - pose[first])) / int(stamp[last] - stamp[first])
 
 
 # --- poses continued on a line ----------------------------------------------------------------------------------------
@@ -145,12 +128,14 @@ class HeldPoses(Portions):
 class ContinuedPoses(Portions):
     """Takes the samples of one stream in order and returns them without continued ones.
 
-    A sample waits for the next one, those on a line for its end. The result does not depend on the portions.
+    A sample waits for the next one, those on a line for its end. The result does not depend on the portions. lost:
+    number of continued samples; runs: of lines that they are on.
     """
 
     def __init__(self, angle: int | None) -> None:
         """Of a stream whose last column is the resolution, m; angle: index of one with an unwrapped heading, rad."""
         super().__init__()
+        self.lost = self.runs = 0
         self._angle = angle
 
     def take(self, new: OrderedSamples, final: bool = False) -> OrderedSamples:
@@ -160,15 +145,11 @@ class ContinuedPoses(Portions):
         lost, decided = _judged(samples.stamp, pose, samples.values[:, -1], first)
         decided = len(lost) if final else max(decided, first)
         rows = np.arange(first, decided)
+        self.lost += int(np.sum(lost[rows]))
+        self.runs += int(np.sum(np.diff(lost[rows], prepend=False) & lost[rows]))
         kept = max(decided - JUDGING, 0)
         self._keep(samples, slice(kept, None), decided - kept)
         return taken(samples, rows[~lost[rows]])
-
-
-def continued(stream: PoseStream, angle: bool) -> BoolArray:
-    """Which poses (n,) of a stream are continued, not measured; angle: whether its headings count."""
-    pose = np.column_stack([stream.x, stream.y, *([LEVER * np.unwrap(stream.heading)] if angle else [])])
-    return _judged(stream.stamp, pose, np.max(Resolution(pose.shape[1]).take(pose), axis=1, initial=0.0), 0)[0]
 
 
 def _judged(stamp: IntArray, pose: Array, quantum: Array, first: int) -> tuple[BoolArray, int]:
