@@ -204,7 +204,7 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
     if decoder.headless:
         label = _label(bag, decoder.of("pusher").source)
         notes.add(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
-    one, other = ({frame.strip("/") for frame in decoder.of(name).named} - {""} for name in POSES)
+    one, other = (decoder.of(name).named - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
         both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
         notes.add(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
@@ -277,7 +277,7 @@ def _option_error(bag: Bag, key: str, value: str, problem: str) -> RecordingErro
 def _unexpected_frame(bag: Bag, decoder: StreamDecoder, label: str) -> list[str]:
     """A note on a wrench in a frame that is not that of the poses, none if the axes were given or are the poses'."""
     world = decoder.world or WORLD
-    others = sorted({frame.strip("/") for frame in decoder.wrench.messages.named} - {world, *decoder.named})
+    others = sorted(decoder.wrench.messages.named - {world, *decoder.named})
     if not others or decoder.topics.wrench_frame:
         return []
     has_tf = any(kind in TF_TYPES for kind in bag.topics.values())
