@@ -102,14 +102,19 @@ SCALAR_TARGET = Target("", 1, NUMBERS, SCALAR_FIELDS, "number")
 
 @dataclass(frozen=True)
 class Source:
-    """A stream as it was named. key: of NAME.recording.yaml or a parameter; option: of the command line, '' for none.
+    """A stream as it was named, or another text that says how to read it.
 
-    text: as given; topic, field (after the first dot) and frame (after the colon) are its parts.
+    key: of NAME.recording.yaml, and of a parameter. text: as given; topic, field (after the first dot) and frame (after
+    the colon) are its parts.
     """
 
     key: str
-    option: str
     text: str
+
+    @property
+    def option(self) -> str:
+        """The option of the command line, which names one topic at a time."""
+        return f"--{self.key.replace('topics', 'topic').replace('_', '-')}"
 
     @property
     def topic(self) -> str:
