@@ -23,7 +23,7 @@ from push_predictor.recordings.decoder.rules import (
     OTHER_CLOCK,
     UNREADABLE,
 )
-from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, sources_of
+from push_predictor.recordings.decoder.sources import COVARIATE, POSES, STATIC, STREAMS, scalar_source, sources_of
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.sources import POSE_TARGET, SCALAR_FIELDS, TF_TYPES, Source
@@ -137,15 +137,11 @@ def _declared(bag: Bag, topics: Topics, decoder: StreamDecoder, notes: Notes) ->
     for source in further:
         decoder.scalars[name_of(source)].declare(bag.topics[bag.spelled(source.topic)], bag.schemas, bag.path)
     for topic, kind in bag.topics.items():  # the others that contain one number
-        if kind in SCALAR_FIELDS and name_of(_scalar_source(topic)) not in decoder.scalars:
-            decoder.add_scalar(_scalar_source(topic)).declare(kind, bag.schemas, bag.path)
+        if kind in SCALAR_FIELDS and name_of(scalar_source(topic)) not in decoder.scalars:
+            decoder.add_scalar(scalar_source(topic)).declare(kind, bag.schemas, bag.path)
             read.add(topic)
     both = {name for topic in decoder.tf for name in (bag.spelled(topic), bag.spelled(topic) + STATIC)}
     return read | {name for name in both if bag.topics.get(name) in TF_TYPES}
-
-
-def _scalar_source(topic: str) -> Source:
-    return Source("covariate_topics", "--covariate-topic", topic)
 
 
 def _kind(bag: Bag, name: str, source: Source, given: bool) -> str:
@@ -196,7 +192,7 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
             turned = f"; the frame of the poses is turned into world_frame {world!r} (option --world-frame)"
             frames = frozenset() if decoder.topics.world else own.named - {world}
         elif own.lacks_world and decoder.topics.world:
-            raise _option_error(bag, "world_frame", world, problem)
+            raise Source("world_frame", world).error(bag.path, problem)
         if problem:
             raise own.source.error(bag.path, problem + turned)
         _note_rejected(notes, label, own.rejected, own.foreign)
@@ -205,7 +201,7 @@ def _note_poses(bag: Bag, decoder: StreamDecoder, notes: Notes) -> None:
     if decoder.headless:
         label = _label(bag, decoder.of("pusher").source)
         notes.add(f"{label}: {decoder.headless} samples have no orientation; heading 0 is used")
-    one, other = ({frame.strip("/") for frame in decoder.of(name).named} - {""} for name in POSES)
+    one, other = (decoder.of(name).named - {""} for name in POSES)
     if one != other and one and other and not decoder.topics.world:
         both = " and ".join(", ".join(map(repr, sorted(each))) for each in (one, other))
         notes.add(f"slider and tip are given in different frames, {both}; --world-frame turns both into one by tf")
@@ -243,42 +239,38 @@ def _wrench(bag: Bag, decoder: StreamDecoder, found: WrenchStream, notes: Notes)
     if wrench.bias is not None:
         if wrench.bias.estimate is None:
             problem = wrench.bias.problem or "there is no wrench"
-            raise _option_error(bag, "wrench_bias", topics.wrench_bias, f"{problem}, or give {NO_BIAS}")
+            raise Source("wrench_bias", topics.wrench_bias).error(bag.path, f"{problem}, or give {NO_BIAS}")
         notes.add(f"{label}: subtracted {wrench.bias.estimate.to_text()}")
     return found
 
 
 def _turned(bag: Bag, wrench: WrenchInput, label: str, decoder: StreamDecoder) -> list[str]:
     """Notes on a wrench whose axes are turned. Raises RecordingError if they cannot be."""
-    topics, tip = decoder.topics, _label(bag, decoder.of("pusher").source)
+    given, tip = Source("wrench_frame", decoder.topics.wrench_frame), _label(bag, decoder.of("pusher").source)
     found = [f"the axes of the wrench are turned with the tip ({tip})"]
     if wrench.frame:
         if not any(kind in TF_TYPES for kind in bag.topics.values()):
             problem = f"the bag has no /tf; give {TIP_AXES} or {WORLD_AXES}, or record /tf and /tf_static"
-            raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+            raise given.error(bag.path, problem)
         if wrench.problem:
             problem = f"{wrench.problem}; {TIP_AXES} and {WORLD_AXES} are accepted as well"
-            raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+            raise given.error(bag.path, problem)
         into = wrench.turned_into
         found = [
             f"the axes of the wrench are turned from {wrench.frame!r} to {into!r} by tf, its torque is moved to the tip"
         ]
     elif not wrench.oriented:
         problem = f"the poses of {tip} have no orientation; give {WORLD_AXES} or a frame in /tf"
-        raise _option_error(bag, "wrench_frame", topics.wrench_frame, problem)
+        raise given.error(bag.path, problem)
     if without := wrench.without_pose:
         found.append(f"{label}: {without} samples outside the time, or in a dropout, of their frame; discarded")
     return found
 
 
-def _option_error(bag: Bag, key: str, value: str, problem: str) -> RecordingError:
-    return RecordingError(f"{bag.path}: {key} {value!r} (option --{key.replace('_', '-')}): {problem}")
-
-
 def _unexpected_frame(bag: Bag, decoder: StreamDecoder, label: str) -> list[str]:
     """A note on a wrench in a frame that is not that of the poses, none if the axes were given or are the poses'."""
     world = decoder.world or WORLD
-    others = sorted({frame.strip("/") for frame in decoder.wrench.messages.named} - {world, *decoder.named})
+    others = sorted(decoder.wrench.messages.named - {world, *decoder.named})
     if not others or decoder.topics.wrench_frame:
         return []
     has_tf = any(kind in TF_TYPES for kind in bag.topics.values())

@@ -9,14 +9,15 @@ import csv
 import gzip
 import io
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from push_predictor.errors import TableError
+from push_predictor.errors import PushPredictorError, TableError
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.reader import is_bag_file
-from push_predictor.recordings.bag.spreadsheet import ERRORS, cells_of
+from push_predictor.recordings.bag.spreadsheet import Sheet, read_sheet
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table import COLUMNS, INPUTS, OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray, TextArray
@@ -37,16 +38,14 @@ def read_table(path: Path) -> PushTable:
     A further column of numbers becomes a covariate (an empty cell is NaN, unknown); a column of text is ignored.
     Raises TableError that names file, line, column, value and what is accepted.
     """
-    path = Path(path)
-    columns, lines = read_cells(path, COLUMNS)
-    numbers = {name: finite_column(path, name, columns[name], lines) for name in NUMBERS}
-    others = [name for name in columns if name not in COLUMNS]
-    covariates = {name: _covariate(path, name, columns[name], lines) for name in others}
+    sheet = sheet_of(Path(path), COLUMNS, TableError)
+    numbers = {name: finite_column(sheet, name) for name in NUMBERS}
+    covariates = {name: _covariate(sheet, place) for place, name in enumerate(sheet.header) if name not in COLUMNS}
     return PushTable(
         inputs=np.stack([numbers[name] for name in INPUTS], axis=1),
         duration=numbers["duration"],
         outcomes=np.stack([numbers[name] for name in OUTPUTS], axis=1),
-        push_id=_push_ids(path, columns["push_id"], lines),
+        push_id=_push_ids(sheet),
         covariates={name: column for name, column in covariates.items() if column is not None},
     )
 
@@ -86,63 +85,39 @@ def rig_of_table(path: Path) -> Rig | None:
     return load_rig(file) if (file := rig_path(path)).exists() else None
 
 
-def read_cells(path: Path, required: Sequence[str]) -> tuple[dict[str, tuple[str, ...]], list[int]]:
-    """The cells of each column of a CSV by its name, and the line number of each row. Raises TableError."""
-    try:
-        data = path.read_bytes()
-        found = cells_of(gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data)
-    except (*ERRORS, EOFError) as error:
-        raise TableError(f"{path}: cannot be read as CSV ({error})") from None
-    if len(found) < 2:
-        raise TableError(f"{path}: contains no rows, give a header with {', '.join(required)} and one row per push")
+def sheet_of(path: Path, required: Sequence[str], error: type[PushPredictorError]) -> Sheet:
+    """A CSV that has at least these columns, each once, in any case. Raises `error`."""
+    sheet = read_sheet(path, error)
     lower = {name.lower(): name for name in required}
-    header = [lower.get(name.lower(), name) for name in found[0][1]]
+    header = [lower.get(name.lower(), name) for name in sheet.header]
     if len(set(header)) != len(header):
-        raise TableError(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")
+        raise error(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")
     if missing := [name for name in required if name not in header]:
-        raise TableError(f"{path} line 1: lacks column {', '.join(missing)}, it has {', '.join(header)!r}")
-    for line, row in found[1:]:
-        if len(row) != len(header):
-            raise TableError(f"{path} line {line}: {len(row)} cells, the header has {len(header)}")
-    lines, rows = zip(*found[1:], strict=True)
-    return dict(zip(header, zip(*rows, strict=True), strict=True)), list(lines)
+        raise error(f"{path} line 1: lacks column {', '.join(missing)}, it has {', '.join(header)!r}")
+    return replace(sheet, header=header)
 
 
-def finite_column(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array:
-    """The numbers (n,) of a column. Raises TableError with the line of one that is not accepted."""
+def finite_column(sheet: Sheet, name: str) -> Array:
+    """The numbers (n,) of a column. Raises an error with the line of one that is not accepted."""
     accepted, test = ACCEPTED.get(name, ("a finite number", np.isfinite))
-    values = np.array([_number(cell) for cell in cells])
+    place = sheet.header.index(name)
+    values, _ = sheet.parsed(place)
     with np.errstate(invalid="ignore"):
         wrong = np.flatnonzero(~(np.isfinite(values) & test(values)))
     if len(wrong):
-        raise _wrong(path, lines[wrong[0]], name, cells[wrong[0]], accepted)
+        raise sheet.wrong(int(wrong[0]), place, accepted)
     return values
 
 
-def _covariate(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Array | None:
-    values = np.array([_number(cell) for cell in cells])
-    words = [i for i, cell in enumerate(cells) if cell and np.isnan(values[i]) and cell.lower() != "nan"]
-    given = sum(1 for cell in cells if cell)
-    if len(words) == given:
-        return None
-    if words:
-        raise _wrong(path, lines[words[0]], name, cells[words[0]], "a number, or leave it empty")
-    return values
+def _covariate(sheet: Sheet, place: int) -> Array | None:
+    """The numbers (n,) of a column, None if it contains only text."""
+    _, words = sheet.parsed(place)
+    return None if len(words) == sum(map(bool, sheet.cells(place))) else sheet.numbers(place)
 
 
-def _push_ids(path: Path, cells: Sequence[str], lines: Sequence[int]) -> TextArray:
-    for line, cell in zip(lines, cells, strict=True):
-        if not cell:
-            raise _wrong(path, line, "push_id", cell, "a name, the same for all windows of one push")
+def _push_ids(sheet: Sheet) -> TextArray:
+    place = sheet.header.index("push_id")
+    cells = sheet.cells(place)
+    if "" in cells:
+        raise sheet.wrong(cells.index(""), place, "a name, the same for all windows of one push")
     return np.array(cells, dtype=np.str_)
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return float("nan")
-
-
-def _wrong(path: Path, line: int, column: str, value: str, accepted: str) -> TableError:
-    return TableError(f"{path} line {line}: column {column} is {value!r}, give {accepted}")

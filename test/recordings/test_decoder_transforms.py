@@ -36,7 +36,7 @@ def original() -> Recording:
 
 def pose_frame(world: str = "", name: str = "tip", tf: TransformBuffer | None = None) -> PoseFrame:
     """The poses of a frame in a buffer of its own, or in a given one."""
-    return PoseFrame(Source("pusher_topic", "", f"/tf:{name}"), PUSHER, TransformBuffer(world) if tf is None else tf)
+    return PoseFrame(Source("pusher_topic", f"/tf:{name}"), PUSHER, TransformBuffer(world) if tf is None else tf)
 
 
 def put(buffer: TransformBuffer, messages: list[Message]) -> None:

@@ -146,8 +146,8 @@ def test_the_steps_of_a_path_keep_dots_in_brackets() -> None:
     assert [step.chooses for step in steps_of("a.b[x].f[3]")] == [False, True, False]
     for wrong in ("", "a.", ".a", "a..b", "a[b", "a]b", "a[b]c"):
         assert steps_of(wrong) == []
-    assert Source("", "", "/t.b[x:y.z].pose").field == "b[x:y.z].pose" and not Source("", "", "/t.b[x:y]").frame
-    assert Source("", "", "/tf:a.b").frame == "a.b" and not Source("", "", "/tf:a.b").field
+    assert Source("", "/t.b[x:y.z].pose").field == "b[x:y.z].pose" and not Source("", "/t.b[x:y]").frame
+    assert Source("", "/tf:a.b").frame == "a.b" and not Source("", "/tf:a.b").field
 
 
 def test_the_type_of_an_array_has_its_length() -> None:
@@ -261,7 +261,7 @@ def test_a_robots_matrix_gives_the_poses_of_the_tip(tmp_path: Path, field: str, 
 
 @pytest.mark.parametrize("field", ["joints", "position", "rotation+turn", "square+position", "position+turn+any", ""])
 def test_numbers_that_are_no_pose_are_refused_with_those_that_can_be(field: str) -> None:
-    source, lab = Source("pusher_topic", "--pusher-topic", f"/arm.{field}" if field else "/arm"), Lab(TYPES)
+    source, lab = Source("pusher_topic", f"/arm.{field}" if field else "/arm"), Lab(TYPES)
     with pytest.raises(RecordingError, match=r"give one of its fields: /arm.square, /arm.flat$"):
         field_to_read(source, ARM, POSE_TARGET, {ARM: lab.definition(ARM)}, "")
 

@@ -26,7 +26,7 @@ from push_predictor.recordings.checks.check import checked_data
 from push_predictor.recordings.decoder.decoder import StreamDecoder
 from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.fields.sources import POSE_TARGET, TF_TYPES, FieldReader, definitions_of
-from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_tree
+from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_edges
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
@@ -231,7 +231,7 @@ def test_an_error_names_option_value_and_what_the_bag_contains(tmp_path: Path, t
 def test_random_bytes_are_no_message_and_no_exception(data: bytes) -> None:
     for message in (data, b"\0\1\0\0" + data):
         input_of(StreamDecoder(Topics()).inputs()["slider"], "nav_msgs/msg/Odometry", message).take()
-        read_tree([(Messages.of("/tf", TF_TYPES[0], [0], [message]), False)])
+        read_edges([Messages.of("/tf", TF_TYPES[0], [0], [message])], static=False)
 
 
 def test_a_type_that_contains_itself_has_no_readable_message() -> None:

@@ -100,7 +100,7 @@ def test_invalid_value_is_rejected_by_name(tmp_path: Path, column: str, value: s
     [
         (f"{HEADER}\n{GOOD}\n0.02,0.25\n", "line 3: 2 cells, the header has 8"),
         (f"{HEADER}\n{GOOD},5\n", "line 2: 9 cells, the header has 8"),
-        (f"velocity,contact\n{GOOD}\n", "line 1: lacks column angle, duration, dx, dy, dtheta, push_id"),
+        ("velocity,contact\n0.02,0.25\n", "line 1: lacks column angle, duration, dx, dy, dtheta, push_id"),
         (f"{HEADER},dx\n{GOOD},1\n", "line 1: a column occurs twice"),
         (f"{HEADER}\n", "contains no rows"),
         ("", "contains no rows"),

@@ -85,7 +85,7 @@ def test_one_message_in_ten_may_be_of_a_lost_body() -> None:
 
 def test_a_field_or_a_frame_decides_which_types_are_tried() -> None:
     def of(text: str, target: object = POSE_TARGET) -> list[str]:
-        return candidates(Source("slider_topic", "", text), target)  # type: ignore[arg-type]
+        return candidates(Source("slider_topic", text), target)  # type: ignore[arg-type]
 
     assert of("/tf:block") == ["tf2_msgs/msg/TFMessage"]
     assert of("/a") == list(POSE_TARGET.known)

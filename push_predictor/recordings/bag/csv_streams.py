@@ -15,8 +15,8 @@ import numpy as np
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.message_types import POSE, WRENCH
-from push_predictor.recordings.bag.messages import BagFile, Notes, RawMessage, encode
-from push_predictor.recordings.bag.spreadsheet import ERRORS, Column, cells_of, column_of
+from push_predictor.recordings.bag.messages import BagFile, RawMessage, encode
+from push_predictor.recordings.bag.spreadsheet import Column, Sheet, column_of, read_sheet, with_point
 from push_predictor.types import Array, IntArray
 
 QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -46,22 +46,54 @@ class CsvStreams(BagFile):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
+        self._messages: dict[str, list[RawMessage]] = {}
         for file in _files(folder):
-            if file.suffix.lower() == ".csv" or file.stem.lower() in STREAMS or _parquet_is_read():
-                self._streams |= _streams(file, self.notes)
+            if file.suffix.lower() == ".csv":
+                self._read(read_sheet(file, RecordingError))
+            elif file.stem.lower() in STREAMS or _parquet_is_read():
+                self._read(_parquet_sheet(file))
             else:
                 self.notes.add(f"{file.name} is ignored; {PARQUET}")
-        self.topics = {topic: kind for topic, (kind, _, _) in self._streams.items()}
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """See BagFile; in order of time, those of a topic in its file's order."""
-        wanted = [topic for topic in self._streams if topics is None or topic in topics]
-        return merge(*map(self._of_topic, wanted), key=lambda message: message.log_time)
+        wanted = [found for topic, found in self._messages.items() if topics is None or topic in topics]
+        return merge(*wanted, key=lambda message: message.log_time)
 
-    def _of_topic(self, topic: str) -> Iterator[RawMessage]:
-        kind, stamp, data = self._streams[topic]
-        return (RawMessage(topic, kind, time, message) for time, message in zip(stamp.tolist(), data, strict=True))
+    def _read(self, sheet: Sheet) -> None:
+        try:
+            columns = [column_of(text) for text in sheet.header]
+        except ValueError as error:
+            raise RecordingError(f"{sheet.path} line 1: {error}") from None
+        if (stream := sheet.path.stem.lower()) in STREAMS:
+            topic, accepted = STREAMS[stream]
+            self._add(topic, *self._stream(sheet, columns, accepted))
+            return
+        if columns[0].name != "time" or len(columns) < 2:
+            raise _refused(sheet, "time and further columns")
+        stamp = _stamps(sheet, 0, columns[0])
+        for place, name in enumerate(sheet.header[1:], start=1):
+            self._add(f"/{sheet.path.stem}/{name}", SCALAR, stamp, sheet.numbers(place)[:, None])
+
+    def _stream(
+        self, sheet: Sheet, columns: Sequence[Column], accepted: Sequence[Sequence[str]]
+    ) -> tuple[str, IntArray, Array]:
+        """Message type, stamps (n,) in ns and numbers (n, 6 or 7) of a stream with one of these headers."""
+        given = sorted(column.name for column in columns)
+        names = next((names for names in accepted if sorted(names) == given), None)
+        if names is None:
+            raise _refused(sheet, " or ".join(repr(",".join(names)) for names in accepted))
+        if converted := [f"{column.name} in {column.unit}" for column in columns if column.factor != 1]:
+            self.notes.add(f"{sheet.path.name}: {', '.join(converted)} is converted to SI units")
+        time, *others = (next(k for k, column in enumerate(columns) if column.name == name) for name in names)
+        stamp = _stamps(sheet, time, columns[time])
+        values = np.column_stack([sheet.numbers(place) * float(columns[place].factor) for place in others])
+        return (POSE if names in (QUATERNION, HEADING) else WRENCH).name, stamp, _spatial(names, values)
+
+    def _add(self, topic: str, kind: str, stamp: IntArray, values: Array) -> None:
+        messages = zip(stamp.tolist(), encode(stamp, values), strict=True)
+        self.topics[topic] = kind
+        self._messages[topic] = [RawMessage(topic, kind, time, data) for time, data in messages]
 
 
 def is_csv_recording(folder: Path) -> bool:
@@ -84,74 +116,8 @@ def _parquet_is_read() -> bool:
     return True
 
 
-def _streams(file: Path, notes: Notes) -> dict[str, tuple[str, IntArray, list[bytes]]]:
-    header, rows = _cells(file)
-    columns = _columns(file, header)
-    if (stream := file.stem.lower()) not in STREAMS:
-        if columns[0].name != "time" or len(header) < 2:
-            raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
-        stamp, values = _numbers(file, header, rows, columns[0].factor)
-        scalars = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
-        return {name: (SCALAR, stamp, encode(stamp, column[:, None])) for name, column in scalars.items()}
-    topic, accepted = STREAMS[stream]
-    by_name = {column.name: place for place, column in enumerate(columns)}
-    names = next((names for names in accepted if {*names} == {*by_name} and len(names) == len(columns)), None)
-    if names is None:
-        choice = " or ".join(repr(",".join(names)) for names in accepted)
-        raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give {choice}")
-    order = [by_name[name] for name in names]
-    _note_units(file, columns, notes)
-    factors = [columns[place].factor for place in order]
-    in_order = [(line, [row[place] for place in order]) for line, row in rows]
-    stamp, values = _numbers(file, [header[place] for place in order], in_order, factors[0])
-    kind, spatial = _as_message(names, values * np.array(factors[1:], np.float64))
-    return {topic: (kind, stamp, encode(stamp, spatial))}
-
-
-def _columns(file: Path, header: Sequence[str]) -> list[Column]:
-    try:
-        return [column_of(text) for text in header]
-    except ValueError as error:
-        raise RecordingError(f"{file} line 1: {error}") from None
-
-
-def _note_units(file: Path, columns: Sequence[Column], notes: Notes) -> None:
-    """Note the columns that are converted to SI units."""
-    if converted := [f"{column.name} in {column.unit}" for column in columns if column.factor != 1]:
-        notes.add(f"{file.name}: {', '.join(converted)} is converted to SI units")
-
-
-def _as_message(header: Sequence[str], values: Array) -> tuple[str, Array]:
-    """(message type, its numbers (n, 6 or 7)) of a stream's columns without the time."""
-    none = np.zeros(len(values))
-    if header == HEADING:
-        z, w = quaternion_of_yaw(values[:, 3])
-        values = np.column_stack([values[:, :3], none, none, z, w])
-    if header == PLANAR:
-        values = np.column_stack([values[:, :2], none, none, none, values[:, 2]])
-    return (POSE if header in (QUATERNION, HEADING) else WRENCH).name, values
-
-
-def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
-    """The header, and the rows with their line numbers."""
-    if file.suffix.lower() == ".parquet":
-        return _parquet_cells(file)
-    try:
-        found = cells_of(file.read_bytes())
-    except ERRORS as error:
-        raise RecordingError(f"{file}: cannot be read as CSV ({error})") from None
-    if len(found) < 2:
-        raise RecordingError(f"{file}: contains no rows, give a header and one row for each sample")
-    header = tuple(found[0][1])
-    for line, row in found[1:]:
-        if len(row) != len(header):
-            many = "; numbers with a decimal comma need semicolons between the cells" if len(row) > len(header) else ""
-            raise RecordingError(f"{file} line {line}: {len(row)} cells, the header has {len(header)}{many}")
-    return header, found[1:]
-
-
-def _parquet_cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
-    """The same of a Parquet file, with the line numbers that it would have as CSV."""
+def _parquet_sheet(file: Path) -> Sheet:
+    """The cells of a Parquet file, with the line numbers that it would have as CSV."""
     try:
         from pyarrow import parquet
     except ImportError:
@@ -163,40 +129,32 @@ def _parquet_cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[st
         raise RecordingError(f"{file}: cannot be read as Parquet ({' '.join(str(error).split())})") from None
     if not table.num_rows:
         raise RecordingError(f"{file}: contains no rows, give one row for each sample")
-    cells = (["" if cell is None else str(cell) for cell in row] for row in zip(*columns, strict=True))
-    return tuple(table.column_names), list(enumerate(cells, start=2))
+    cells = [["" if cell is None else str(cell) for cell in row] for row in zip(*columns, strict=True)]
+    return Sheet(file, table.column_names, cells, range(2, len(cells) + 2), RecordingError)
 
 
-def _numbers(
-    file: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], seconds: Decimal
-) -> tuple[IntArray, Array]:
-    """Stamps (n,) in ns and the other columns (n, k); an empty cell is NaN. seconds: unit of the time."""
-    stamp, values = np.zeros(len(rows), np.int64), np.zeros((len(rows), len(header) - 1))
-    for place, (line, row) in enumerate(rows):
-        stamp[place] = _stamp(file, line, row[0], seconds)
-        for column, cell in enumerate(row[1:]):
-            try:
-                values[place, column] = float(cell or "nan")
-            except ValueError:
-                accepted = f"a number{_with_point(cell)}, or leave it empty"
-                raise RecordingError(
-                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give {accepted}"
-                ) from None
-    return stamp, values
+def _refused(sheet: Sheet, accepted: str) -> RecordingError:
+    return RecordingError(f"{sheet.path} line 1: the header is {','.join(sheet.header)!r}, give {accepted}")
 
 
-def _stamp(file: Path, line: int, cell: str, seconds: Decimal) -> int:
-    """A time in ns. A float has no room for the nanoseconds of a date, a decimal has."""
-    try:
-        found = (Decimal(cell) * seconds).scaleb(9)
-    except InvalidOperation:
-        found = Decimal("nan")
-    if not found.is_finite() or not 0 <= found < _LATEST:
-        accepted = f"s from 0 to {_LATEST // 10**9}{_with_point(cell)}"
-        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give {accepted}")
-    return round(found)
+def _spatial(names: Sequence[str], values: Array) -> Array:
+    """The numbers (n, 6 or 7) of a message from those of a stream's columns without the time."""
+    none = np.zeros(len(values))
+    if names == HEADING:
+        z, w = quaternion_of_yaw(values[:, 3])
+        return np.column_stack([values[:, :3], none, none, z, w])
+    return np.column_stack([values[:, :2], none, none, none, values[:, 2]]) if names == PLANAR else values
 
 
-def _with_point(cell: str) -> str:
-    """What a number with a comma lacks, in a file that has decimal points as well."""
-    return " with a decimal point" if "," in cell else ""
+def _stamps(sheet: Sheet, place: int, column: Column) -> IntArray:
+    """Times (n,) in ns. A float has no room for the nanoseconds of a date, a decimal has."""
+    stamp = np.zeros(len(sheet.rows), np.int64)
+    for row, cell in enumerate(sheet.cells(place)):
+        try:
+            found = (Decimal(cell) * column.factor).scaleb(9)
+        except InvalidOperation:
+            found = Decimal("nan")
+        if not found.is_finite() or not 0 <= found < _LATEST:
+            raise sheet.wrong(row, place, f"s from 0 to {_LATEST // 10**9}{with_point(cell)}")
+        stamp[row] = round(found)
+    return stamp

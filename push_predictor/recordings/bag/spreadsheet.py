@@ -10,13 +10,24 @@ from __future__ import annotations
 
 import codecs
 import csv
+import gzip
 import io
 import math
 import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
 from decimal import Decimal
+from pathlib import Path
 from typing import NamedTuple
 
-ERRORS = (OSError, ValueError, csv.Error)  # ValueError: also of text that cannot be decoded
+import numpy as np
+
+from push_predictor.errors import PushPredictorError
+from push_predictor.types import Array
+
+_ERRORS = (OSError, EOFError, zlib.error, ValueError, csv.Error)  # ValueError: also of text that cannot be decoded
+_GZIP = b"\x1f\x8b"
 _SEPARATORS = (",", ";", "\t")
 _MARKED = re.compile(r"sep=(.)\s*")  # Excel's first line
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
@@ -41,8 +52,72 @@ _NAMED = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 Rows = list[tuple[int, list[str]]]
 
 
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The cells of a file: header (k,), rows with k cells each, and their line numbers.
+
+    error: the class of what is raised for cells that are not accepted; it names file and line.
+    """
+
+    path: Path
+    header: list[str]
+    rows: Sequence[Sequence[str]]
+    lines: Sequence[int]
+    error: type[PushPredictorError]
+
+    def cells(self, column: int) -> list[str]:
+        """The cells of a column."""
+        return [row[column] for row in self.rows]
+
+    def wrong(self, row: int, column: int, accepted: str) -> PushPredictorError:
+        """The error for a cell."""
+        name, cell = self.header[column], self.rows[row][column]
+        return self.error(f"{self.path} line {self.lines[row]}: column {name} is {cell!r}, give {accepted}")
+
+    def parsed(self, column: int) -> tuple[Array, list[int]]:
+        """The numbers (n,) in a column, NaN for an empty cell; and the rows that contain a text instead."""
+        values, words = np.full(len(self.rows), np.nan), list[int]()
+        for row, cell in enumerate(self.cells(column)):
+            try:
+                values[row] = float(cell or "nan")
+            except ValueError:
+                words.append(row)
+        return values, words
+
+    def numbers(self, column: int) -> Array:
+        """The same of a column that contains only numbers. Raises `error`."""
+        values, words = self.parsed(column)
+        if words:
+            point = with_point(self.rows[words[0]][column])
+            raise self.wrong(words[0], column, f"a number{point}, or leave it empty")
+        return values
+
+
+def with_point(cell: str) -> str:
+    """What a number with a comma lacks, in a file that has decimal points as well."""
+    return " with a decimal point" if "," in cell else ""
+
+
+def read_sheet(path: Path, error: type[PushPredictorError]) -> Sheet:
+    """Read a CSV file, also one that gzip has compressed. Raises `error` unless it has a header and equal rows."""
+    try:
+        data = path.read_bytes()
+        found = cells_of(gzip.decompress(data) if data.startswith(_GZIP) else data)
+    except _ERRORS as reason:
+        raise error(f"{path}: cannot be read as CSV ({reason})") from None
+    if len(found) < 2:
+        raise error(f"{path}: contains no rows, give a header and one row for each sample or push")
+    (_, header), *others = found
+    for line, row in others:
+        if len(row) != len(header):
+            many = "; numbers with a decimal comma need semicolons between the cells" if len(row) > len(header) else ""
+            raise error(f"{path} line {line}: {len(row)} cells, the header has {len(header)}{many}")
+    lines, rows = zip(*others, strict=True)
+    return Sheet(path, header, rows, lines, error)
+
+
 def cells_of(data: bytes) -> Rows:
-    """The line number and the cells of each row, the header first. Raises one of ERRORS."""
+    """The line number and the cells of each row, the header first. Raises ValueError or csv.Error."""
     text = _decoded(data)
     separator, rows = _separator(text), Rows()
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)

@@ -70,6 +70,8 @@ class BiasSoFar:
         last: no more will come.
         """
         known_before = self.estimate is not None
+        if wrench.sensor is None:
+            wrench = replace(wrench, values=with_planar_numbers(wrench.values))
         if not self._final:
             self._keep(_Portion(wrench, slider, pusher))
         if (
@@ -83,8 +85,7 @@ class BiasSoFar:
         ready = wrench if known_before else joined([portion.wrench for portion in self._portions])
         if self._final:
             self._portions = []
-        values = with_planar_numbers(ready.values) if ready.sensor is None else ready.values
-        return replace(ready, values=self.estimate.subtracted_from(values, ready.sensor))
+        return replace(ready, values=self.estimate.subtracted_from(ready.values, ready.sensor))
 
     def _keep(self, portion: _Portion) -> None:
         before = next((each.slider for each in reversed(self._portions) if len(each.slider)), None)
@@ -102,10 +103,9 @@ class BiasSoFar:
         wrench = joined([portion.wrench for portion in self._portions])
         slider = joined([portion.slider for portion in self._portions])
         pusher = joined([portion.pusher for portion in self._portions])
-        values = with_planar_numbers(wrench.values) if wrench.sensor is None else wrench.values
         free = free_motion(rig, slider, pusher, wrench.stamp)
         try:
-            self.estimate, self.problem = estimate_bias(wrench.stamp, values, free, wrench.sensor), ""
+            self.estimate, self.problem = estimate_bias(wrench.stamp, wrench.values, free, wrench.sensor), ""
         except BiasError as error:
             self.problem = str(error)
         later = min(round(self._seen * LATER), self._seen + MOST // 10)

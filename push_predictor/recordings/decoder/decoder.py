@@ -33,7 +33,7 @@ from push_predictor.recordings.decoder.wrench import WrenchInput
 from push_predictor.recordings.fields.pose_rows import bodies_z_up, z_up
 from push_predictor.recordings.fields.sources import SCALAR_TARGET, TF_TYPES, Source
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
+from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream, taken
 from push_predictor.recordings.topics import Topics
 from push_predictor.types import Array, IntArray
 
@@ -153,7 +153,7 @@ class StreamDecoder:
         """The frames that the poses name, without a given world, into which they are turned."""
         if self.topics.world:
             return frozenset({self.topics.world})
-        return frozenset(name.strip("/") for stream in POSES for name in self.of(stream).named)
+        return frozenset(name for stream in POSES for name in self.of(stream).named)
 
 
 def key_of(topic: str) -> str:
@@ -185,5 +185,5 @@ def _scalar(each: TopicInput, span: tuple[int, int] | None) -> ScalarStream:
     columns = each.usable(SCALAR)
     if span is not None:
         far = (columns.stamp < span[0] - FAR) | (columns.stamp > span[1] + FAR)
-        columns = columns.rows(usable({OTHER_CLOCK: far}, each.rejected))
+        columns = taken(columns, usable({OTHER_CLOCK: far}, each.rejected))
     return ScalarStream(columns.stamp, columns.values[:, 0])

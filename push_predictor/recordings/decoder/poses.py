@@ -22,7 +22,7 @@ from push_predictor.recordings.fields.transforms import Edge, TransformError, Tr
 from push_predictor.recordings.topics import Topics
 from push_predictor.types import Array, IntArray
 
-Names: TypeAlias = NDArray[np.str_]
+Names: TypeAlias = NDArray[np.object_]
 SET_BACK = "clock set back"
 SETTLING = 1_000_000_000  # ns of all transforms of a frame that decide which of them gives the stamps
 WAIT = 2_000_000_000  # ns that a pose in another frame waits for its transform
@@ -43,7 +43,7 @@ class PoseTopic:
         self._name, self._rules, self._tf = name, rules, tf
         self._world = topics.world
         self._stamp, self._values = np.empty(0, np.int64), np.empty((0, 7))
-        self._frame: Names = np.empty(0, np.str_)
+        self._frame: Names = np.empty(0, np.object_)
 
     def __len__(self) -> int:
         return len(self.messages) + len(self._stamp)
@@ -53,7 +53,7 @@ class PoseTopic:
         columns = self.messages.usable(self._rules)
         if not self._world:
             return columns.stamp, columns.values
-        return self._turned(columns.stamp, columns.values, columns.frame_names(), last)
+        return self._turned(columns.stamp, columns.values, columns.frame, last)
 
     def _turned(self, stamp: IntArray, values: Array, frame: Names, last: bool) -> tuple[IntArray, Array]:
         """The poses in the world whose transforms have come; those after one that waits wait as well."""

@@ -57,9 +57,13 @@ def topics_to_record(given: Topics, with_wrench: bool = True) -> tuple[RecordedT
 def sources_of(given: Topics) -> list[tuple[str, Source]]:
     """(stream, its source) of slider, pusher, wrench and each covariate."""
     every = given.over(DEFAULT_TOPICS)
-    streams = [(name, Source(f"{name}_topic", f"--{name}-topic", getattr(every, name))) for name in STREAMS]
-    covariates = [Source("covariate_topics", "--covariate-topic", text) for text in every.covariates]
-    return streams + [(COVARIATE, source) for source in covariates]
+    streams = [(name, Source(f"{name}_topic", getattr(every, name))) for name in STREAMS]
+    return streams + [(COVARIATE, scalar_source(text)) for text in every.covariates]
+
+
+def scalar_source(text: str) -> Source:
+    """The source of a scalar."""
+    return Source("covariate_topics", text)
 
 
 def resolved(given: Topics, resolve: Callable[[str], str]) -> Topics:

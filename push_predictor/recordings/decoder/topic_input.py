@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -23,6 +23,7 @@ from push_predictor.recordings.fields.sources import (
     definitions_of,
     field_to_read,
 )
+from push_predictor.recordings.streams import joined, taken
 from push_predictor.types import IntArray
 
 _Part: TypeAlias = tuple[Messages | Columns, IntArray | None]  # and when they arrived, of a live topic
@@ -97,19 +98,20 @@ class TopicInput:
 
     def take(self) -> Columns:
         """The columns of the messages since the last call."""
-        return _joined([columns for columns, _ in self._decoded(taken=True)], self.target.count)
+        parts = [columns for columns, _ in self._decoded(last=True)]
+        return joined(parts or [Columns.unread(np.empty(0, np.int64), self.target.count)])
 
     def usable(self, rules: Rules) -> Columns:
         """Of `take` those that are readable, in the expected frame and break no rule; the others are rejected."""
         columns = self.take()
         faults = {NO_ELEMENT: columns.absent, UNREADABLE: ~columns.valid}
         if self.expected and self.timed:
-            faults[OTHER_FRAME] = columns.frame_names() != self.expected
-        return columns.rows(usable(faults | broken(columns.values, rules), self.rejected))
+            faults[OTHER_FRAME] = np.asarray(columns.frame != self.expected, np.bool_)
+        return taken(columns, usable(faults | broken(columns.values, rules), self.rejected))
 
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
         """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
-        decoded = self._decoded(taken=False)
+        decoded = self._decoded(last=False)
         with self._lock:
             self._waiting[:0] = decoded
             self._drop_oldest()
@@ -124,11 +126,11 @@ class TopicInput:
             old = len(self._waiting.pop(0)[0])
             self.dropped, self._count = self.dropped + old, self._count - old
 
-    def _decoded(self, taken: bool) -> list[tuple[Columns, IntArray | None]]:
-        """What waited, as columns; taken: it waits no longer."""
+    def _decoded(self, last: bool) -> list[tuple[Columns, IntArray | None]]:
+        """What waited, as columns; last: it waits no longer."""
         with self._lock:
             waiting, reader, self._waiting = self._waiting, self._reader, []
-            self._count = 0 if taken else self._count
+            self._count = 0 if last else self._count
         found: list[tuple[Columns, IntArray | None]] = []
         for part, arrived in waiting:
             if isinstance(part, Messages):
@@ -141,19 +143,3 @@ class TopicInput:
         while self._recent and sum(len(stamp) for stamp, _, _ in self._recent[1:]) >= RECENT:
             self._recent.pop(0)
         return found
-
-
-def _joined(parts: Sequence[Columns], count: int) -> Columns:
-    """Consecutive columns as one."""
-    if len(parts) == 1:
-        return parts[0]
-    frames = {"": 0}
-    number = [np.array([frames.setdefault(name, len(frames)) for name in part.frames]) for part in parts]
-    return Columns(
-        np.concatenate([np.empty(0, np.int64), *(part.stamp for part in parts)]),
-        np.concatenate([np.empty((0, count)), *(part.values for part in parts)]),
-        np.concatenate([np.empty(0, np.bool_), *(part.valid for part in parts)]),
-        np.concatenate([np.empty(0, np.int64), *(of[part.frame] for of, part in zip(number, parts, strict=True))]),
-        tuple(frames),
-        np.concatenate([np.empty(0, np.bool_), *(part.absent for part in parts)]),
-    )

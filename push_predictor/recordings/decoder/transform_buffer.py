@@ -13,7 +13,7 @@ import numpy as np
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.topic_input import LIMIT
 from push_predictor.recordings.dropouts import CLOCK_SET
-from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree, joined, read_tree
+from push_predictor.recordings.fields.transforms import Edge, TransformError, TransformTree, joined, read_edges
 from push_predictor.types import Array, BoolArray, IntArray
 
 KEPT = 5_000_000_000  # ns of samples that are kept after their pose was returned
@@ -130,17 +130,17 @@ class TransformBuffer:
             waiting, self._waiting = self._waiting, []
             self.read, self.unread = self.read + self.unread, 0
         for static in (True, False):
-            if not (portion := [each for each in waiting if each[1] is static]):
+            if not (portions := [messages for messages, of_static in waiting if of_static is static]):
                 continue
             self.problem = ""
             try:
-                found = read_tree(portion, self._from_log)
-                self.unreadable += found.unreadable
-                for child, edge in found.edges.items():
+                edges, unreadable = read_edges(portions, static, self._from_log)
+                self.unreadable += unreadable
+                for child, edge in edges.items():
                     self._add(child, edge)
             except TransformError as error:
                 self.problem = str(error)
-                self.dropped += sum(len(messages) for messages, _ in portion)
+                self.dropped += sum(map(len, portions))
 
     def _add(self, child: str, edge: Edge) -> None:
         if (history := self.histories.get(child)) is None:

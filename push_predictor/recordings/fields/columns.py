@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,26 +34,13 @@ _NUMBERS = {
 NUMBERS = frozenset(_NUMBERS)
 
 
-@dataclass
-class _Layout:
-    """Where fields of one message lie: numbers {path: (byte, type code)}, texts {path: (byte, length)}.
-
-    lengths: (byte, value) of every length that was read on the way.
-    """
-
-    numbers: dict[str, tuple[int, str]] = field(default_factory=dict)
-    texts: dict[str, tuple[int, int]] = field(default_factory=dict)
-    lengths: list[tuple[int, int]] = field(default_factory=list)
-
-
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Messages of the same layout: rows (n,) among those given; numbers and texts by field path, of n messages."""
+    """Messages of the same layout: rows (n,) among those given, and their bytes (n, length)."""
 
     rows: IntArray
-    order: str
     data: NDArray[np.uint8]
-    layout: _Layout
+    layout: Layout
 
     def paths(self, prefix: str) -> list[str]:
         """The paths of the numbers at a field or below it, in their order in the message."""
@@ -71,11 +58,11 @@ class Block:
             return np.column_stack([self.number(path) for path in paths])
         column = np.ascontiguousarray(self.data[:, at : at + size * len(paths)])
         with np.errstate(invalid="ignore"):  # widening a signalling NaN
-            return np.asarray(column.view(f"{self.order}{code}").astype(np.float64))
+            return np.asarray(column.view(f"{self.layout.order}{code}").astype(np.float64))
 
     def where(self, which: BoolArray) -> Block:
         """Some of the messages."""
-        return self if which.all() else Block(self.rows[which], self.order, self.data[which], self.layout)
+        return self if which.all() else Block(self.rows[which], self.data[which], self.layout)
 
     def raw_text(self, path: str) -> bytes:
         """The bytes of a text of the first message, with its closing zero."""
@@ -98,25 +85,25 @@ class BlockReader:
     def __init__(self, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]) -> None:
         self._type, self._definitions = short_name(type_name), definitions
         self._wanted = [re.split(r"[.\[]", path, maxsplit=1)[0] for path in wanted]
-        self._known: dict[int, tuple[str, _Layout]] = {}  # the last layout of messages of a length
+        self._known: dict[int, Layout] = {}  # the last one of messages of a length
 
     def blocks(self, messages: Messages) -> Iterator[Block]:
         """All readable messages; a message that is not readable is in no block."""
         for rows, data in messages.of_equal_length():
             while len(rows):
                 try:
-                    order, layout = self._layout(data[0])
+                    layout = self._layout(data[0])
                 except (ValueError, LookupError, RecursionError):  # also of a type that contains itself
                     rows, data = rows[1:], data[1:]
                     continue
-                same = _same(data, order, layout)
-                yield Block(rows[same], order, data[same], layout)
+                same = layout.fits(data)
+                yield Block(rows[same], data[same], layout)
                 rows, data = rows[~same], data[~same]
 
-    def _layout(self, message: NDArray[np.uint8]) -> tuple[str, _Layout]:
+    def _layout(self, message: NDArray[np.uint8]) -> Layout:
         known = self._known.get(len(message))
-        if known is None or not _same(message[None], *known)[0]:
-            known = _walked(message.tobytes(), self._type, self._definitions, self._wanted)[:2]
+        if known is None or not known.fits(message[None])[0]:
+            known = Layout(message.tobytes(), self._type, self._definitions, self._wanted)
             self._known[len(message)] = known
         return known
 
@@ -125,85 +112,81 @@ def whole_block(messages: Messages, definitions: Mapping[str, tuple[Field, ...]]
     """All fields of the first message, if it is exactly as long as its type; else None."""
     message, kind = messages.buffer[: int(messages.length[0])], short_name(messages.type)
     try:
-        order, layout, end = _walked(message, kind, definitions, [each.name for each in definitions[kind]])
+        layout = Layout(message, kind, definitions, [each.name for each in definitions[kind]])
     except (ValueError, LookupError, RecursionError):
         return None
-    if not 0 <= len(message) - end < _PADDING:
+    if not 0 <= len(message) - layout.end < _PADDING:
         return None
-    return Block(np.zeros(1, np.int64), order, np.frombuffer(message, np.uint8)[None], layout)
+    return Block(np.zeros(1, np.int64), np.frombuffer(message, np.uint8)[None], layout)
 
 
-def _same(data: NDArray[np.uint8], order: str, layout: _Layout) -> NDArray[np.bool_]:
-    """Which messages (n, length) have a layout."""
-    same = (data[:, 0] == 0) & (data[:, 1] == (order == "<"))
-    for at, value in layout.lengths:
-        same &= np.ascontiguousarray(data[:, at : at + 4]).view(f"{order}u4")[:, 0] == value
-    return np.asarray(same)
+class Layout:
+    """Where the fields of one message lie, up to the last wanted one, which ends at the byte `end`.
 
+    numbers {path: (byte, type code)}, texts {path: (byte, length)}, lengths: (byte, value) of every length on the way;
+    order: of the bytes. Raises ValueError or LookupError for a message that its type does not describe.
+    """
 
-def _walked(
-    message: bytes, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]
-) -> tuple[str, _Layout, int]:
-    """(byte order, layout, end) of one message up to the last wanted field. Raises ValueError or LookupError."""
-    if len(message) < _PREFIX or message[0] != 0 or message[1] not in (0, 1):
-        raise ValueError("not XCDR1")
-    order = "<" if message[1] else ">"
-    walk = _Walk(message, order, definitions)
-    fields = definitions[type_name]
-    last = max(number for number, each in enumerate(fields) if each.name in wanted)
-    for each in fields[: last + 1]:
-        walk.field(each, each.name)
-    return order, walk.layout, walk.at
+    def __init__(
+        self, message: bytes, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]
+    ) -> None:
+        if len(message) < _PREFIX or message[0] != 0 or message[1] not in (0, 1):
+            raise ValueError("not XCDR1")
+        self.order, self.end = "<" if message[1] else ">", _PREFIX
+        self.numbers: dict[str, tuple[int, str]] = {}
+        self.texts: dict[str, tuple[int, int]] = {}
+        self.lengths: list[tuple[int, int]] = []
+        self._message, self._definitions = message, definitions
+        fields = definitions[type_name]
+        last = max(number for number, each in enumerate(fields) if each.name in wanted)
+        for each in fields[: last + 1]:
+            self._add(each, each.name)
 
+    def fits(self, data: NDArray[np.uint8]) -> BoolArray:
+        """Which messages (n, length) have this layout."""
+        same = (data[:, 0] == 0) & (data[:, 1] == (self.order == "<"))
+        for at, value in self.lengths:
+            same &= np.ascontiguousarray(data[:, at : at + 4]).view(f"{self.order}u4")[:, 0] == value
+        return np.asarray(same)
 
-class _Walk:
-    """A place in one message, and the layout of what came before it."""
-
-    def __init__(self, message: bytes, order: str, definitions: Mapping[str, tuple[Field, ...]]) -> None:
-        self.message, self.definitions = message, definitions
-        self.at, self.layout = _PREFIX, _Layout()
-        self._byteorder = order
-
-    def field(self, each: Field, path: str) -> None:
+    def _add(self, each: Field, path: str) -> None:
         if each.array is None:
-            self._value(each.type, path)
+            self._add_value(each.type, path)
             return
         count = each.array or self._length()
-        if count > len(self.message):
+        if count > len(self._message):
             raise ValueError(f"{path} has {count} elements")
         if count and (code := _NUMBERS.get(each.type)):
             size = int(code[1:])
             at = self._take(size, size * count)
-            self.layout.numbers |= {f"{path}[{k}]": (at + size * k, code) for k in range(count)}
+            self.numbers |= {f"{path}[{k}]": (at + size * k, code) for k in range(count)}
             return
         for number in range(count):
-            self._value(each.type, f"{path}[{number}]")
+            self._add_value(each.type, f"{path}[{number}]")
 
-    def _value(self, kind: str, path: str) -> None:
+    def _add_value(self, kind: str, path: str) -> None:
         if code := _NUMBERS.get(kind):
-            at = self._take(int(code[1:]), int(code[1:]))
-            self.layout.numbers[path] = (at, code)
+            self.numbers[path] = (self._take(int(code[1:]), int(code[1:])), code)
         elif kind == "string":
             length = self._length()
-            self.layout.texts[path] = (self._take(1, length), length)
+            self.texts[path] = (self._take(1, length), length)
         else:
-            fields = self.definitions[kind]
-            for each in fields:
-                self.field(each, f"{path}.{each.name}")
-            if not fields:
+            for each in self._definitions[kind]:
+                self._add(each, f"{path}.{each.name}")
+            if not self._definitions[kind]:
                 self._take(1, 1)  # an empty message has one byte in CDR
 
     def _length(self) -> int:
         at = self._take(4, 4)
-        value = int.from_bytes(self.message[at : at + 4], "little" if self._byteorder == "<" else "big")
-        self.layout.lengths.append((at, value))
+        value = int.from_bytes(self._message[at : at + 4], "little" if self.order == "<" else "big")
+        self.lengths.append((at, value))
         return value
 
     def _take(self, size: int, length: int) -> int:
         """Where `length` bytes aligned to `size` begin."""
-        at = _PREFIX + -(-(self.at - _PREFIX) // size) * size
-        self.at = at + length
-        if self.at > len(self.message):
+        at = _PREFIX + -(-(self.end - _PREFIX) // size) * size
+        self.end = at + length
+        if self.end > len(self._message):
             raise ValueError("the message is too short")
         return at
 

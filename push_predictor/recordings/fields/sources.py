@@ -102,14 +102,19 @@ SCALAR_TARGET = Target("", 1, NUMBERS, SCALAR_FIELDS, "number")
 
 @dataclass(frozen=True)
 class Source:
-    """A stream as it was named. key: of NAME.recording.yaml or a parameter; option: of the command line, '' for none.
+    """A stream as it was named, or another text that says how to read it.
 
-    text: as given; topic, field (after the first dot) and frame (after the colon) are its parts.
+    key: of NAME.recording.yaml, and of a parameter. text: as given; topic, field (after the first dot) and frame (after
+    the colon) are its parts.
     """
 
     key: str
-    option: str
     text: str
+
+    @property
+    def option(self) -> str:
+        """The option of the command line, which names one topic at a time."""
+        return f"--{self.key.replace('topics', 'topic').replace('_', '-')}"
 
     @property
     def topic(self) -> str:
@@ -147,16 +152,21 @@ class Columns:
     """n decoded messages.
 
     stamp (n,) in ns: of the nearest header around the field, else when the message was logged or sent. values (n, k).
-    valid (n,): readable. frame (n,): number of the frame that the header names among `frames`. absent (n,): readable,
-    but without the chosen element, or with a matrix that is no pose.
+    valid (n,): readable. absent (n,): readable, but without the chosen element, or with a matrix that is no pose.
+    frame (n,): that the header names, without the slashes around it.
     """
 
     stamp: IntArray
     values: Array
     valid: BoolArray
-    frame: IntArray
-    frames: tuple[str, ...]
     absent: BoolArray
+    frame: NDArray[np.object_]
+
+    @classmethod
+    def unread(cls, times: IntArray, count: int) -> Columns:
+        """Messages of which nothing is known but their times (n,) ns; count: of their numbers."""
+        valid, absent = np.zeros((2, len(times)), np.bool_)
+        return cls(times.copy(), np.zeros((len(times), count)), valid, absent, np.full(len(times), "", np.object_))
 
     def __len__(self) -> int:
         return len(self.stamp)
@@ -164,16 +174,7 @@ class Columns:
     @property
     def named(self) -> frozenset[str]:
         """The frames of readable messages."""
-        return frozenset(self.frames[k] for k in np.unique(self.frame[self.valid]).tolist())
-
-    def frame_names(self) -> NDArray[np.str_]:
-        """The frame (n,) of each, without the slashes around it."""
-        return np.array([name.strip("/") for name in self.frames])[self.frame]
-
-    def rows(self, which: BoolArray | slice) -> Columns:
-        """Some of the messages."""
-        stamp, values, valid, frame = self.stamp[which], self.values[which], self.valid[which], self.frame[which]
-        return Columns(stamp, values, valid, frame, self.frames, self.absent[which])
+        return frozenset(self.frame[self.valid].tolist())
 
 
 class FieldReader:
@@ -196,28 +197,31 @@ class FieldReader:
 
     def read(self, messages: Messages) -> Columns:
         """The columns of n messages; one that is not valid has zeros."""
-        n, frames = len(messages), {"": 0}
-        stamp, values = messages.times.copy(), np.zeros((n, self._target.count))
-        valid, absent, frame = np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.int64)
+        found = Columns.unread(messages.times, self._target.count)
         for block in self._blocks.blocks(messages):
-            absent[block.rows] = True
+            found.absent[block.rows] = True
             for steps, which in places_of(block, self._fields[0]):
-                part, rows = block.where(which), block.rows[which]
-                if (found := self._numbers(part, steps)) is None:
-                    continue
-                values[rows], absent[rows] = found
-                valid[rows] = ~absent[rows]
-                if self._header:
-                    # The fields before the header are those before the field, with the same element.
-                    header = ".".join([*steps[: len(self._header) - 1], "header"])
-                    if not self._from_log:
-                        stamp[rows], sound = header_stamps(part, header)
-                        valid[rows] &= sound
-                    names, number = part.text(f"{header}.frame_id")
-                    frame[rows] = np.array([frames.setdefault(name, len(frames)) for name in names])[number]
-            if absent[block.rows].all() and len(self.names) < MOST_NAMES:
+                self._fill(found, block.where(which), steps)
+            if found.absent[block.rows].all() and len(self.names) < MOST_NAMES:
                 self.names |= element_names(block, self._fields[0])
-        return Columns(stamp, values, valid, frame, tuple(frames), absent)
+        return found
+
+    def _fill(self, columns: Columns, block: Block, first: Sequence[str]) -> None:
+        """Fill the rows of a block; first: the steps of the first field."""
+        if (found := self._numbers(block, first)) is None:
+            return
+        rows = block.rows
+        columns.values[rows], columns.absent[rows] = found
+        columns.valid[rows] = ~columns.absent[rows]
+        if not self.timed:
+            return
+        # The fields before the header are those before the field, with the same element.
+        header = ".".join([*first[: len(self._header) - 1], "header"])
+        if not self._from_log:
+            columns.stamp[rows], sound = header_stamps(block, header)
+            columns.valid[rows] &= sound
+        names, number = block.text(f"{header}.frame_id")
+        columns.frame[rows] = np.array([name.strip("/") for name in names], np.object_)[number]
 
     def _numbers(self, block: Block, first: Sequence[str]) -> tuple[Array, BoolArray] | None:
         """The numbers (n, count) of the fields, and which rows are a matrix that is no pose; None without the fields.

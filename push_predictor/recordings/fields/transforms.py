@@ -46,10 +46,9 @@ class TransformError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class TransformTree:
-    """The edges of a tree of frames, by child frame; unreadable counts the messages that are not in it."""
+    """The edges of a tree of frames, by child frame."""
 
     edges: dict[str, Edge]
-    unreadable: int = 0
 
     @property
     def frames(self) -> list[str]:
@@ -124,26 +123,26 @@ class TransformTree:
         return found
 
 
-def read_tree(recorded: Sequence[tuple[Messages, bool]], from_log: bool = False) -> TransformTree:
-    """The tree in messages of tf topics, each with whether it is the static topic.
+def read_edges(portions: Sequence[Messages], static: bool, from_log: bool = False) -> tuple[dict[str, Edge], int]:
+    """The edges in messages of a tf topic, by child frame, and the number of messages that are unreadable.
 
-    from_log: the stamps are the times of the messages, whatever their headers state.
+    static: of the static topic. from_log: the stamps are the times of the messages, whatever their headers state.
 
     Raises TransformError for a frame with two parents.
     """
     found: dict[str, list[_Part]] = {}
     unreadable = begin = 0
-    for messages, static in recorded:
+    for messages in portions:
         read = 0
         for block in _READERS[messages.type].blocks(messages):
             read += len(block.rows)
             for number in range(len(block.paths("transforms")) // _NUMBERS):
                 times = messages.times[block.rows] if from_log else None
-                for child, part in _parts(block, f"transforms[{number}]", static, times):
+                for child, part in _parts(block, f"transforms[{number}]", times):
                     found.setdefault(child, []).append(part._replace(rows=part.rows + begin))
         unreadable += len(messages) - read
         begin += len(messages)
-    return TransformTree({child: _edge(child, parts) for child, parts in found.items()}, unreadable)
+    return {child: _edge(child, parts, static) for child, parts in found.items()}, unreadable
 
 
 def joined(child: str, earlier: Edge, later: Edge) -> Edge:
@@ -163,10 +162,9 @@ class _Part(NamedTuple):
     parents: frozenset[str]
     stamp: IntArray
     poses: Array
-    static: bool
 
 
-def _parts(block: Block, path: str, static: bool, times: IntArray | None) -> Iterator[tuple[str, _Part]]:
+def _parts(block: Block, path: str, times: IntArray | None) -> Iterator[tuple[str, _Part]]:
     """(child frame, samples) of one place in the list of transforms. times (n,) ns: in place of the headers' stamps."""
     stamp, valid = header_stamps(block, f"{path}.header")
     if times is not None:
@@ -179,20 +177,17 @@ def _parts(block: Block, path: str, static: bool, times: IntArray | None) -> Ite
     )
     for child in sorted(set(children[valid].tolist())):
         chosen = valid & (children == child)
-        yield (
-            child,
-            _Part(block.rows[chosen], frozenset(parents[chosen].tolist()), stamp[chosen], poses[chosen], static),
-        )
+        yield child, _Part(block.rows[chosen], frozenset(parents[chosen].tolist()), stamp[chosen], poses[chosen])
 
 
-def _edge(child: str, parts: Sequence[_Part]) -> Edge:
+def _edge(child: str, parts: Sequence[_Part], static: bool) -> Edge:
     parents = sorted(frozenset[str]().union(*(part.parents for part in parts)))
     if len(parents) > 1:
         raise _several_parents(child, parents)
     order = np.argsort(np.concatenate([part.rows for part in parts]), kind="stable")
     stamp = np.concatenate([part.stamp for part in parts])[order]
     poses = normalised(np.concatenate([part.poses for part in parts])[order])
-    return Edge(parents[0], stamp, poses, all(part.static for part in parts))
+    return Edge(parents[0], stamp, poses, static)
 
 
 def _several_parents(child: str, parents: Sequence[str]) -> TransformError:

@@ -31,7 +31,7 @@ from push_predictor.recordings.importers.cleaning import (
     repair_heading,
     require_overlap,
 )
-from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name
+from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name, sources_in
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.types import Array
@@ -46,6 +46,7 @@ CLOCK = "tip, object and wrench share a clock; no offset was applied"
 HEIGHT = "tip and slider are at height 0: the set has planar poses, and the tip is never lifted within a file"
 STREAMS = ("tip_pose", "object_pose", "ft_wrench")
 SUFFIXES = (".json", ".h5", ".hdf5")
+FILES = (*SUFFIXES, ".zip")
 METADATA = re.compile(r"(?:^|_)(surface|shape|a|v|i|s|t)=([^_=]+)")
 
 
@@ -181,20 +182,13 @@ def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
 
     Raises ImportSourceError if a source contains none.
     """
-    for source in sources:
-        if not source.exists():
-            raise ImportSourceError(f"{source}: does not exist, give a file, a folder or a zip archive")
-        paths = paths_in(source) if source.is_dir() else [source]
-        if not paths:
-            raise ImportSourceError(f"{source}: contains no {', '.join(SUFFIXES)} or .zip file")
-        for path in paths:
-            if path.suffix.lower() not in (*SUFFIXES, ".zip"):
-                accepted = f"{', '.join(SUFFIXES)}, .zip or a folder"
-                raise ImportSourceError(f"{path}: suffix {path.suffix!r}, give {accepted}")
-            places = sorted(mit_places(path), key=lambda place: place.name)
-            if not places:
-                raise ImportSourceError(f"{path}: the archive contains no {', '.join(SUFFIXES)} file")
-            yield from read_places(places)
+    for path in sources_in(sources, *(f"*{suffix}" for suffix in FILES)):
+        if path.suffix.lower() not in FILES:
+            raise ImportSourceError(f"{path}: suffix {path.suffix!r}, give {', '.join(FILES)} or a folder")
+        places = sorted(mit_places(path), key=lambda place: place.name)
+        if not places:
+            raise ImportSourceError(f"{path}: the archive contains no {', '.join(SUFFIXES)} file")
+        yield from read_places(places)
 
 
 def mit_places(path: Path) -> list[MitPlace]:
@@ -221,7 +215,7 @@ def read_places(places: Sequence[MitPlace]) -> Iterator[MitFile]:
 
 def paths_in(folder: Path) -> list[Path]:
     """Paths in a folder (recursive) with the suffix of a file of the set or of an archive."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in (*SUFFIXES, ".zip"))
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in FILES)
 
 
 def file_metadata(name: str) -> dict[str, str]:

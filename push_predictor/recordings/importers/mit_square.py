@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from push_predictor.errors import ImportSourceError, TableError
+from push_predictor.errors import ImportSourceError
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import MASSES, shape_outline
 from push_predictor.recordings.importers.mit import PUSHER_RADIUS
 from push_predictor.recordings.importers.staging import ImportReport, Notes, Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.table_file import finite_column, read_cells
+from push_predictor.recordings.table_file import finite_column, sheet_of
 from push_predictor.types import Array
 
 VELOCITY = 0.02  # m/s
@@ -102,8 +102,5 @@ def _npz_columns(source: Path) -> dict[str, Array]:
 
 def _csv_columns(source: Path) -> dict[str, Array]:
     names = {name: CSV_NAMES.get(name, name) for name in COLUMNS}
-    try:
-        cells, lines = read_cells(source, list(names.values()))
-        return {name: finite_column(source, column, cells[column], lines) for name, column in names.items()}
-    except TableError as error:
-        raise ImportSourceError(str(error)) from None
+    sheet = sheet_of(source, list(names.values()), ImportSourceError)
+    return {name: finite_column(sheet, column) for name, column in names.items()}

@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TypeVar
 
@@ -145,7 +146,7 @@ def _move(made: Path, target: Path) -> None:
 
 
 def sources_in(sources: Sequence[Path], *patterns: str) -> list[Path]:
-    """The files that were given, and those in given folders (recursive) whose names match a pattern.
+    """The files that were given, and those in given folders (recursive) whose names match a pattern in any case.
 
     Raises ImportSourceError for what does not exist, and for a folder without such a file.
     """
@@ -154,7 +155,8 @@ def sources_in(sources: Sequence[Path], *patterns: str) -> list[Path]:
         wanted = f"a file or a folder that contains {' or '.join(patterns)}"
         if not source.exists():
             raise ImportSourceError(f"{source}: does not exist, give {wanted}")
-        inside = [path for pattern in patterns for path in source.rglob(pattern)] if source.is_dir() else [source]
+        fits = (path for path in source.rglob("*") if any(fnmatchcase(path.name.lower(), each) for each in patterns))
+        inside = list(fits) if source.is_dir() else [source]
         if not inside:
             raise ImportSourceError(f"{source}: contains no {' or '.join(patterns)}")
         found += sorted(inside)
