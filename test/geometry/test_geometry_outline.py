@@ -72,17 +72,6 @@ def test_perimeter_and_area_of_an_ellipse_equal_those_of_the_curve(a, b):
     assert outline.area == pytest.approx(np.pi * a * b)
 
 
-@EVERY_OUTLINE
-def test_inward_normals_are_perpendicular_unit_vectors_into_the_slider(outline):
-    normal, point = outline.inward_normal(GRID), outline.point(GRID)
-    along = outline.point(GRID + 1e-6) - outline.point(GRID - 1e-6)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0)
-    assert np.abs(np.sum(normal * along, axis=1)).max() < 1e-4
-    assert np.all(outline.project(point + 1e-4 * normal).distance < 0.0)
-    assert np.all(outline.project(point - 1e-4 * normal).distance > 0.0)
-
-
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 @pytest.mark.parametrize("offset", [-0.002, 0.0, 0.003])
 def test_point_off_the_outline_projects_back_to_its_contact(outline, offset):
@@ -212,11 +201,6 @@ def test_contact_is_recovered_from_edge_and_fraction(outline, contact):
     edge, fraction = outline.edge(np.array([contact]))
     assert 0.0 <= fraction[0] <= 1.0
     assert outline.contact_on_edge(int(edge[0]), float(fraction[0])) == pytest.approx(contact, abs=1e-12)
-
-
-def test_edges_of_a_polygon_share_the_perimeter_by_their_length():
-    legs = 0.15 / TRIANGLE.perimeter
-    assert np.diff(TRIANGLE.edge_starts) == pytest.approx([legs, np.sqrt(2.0) * legs, legs])
 
 
 @EVERY_OUTLINE

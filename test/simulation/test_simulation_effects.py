@@ -177,31 +177,6 @@ def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     assert turn > 0.005  # the loaded left side lags, so the slider turns left
 
 
-@pytest.mark.slow
-def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
-    grain = Changes(grain=lambda moment: np.outer(of_push([0.02, 0.02, 0.02, 0.0, 0.0, 0.0], moment), [0.0, 1.0]))
-    headings = np.tile([0.3, 0.3 + np.pi, 0.3 + np.pi / 2.0], 2)
-    with_it, without = np.split(outcomes_by_push(at_headings(headings, grain)), 2)
-    along, opposite, right = with_it - without
-    assert abs(along[1]) > 3e-5
-    assert opposite == pytest.approx(along, abs=0.02 * abs(along[1]))
-    assert right[1] == pytest.approx(-along[1], rel=0.1)
-
-
-def at_headings(headings: Array, changes: Changes) -> SimulationSpec:
-    """The same push of sliders with these headings."""
-    start = np.column_stack([np.zeros((len(headings), 2)), headings])
-    return spec_of(middle_pushes(np.zeros(len(headings))), changes=changes, start=start)
-
-
-def test_grain_of_the_slider_turns_with_it() -> None:
-    def grain(moment: Moment) -> Array:
-        return rotate(np.tile([0.0, 0.4], (len(moment.travelled), 1)), 2.0 * moment.pose[:, 2])
-
-    one, other = outcomes_by_push(at_headings(np.array([0.9, -0.5]), Changes(grain=grain)))
-    assert one == pytest.approx(other, rel=0.02, abs=1e-7)
-
-
 def test_resting_slider_stays_on_a_gentle_slope() -> None:
     spec = spec_of(middle_pushes(np.zeros(1)), changes=Changes(pull=lambda moment: np.array([[0.3, 0.3, 0.0]])))
     (batch,) = run_pushes(spec)
