@@ -148,10 +148,6 @@ class TestSuggestedPushes:
         assert np.all((found.inputs[:, 2] >= -0.5) & (found.inputs[:, 2] <= 0.9))
         np.testing.assert_allclose(found.duration * found.inputs[:, 0], 0.02)
 
-    def test_leave_less_and_less_variance(self, suggested: Suggested) -> None:
-        left = suggested.variance_left
-        assert left[-1] > 0.0 and left[0] < 1.0 and np.all(np.diff(left) < 0.0)
-
     def test_of_a_learnt_model_are_spread_evenly_up_to_the_tenth(self, untrained: PushModel) -> None:
         known, short = few_pushes(7), Limits(travel=0.004)
         expected = candidate_pushes(known, short, 64)
