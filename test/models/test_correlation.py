@@ -26,13 +26,10 @@ from push_predictor.models.predictors.correlation import (
     LONGEST,
     Correlation,
     correlated,
-    covariances,
     fit_correlation,
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.prediction_table import unbounded
-from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -124,43 +121,6 @@ def test_correlation_equals_that_of_many_nearby_rows() -> None:
     z = rng.multivariate_normal(np.zeros(3), r, 20_000)
     found = Correlation(rng.standard_normal((20_000, 2)) * 0.1, z, 1.0, 2.0).at(np.zeros((1, 2)))[0]
     assert found == pytest.approx(r, abs=0.03)
-
-
-def test_many_points_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch, model: PushModel) -> None:
-    correlation = correlation_of(model)
-    asked = np.random.default_rng(1).standard_normal((500, 2))
-    whole = correlation.at(asked)
-    monkeypatch.setattr("push_predictor.models.predictors.correlation._WEIGHTS_AT_ONCE", 7 * len(correlation.features))
-    assert correlation.at(asked) == pytest.approx(whole, abs=1e-12)
-
-
-def bounded(numbers: Array) -> Array:
-    """The correlation matrices (n, 3, 3) of numbers (n, 3) in a table: covariances of unit variances."""
-    values = np.column_stack([np.ones((len(numbers), 6)), np.zeros((len(numbers), 3)), numbers])
-    found, of_process = np.empty((len(numbers), 3, 3)), np.empty((len(numbers), 3, 3))
-    table_moments(values, np.zeros(3), found, of_process)
-    return of_process
-
-
-@given(
-    numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
-    latent=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
-    process=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
-)
-def test_outcome_process_and_their_difference_are_covariances(numbers: Array, latent: Array, process: Array) -> None:
-    total, of_process = covariances(latent, process, bounded(numbers))
-    for covariance, variances in ((total, latent + process), (of_process, process), (total - of_process, latent)):
-        assert np.diagonal(covariance, axis1=1, axis2=2) == pytest.approx(variances, rel=1e-6)
-    for covariance in (total, of_process):
-        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        assert np.all(np.linalg.eigvalsh(covariance / sd[:, :, None] / sd[:, None, :]) > 0.0)
-
-
-@given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
-def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
-    matrices = bounded(numbers)
-    assert np.all(np.linalg.eigvalsh(matrices) > 0.0)
-    assert bounded(unbounded(matrices)) == pytest.approx(matrices, abs=1e-7)
 
 
 # --- fit -------------------------------------------------------------------------------------------------

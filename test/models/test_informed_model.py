@@ -23,7 +23,6 @@ from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
@@ -210,17 +209,6 @@ def test_a_regression_must_be_worth_its_hyperparameters() -> None:
     assert best_held_out([fit_constant(inputs, wave, heavy_tails=False), found := fit_gp(inputs, wave)], block) is found
 
 
-def test_the_search_of_a_vhgp_begins_from_the_gps_that_decided_about_the_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object, **__: object) -> None:
-        raise AssertionError("a GP of all rows was fitted")
-
-    monkeypatch.setattr("push_predictor.models.gaussian_process.vhgp.fit_gp", refused)
-    auto = learnt(trained(pushes(24, 0), mean="auto"))
-    assert any(isinstance(regression, ConstantNoise) for regression in auto.regressions)
-    with pytest.raises(AssertionError, match="all rows"):
-        trained(pushes(24, 0), mean="zero")
-
-
 # --- the speed: per path length within the training's speeds, less certain beyond them ---
 
 
@@ -307,19 +295,6 @@ def test_noise_of_the_recorded_speed_is_no_input() -> None:
     jittery = learnt(trained_at(pushes_at(0.02, jitter=0.05)))
     assert 0 not in jittery.scaling.columns and jittery.scaling.speeds == pytest.approx((0.02, 0.02), rel=0.05)
     assert 0 in learnt(trained_at(pushes_at(0.02, 0.03, jitter=0.05))).scaling.columns
-
-
-@pytest.mark.parametrize("about", (None, MECHANICS))
-@pytest.mark.parametrize("speed", (0.02, 0.08))
-def test_density_without_tails_is_that_of_the_moments(about: FittedMechanics | None, speed: float) -> None:
-    table = pushes_at(speed, seed=2)
-    predictor = learnt(trained_at(pushes_at(0.02), about=about, tails=False))
-    mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, {}))
-    variance = np.diagonal(covariance, axis1=1, axis2=2)
-    expected = -0.5 * (np.log(2.0 * np.pi * variance) + (table.outcomes - mean) ** 2 / variance)
-    push = Push(table.inputs, table.duration, {})
-    found = predictor._log_density(predictor.latent(table.inputs), push, table.outcomes)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_outcomes_are_learnt_as_they_are_where_asked() -> None:

@@ -28,7 +28,6 @@ from push_predictor.models.gaussian_process.sparse_vhgp import (
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.grid_posterior import GridRegression, on_grid
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
 from push_predictor.recordings.table import PushTable
@@ -196,25 +195,6 @@ def test_held_out_predictions_equal_those_of_a_dense_model() -> None:
     for name in ("mean", "variance", "log_noise_mean", "log_noise_variance"):
         np.testing.assert_allclose(getattr(of_sparse, name), getattr(of_dense, name), atol=1e-4, err_msg=name)
     assert "solved" not in vars(sparse)  # (n, m) matrices
-
-
-def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
-    regression = on_grid(fitted)
-    assert isinstance(regression, GridRegression)
-    axes = np.linspace(-1.0, 1.0, 7), np.linspace(-1.5, 1.0, 5)
-    points = fitted.predict(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
-    assert regression.noise is not None
-    for posterior, prior, mean, variance in (
-        (regression.signal, 0.0, points.mean, points.variance),
-        (regression.noise, regression.log_noise, points.log_noise_mean, points.log_noise_variance),
-    ):
-        scale = np.exp(posterior.kernel.log_lengthscales)
-        factors = [
-            np.exp(-0.5 * ((axis[:, None] - posterior.inputs[:, d]) / scale[d]) ** 2) for d, axis in enumerate(axes)
-        ]
-        found = posterior.moments(factors)
-        np.testing.assert_allclose(found[0].ravel() + prior, mean, atol=1e-9)
-        np.testing.assert_allclose(found[1].ravel(), variance, rtol=1e-7)
 
 
 def test_memory_grows_with_rows_times_inducing_inputs() -> None:

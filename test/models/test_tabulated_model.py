@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import product
-from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +26,6 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along_all
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
 from push_predictor.models.tabulated.spline import spline_values, table_moments
 from push_predictor.models.tabulated.tabulated_model import (
@@ -326,46 +322,7 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
 
 
-# --- services ------------------------------------------------------------------------------------
-
-
 # --- splines on boxes ---
-
-
-AXES = (Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7), Axis(3.0, 4.0, 3))
-ENDS = np.array([[axis.low, axis.high] for axis in AXES])
-
-
-def b_spline(u: Array) -> Array:
-    """The cardinal cubic B-spline, from its sum of truncated powers; not zero between 0 and 4."""
-    return sum((-1) ** k * comb(4, k) * np.maximum(u - k, 0.0) ** 3 / 6.0 for k in range(5))
-
-
-def by_formula(axes: Sequence[Axis], coefficients: Array, points: Array, box: Array) -> Array:
-    """Sum of all products of B-splines, with those that are zero too."""
-    factors = []
-    for axis, x in zip(axes, points.T, strict=True):
-        place = (x - axis.low) * axis.cells / (axis.high - axis.low)
-        factors.append(b_spline(place[:, None] + 3.0 - np.arange(axis.cells + 3)))
-    found = coefficients[box]
-    for factor in factors:
-        found = np.einsum("ni,ni...->n...", factor, found)
-    return np.asarray(found)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-@pytest.mark.parametrize("functions", [1, 9, 16])
-def test_compiled_spline_is_the_sum_of_its_basis(count: int, functions: int) -> None:
-    """At random points, at knots, and at both ends of every axis, in several boxes; summed in single precision."""
-    axes, draw = AXES[:count], np.random.default_rng(0)
-    coefficients = draw.standard_normal((3, *(axis.cells + 3 for axis in axes), functions)).astype(np.float32)
-    corners = np.array(list(product(*ENDS[:count])))
-    knots = np.array([[axis.low + (axis.high - axis.low) * k / axis.cells for axis in axes] for k in range(3)])
-    points = np.concatenate([draw.uniform(*ENDS[:count].T, (60, count)), corners, knots])
-    box = draw.integers(0, 3, len(points))
-    expected = by_formula(axes, coefficients.astype(np.float64), points, box)
-    rounding = 4**count * np.finfo(np.float32).eps * np.abs(coefficients).max()
-    np.testing.assert_allclose(TensorSpline(axes, coefficients)(points, box), expected, rtol=0.0, atol=rounding)
 
 
 def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refused() -> None:
@@ -376,31 +333,6 @@ def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refuse
                 np.zeros((1, axes)), np.zeros(1, np.intp), one, one, np.ones(1, np.intp),
                 np.zeros((4, functions), np.float32), np.zeros((1, functions)),
             )  # fmt: skip
-
-
-def through(axes: Sequence[Axis], values: Array) -> TensorSpline:
-    """The spline that takes values (cells_1 + 1, ..., K) at the knots."""
-    return TensorSpline(axes, along_all([axis.coarse_to_coefficients(axis.cells) for axis in axes], values[None]))
-
-
-def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
-    axes = AXES[:2]
-
-    def cubic(x: Array, y: Array) -> Array:
-        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
-
-    knots = np.meshgrid(*(np.linspace(axis.low, axis.high, axis.cells + 1) for axis in axes), indexing="ij")
-    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
-    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
-    found = through(axes, cubic(*knots))(points, np.zeros(len(points), np.intp))
-    assert found == pytest.approx(cubic(*points.T), abs=1e-5)  # coefficients have single precision
-
-
-def test_few_nodes_resolve_a_smooth_function() -> None:
-    axis = Axis(0.2, 3.0, 10)
-    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
-        knots = axis.nodes_to_knots(count) @ np.exp(-(axis.nodes(count) ** 2))
-        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
 
 
 @pytest.mark.parametrize("coupled", [False, True])

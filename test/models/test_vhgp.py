@@ -16,9 +16,8 @@ from sparse_rows import PARAMETERS, rows
 
 from push_predictor.models.gaussian_process import sparse_vhgp, vhgp
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.fit import _sites as sites_from
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
-from push_predictor.models.gaussian_process.fit import maximise_over_noise, precisions_from
+from push_predictor.models.gaussian_process.fit import maximise_over_noise
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, some_rows
 from push_predictor.models.gaussian_process.sparse_vhgp import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
@@ -93,14 +92,6 @@ def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
         precisions = best.sites.precisions * np.exp(size * rng.normal(size=60))
         potentials = best.sites.potentials + size * rng.normal(size=60)
         assert Bound.at(problem, Sites(precisions, potentials)).value < best.value
-
-
-def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
-    problem = VhgpProblem.of(*rows(60), PARAMETERS)
-    best = maximise_over_noise(problem, None, 1e-13)
-    np.testing.assert_allclose(best.mean_weights, best.sites.precisions - 0.5, atol=1e-5)
-    np.testing.assert_allclose(best.signal.optimal_precisions, best.sites.precisions, atol=1e-5)
-    assert Bound.tied(problem, best.sites.precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
 def test_q_of_a_loose_search_has_one_parameter_per_row() -> None:
@@ -214,17 +205,6 @@ def test_more_rows_than_are_searched_get_the_hyperparameters_of_some_and_their_o
     np.testing.assert_array_equal(whole.parameters.to_vector(), part.parameters.to_vector())
     best = maximise_over_noise(VhgpProblem.of(inputs, outputs, whole.parameters), None, 1e-10).value
     assert best - 0.05 < whole.bound <= best + 1e-9
-
-
-def test_the_noise_of_all_rows_begins_where_some_rows_predict_it(fitted: VHGP) -> None:
-    inputs, outputs = rows(400, seed=7)
-    problem = VhgpProblem.of(inputs, outputs, fitted.parameters)
-    best = maximise_over_noise(problem, None, 1e-6).value
-    begun = Bound.at(problem, sites_from(problem, fitted.predict(inputs))).value
-    cold = Bound.tied(problem, np.full(400, 0.5)).value
-    assert best - begun < 0.1 * (best - cold)
-    precisions = precisions_from(problem, fitted.predict(inputs))
-    assert Bound.tied(problem, precisions).value == pytest.approx(best, abs=0.05)
 
 
 def test_matrices_are_freed_and_computed_again() -> None:
