@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting_models import DRIFT, pushes, slippery
 from repository import REPOSITORY
 from synthetic import square_rig
 
@@ -23,13 +22,7 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_NAME
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, Mechanism, mechanism_named
-from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.train import train_model
-from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
-from push_predictor.residuals.evidence.standardised import evidence_of
 
 EVERY = (*LIBRARY, *REFINEMENTS)
 EVERY_MECHANISM = pytest.mark.parametrize("mechanism", EVERY, ids=lambda m: m.name)
@@ -115,7 +108,6 @@ def test_the_docs_name_every_mechanism_with_its_limit() -> None:
 
 NAMES = [mechanism.name for mechanism in EVERY]
 ALWAYS = DriverBasis("constant")
-CONTACT, ANGLE = 1, 2  # columns of the inputs
 EVEN = uniform_ellipsoid(square_rig().outline)
 
 
@@ -221,38 +213,3 @@ def test_a_parameter_stays_within_its_plausible_range() -> None:
     np.testing.assert_array_equal(below, none)
     far, end = (joint_shift(on, [effect("pusher_travel", size)], push) for size in (-9.0, -0.5))
     np.testing.assert_array_equal(far, end)
-
-
-# --- estimation ----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def deployed() -> PushModel:
-    return train_model(pushes(60), square_rig(), "analytical", name="deployed")
-
-
-def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis, *, of_size: bool = True) -> Effect:
-    evidence = evidence_of(deployed, table)
-    fit = fitted(FitRows(evidence), [candidate(evidence, mechanism, "elapsed_time", basis)])
-    return estimated(fit, of_size=of_size)[0][0]
-
-
-def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
-    """Friction grows from 0.3 to 0.9: by its first derivative alone it would come out a fifth too small."""
-    table = pushes(100, 5, slippery(0.4))
-    estimate = found(deployed, table, "contact_friction", DRIFT)
-    sd = float(np.sqrt(estimate.covariance[0, 0]))
-    assert abs(float(estimate.coefficients[0]) - 0.4) < 3.0 * sd < 0.1
-
-
-@pytest.mark.parametrize(("differ_by", "limit"), [(CONTACT, 0.5), (ANGLE, 0.0)])
-def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
-    deployed: PushModel, differ_by: int, limit: float
-) -> None:
-    """Real mechanics err by contact and angle: pushes of one angle, however many, do not make the size more certain."""
-    weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
-    on_one_side = weak.inputs[:, differ_by] > limit
-    mixed = replace(weak, outcomes=np.where(on_one_side[:, None], strong.outcomes, weak.outcomes))
-    narrow, wide = (found(deployed, mixed, "contact_friction", DRIFT, of_size=of_size) for of_size in (False, True))
-    assert 0.1 < wide.coefficients[0] < 0.3
-    assert wide.covariance[0, 0] > 2.5**2 * narrow.covariance[0, 0]

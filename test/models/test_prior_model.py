@@ -252,7 +252,10 @@ def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel
     pushes = Pushes(
         [0.001, FASTEST, 1.01 * FASTEST, 0.02], [0.0, 0.99, 0.5, 0.3], [0.0, -STEEPEST, 0.0, 1.01 * STEEPEST]
     )
+    assert (FASTEST, STEEPEST) == (0.15, 1.4)
     for model in (untrained, after_ten):
+        limits = model.input_limits
+        assert limits.velocity == (0.0, FASTEST) and limits.angle == (-STEEPEST, STEEPEST)
         assert model.in_domain(pushes.inputs).tolist() == [True, True, False, False]
 
 
