@@ -244,14 +244,8 @@ def test_lists_tuples_and_arrays_mean_the_same_and_scalars_apply_to_all(
         (("fast", 0.1, 0.3), r"velocity: \"'fast'\" is not accepted, give a number or a list of numbers"),
         ((0.02, np.nan, 0.3), "contact: nan is not accepted, give a finite number"),
         ((0.02, [0.1, np.inf], 0.3), r"contact\[1\]: inf is not accepted"),
-        (
-            (0.02, 0.1, np.zeros((2, 2))),
-            r"angle: 'an array of shape \(2, 2\)' is not accepted",
-        ),
-        (
-            ([0.02, 0.03], [0.1, 0.2, 0.3], 0.3),
-            "velocity: '2 numbers' .* give one number, or 3 as in contact",
-        ),
+        ((0.02, 0.1, np.zeros((2, 2))), r"angle: 'an array of shape \(2, 2\)' is not accepted"),
+        (([0.02, 0.03], [0.1, 0.2, 0.3], 0.3), "velocity: '2 numbers' .* give one number, or 3 as in contact"),
         ((0.02, [], 0.3), "contact: 'an empty list' is not accepted, give at least one number"),
         ((0.02, 0.1, 0.3, [0.2, 0.1], {"dwell_time": [1, 2, 3]}), "duration: '2 numbers'"),
         ((0.02, 0.1, 0.3, 0.2, {"dwell_time": None}), "covariate dwell_time"),
@@ -264,8 +258,6 @@ def test_rejects_invalid_push_by_field_and_value(arguments: tuple[Any, ...], mes
 
 
 # --- why a push is outside the domain ---
-
-
 
 
 @pytest.fixture(scope="module")

@@ -186,10 +186,7 @@ NARROW = {
 
 @pytest.mark.parametrize(
     ("shape", "narrow"),
-    [
-        *(("square", narrow) for narrow in NARROW),
-        *(("circle", "one contact"), ("ellipse", "a part of an edge")),
-    ],
+    [*(("square", narrow) for narrow in NARROW), *(("circle", "one contact"), ("ellipse", "a part of an edge"))],
 )
 def test_constant_inputs_have_no_axis(shape: str, narrow: str) -> None:
     low, high = (np.array(limit) for limit in NARROW[narrow])
