@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drifting_models import extended, pushes, slippery
-from synthetic import noisy_pushes, square_rig
+from synthetic import square_rig
 
 from push_predictor.models.gaussian_process.bound import VhgpProblem
 from push_predictor.models.gaussian_process.fit import maximise_over_noise
@@ -104,17 +104,6 @@ def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units(
         push = Push(inputs[out], np.full(int(out.sum()), 0.2), {})
         for whole, part in zip(found, replace(predictor, regressions=without).moments(push), strict=True):
             np.testing.assert_allclose(whole[out], part, rtol=1e-6, atol=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_push_model_holds_out_one_push_by_default(kind: str) -> None:
-    model = train_model(noisy_pushes(60), square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
-    push = np.unique(model.training.push_id, return_inverse=True)[1]
-    for found, expected in zip(model.held_out_moments(), model.held_out_moments(push), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    rows = model.training
-    trained_on = model.predict_rows(rows.inputs, rows.duration).mean
-    assert np.array_equal(model.held_out_moments().mean, trained_on) == (kind == "analytical")
 
 
 def test_held_out_moments_of_extended_model_include_its_effects() -> None:

@@ -142,20 +142,6 @@ def test_exact_density_has_the_predicted_variance(vhgp: PushModel) -> None:
     np.testing.assert_allclose((weights * steps[:, None] ** 2).sum(axis=0), 1.0, rtol=1e-2)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_tabulated_model_predicts_single_push_as_in_a_batch(bases: dict[str, PushModel], kind: str) -> None:
-    model, table = extended(bases[kind], slippery(0.2, sd=0.1), grain(0.1)), pushes(5, 1)
-    tabulated = tabulate(model)
-    assert tabulated.tabulated == (kind in ("vhgp", "gp"))
-    among = predicted(tabulated, table)
-    for k in range(len(table)):
-        alone = predicted(tabulated, table.take([k]))
-        for name in FIELDS:
-            np.testing.assert_allclose(getattr(alone, name)[0], getattr(among, name)[k], rtol=1e-7, atol=1e-12)
-    sd = np.sqrt(np.diagonal(among.covariance, axis1=1, axis2=2))
-    assert np.max(np.abs(among.mean - predicted(model, table).mean) / sd) < 1e-3
-
-
 def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
     predictor = model.predictor

@@ -12,7 +12,7 @@ import pytest
 from forward_pushes import IN_METRES, RADIUS, SQUARE, mechanics, moved, one, pushes, size
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lynch import in_equal_steps, sweeps
+from lynch import sweeps
 from supports import THREE_POINTS
 from synthetic import triangle
 
@@ -94,20 +94,6 @@ def test_demands_the_covariate_that_a_parameter_needs(parameter: MechanicsParame
 
 
 # --- whole pushes on the ellipsoid, against closed forms and fine steps ----------------------------------------------
-
-
-def test_displacements_are_as_accurate_as_asked_for() -> None:
-    """Steps of 4e-5 m of another method, on another solution of the contact; in them corners blur to some 1e-5."""
-    outline, (inputs, duration) = OUTLINES["rect1"], pushes(30, seed=3, travel=0.0145)
-    surface = uniform_ellipsoid(outline)
-    path = sweeps(outline, RADIUS, inputs, duration)
-    coarse, exact = (in_equal_steps(path, surface, 0.3, steps) for steps in (256, 512))
-    known = size(coarse - exact)
-    assert np.quantile(known, 0.7) < 1e-8
-    for accuracy in (1e-3, 1e-4, 1e-6):
-        found = PushMechanics(outline, RADIUS, surface, accuracy=accuracy).displacement({}, inputs, duration)
-        error = size(world_pose(outline, inputs, found) - exact)
-        assert np.all(error < accuracy * (size(exact) + 0.01 * 0.0145) + 4.0 * known), accuracy
 
 
 @pytest.mark.parametrize("travel", [0.004, 0.0145])

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
-from push_predictor.models import train, train_learnt
 from push_predictor.models.features import DEVIATION
 from push_predictor.models.gaussian_process import vhgp
 from push_predictor.models.gaussian_process.bound import VhgpParameters
@@ -24,7 +22,6 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, bes
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
@@ -97,31 +94,6 @@ def test_a_tie_goes_to_mechanics_and_so_does_what_pushes_cannot_decide() -> None
     assert not zero_is_better(noise + 0.9 * error, zero)
     assert zero_is_better(noise + 1.1 * error, zero)
     assert not zero_is_better(zero, noise + 1.1 * error)
-
-
-def test_auto_is_decided_by_held_out_pushes_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same pushes under both means, one number a push; the answer is followed, with few rows and with many."""
-    seen: list[tuple[np.ndarray, np.ndarray]] = []
-
-    def answer(zero: np.ndarray, mechanics: np.ndarray) -> bool:
-        seen.append((zero, mechanics))
-        return better
-
-    monkeypatch.setattr(train_learnt, "zero_is_better", answer)
-    table = pushes(40, 3)
-    for most, better in ((500, True), (20, False)):
-        monkeypatch.setattr(train, "MOST_MEAN_ROWS", most)
-        predictor = learnt(trained(table, "gp", mean="auto"))
-        assert (predictor.mean is None) == better
-        assert len(predictor.regressions[0].outputs) == 40
-    assert [zero.shape for zero, _ in seen] == [mechanics.shape for _, mechanics in seen]
-    assert [len(zero) for zero, _ in seen] == [20, len(set(drawn(table, 20).push_id))]
-    # The densities are in the same units: with mechanics these pushes are more likely, by nats, not by orders.
-    assert 0.0 < float(np.mean(seen[0][1] - seen[0][0])) < 20.0
-
-
-def drawn(table: PushTable, count: int) -> PushTable:
-    return table.take(train.training_rows(replace(table), None, 0, count))
 
 
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
@@ -302,17 +274,3 @@ def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
     np.testing.assert_allclose(targets(learnt(model)), model.training.outcomes, rtol=1e-9, atol=1e-15)
     for first, second in zip(at(model, 0.02), at(model, 0.02, 0.4), strict=True):
         np.testing.assert_array_equal(first, second)
-
-
-def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:
-    several = trained_at(pushes_at(0.02, 0.03, n=90), slow.kind)
-    for model in (slow, several):
-        tabulated = tabulate(model)
-        assert tabulated.tabulated, tabulated.how
-        for speed, n in product((0.005, 0.02, 0.025, 0.03, 0.06, 0.15), (1, 6)):
-            inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
-            assert not tabulated.exact_count(inputs)
-            found, expected = (m.predict_rows(inputs, np.full(n, 0.2)) for m in (tabulated, model))
-            assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 2e-3
-            np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
-            np.testing.assert_array_equal(found.in_domain, expected.in_domain)

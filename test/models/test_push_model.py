@@ -65,16 +65,6 @@ def test_model_predicts_new_pushes(models: dict[str, PushModel], kind: str) -> N
     assert (metrics["exact_nlpd"] is not None) == (kind in ("gp", "vhgp"))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
-    rng = np.random.default_rng(3)
-    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 10), rng.random(10), rng.uniform(-1.57, 1.57, 10)])
-    prediction = models[kind].predict_rows(inputs, np.full(10, 0.2))
-    assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
-    assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
-    assert not np.all(prediction.in_domain)
-
-
 @settings(max_examples=25, deadline=None)
 @given(fraction=st.floats(0.0, 0.99), angle=st.floats(-1.2, 1.2), side=st.integers(1, 3))
 def test_four_sides_of_a_square_share_features(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,12 +17,10 @@ from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.gaussian_process.regression import fit_constant
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
@@ -53,7 +50,6 @@ OUTLINES = {
     "triangle": triangle(),
 }
 SIZES = {"mean": 1e-3, "covariance": 1e-9, "process_covariance": 1e-9, "in_domain": 0.0}  # SI, of the smaller ones
-FIELDS = tuple(SIZES)
 
 
 def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> PushTable:
@@ -234,21 +230,6 @@ def test_a_table_is_compared_with_the_model_outside_the_domain_too() -> None:
     assert np.sum(~model.in_domain(probed(model, 20).inputs)) == 20
 
 
-def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) -> None:
-    model = trained_widely("square", "vhgp")
-    predictor = learnt(model)
-    first, second, third = predictor.regressions
-    constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
-    mixed = replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
-    computed, outside = tabulate(mixed), outside_pushes(mixed, 100)
-    assert_true_to_the_model(computed, outside)
-    write_tables(tmp_path / "tables", "digest", computed)
-    read = read_tables(tmp_path / "tables", "digest", mixed)
-    assert read is not None
-    for name in FIELDS:
-        assert np.array_equal(getattr(of(read, outside), name), getattr(of(computed, outside), name))
-
-
 @pytest.mark.parametrize("shape", ["square", "circle"])
 def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: str) -> None:
     model = tabulate(coupled(trained(OUTLINES[shape], "gp", *WIDE, n=80, per_path=False)))
@@ -258,7 +239,7 @@ def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: s
     assert not table.in_domain.any() and model.exact_count(fast) == 30
     known = of(model, inside(model.model, 5))
     mixed = of(model, np.concatenate([fast, inside(model.model, 5)]))
-    for name in FIELDS:
+    for name in SIZES:
         assert np.array_equal(getattr(table, name), getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[30:], getattr(known, name))
@@ -283,11 +264,6 @@ def test_boundary_of_the_domain_is_inside() -> None:
         table, exact = of(model, rim), of(model.model, rim)
         assert np.array_equal(table.in_domain, exact.in_domain)
         assert table.mean == pytest.approx(exact.mean, abs=1e-5)
-
-
-def test_no_rows_give_no_predictions() -> None:
-    prediction = of(tabulated("square", "vhgp"), np.empty((0, 3)))
-    assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
 
 
 def test_analytical_model_has_no_table() -> None:

@@ -33,7 +33,6 @@ from push_predictor.models.predictors.tails import (
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -284,14 +283,3 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
     counts = [regression.parameters.count for regression in learnt(model).regressions]
     own = fit_tails(table.outcomes - held.mean, held.covariance, table.push_id, counts)
     assert own is not None and np.prod(tails_of(model).factor) > 1.01 * np.prod(own.factor)
-
-
-def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
-    model, test = trained("gp"), shared_errors(20, 3)
-    table, answer = tabulate(model), predicted(model, test)
-    assert table.tabulated
-    for rows in (slice(None), slice(0, 1)):
-        found = table.predict_rows(test.inputs[rows], test.duration[rows])
-        assert found.covariance == pytest.approx(answer.covariance[rows], rel=0.02, abs=1e-12)
-        assert found.process_covariance == pytest.approx(answer.process_covariance[rows], rel=0.02, abs=1e-12)
-        assert found.tails is tails_of(model)

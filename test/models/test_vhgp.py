@@ -9,16 +9,13 @@ import tracemalloc
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
 from likelihoods import bound_and_gradient, log_marginal_likelihood
 from sparse_rows import PARAMETERS, rows
-from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
-from push_predictor.models import train
 from push_predictor.models.gaussian_process import sparse_vhgp, vhgp
 from push_predictor.models.gaussian_process.bound import Bound, Sites, VhgpParameters, VhgpProblem
 from push_predictor.models.gaussian_process.fit import _spread as prior_spread
@@ -32,11 +29,7 @@ from push_predictor.models.gaussian_process.sparse_vhgp import (
     noise_prior,
 )
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
-from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
-from push_predictor.recordings.table import PushTable
+from push_predictor.models.train import MOST_DENSE_ROWS, inducing_inputs
 from push_predictor.types import Array
 
 
@@ -397,15 +390,6 @@ def test_memory_grows_with_rows_times_inducing_inputs() -> None:
     assert peak < 3.0 * 8 * 20_000 * len(chosen)  # features of f and of g, and blocks
 
 
-def table(n: int) -> PushTable:
-    """Pushes of five windows each, with noise that grows with the angle."""
-    rng = np.random.default_rng(0)
-    inputs = np.column_stack([np.full(n, 0.02), rng.uniform(0.0, 0.25, n), rng.uniform(-0.5, 0.5, n)])
-    noise = rng.normal(size=(n, 3)) * np.exp(2.0 * inputs[:, 2:] - 1.0)
-    outcomes = 1e-3 * (np.column_stack([np.cos(inputs[:, 2]), np.sin(inputs[:, 2]), inputs[:, 1]]) + noise)
-    return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"push-{k // 5}" for k in range(n)]))
-
-
 def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
     assert inducing_inputs("vhgp", MOST_DENSE_ROWS) is None
     assert inducing_inputs("vhgp", MOST_DENSE_ROWS + 1) == DEFAULT_INDUCING
@@ -414,26 +398,3 @@ def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
     for kind, wanted in (("gp", 30), ("analytical", 30), ("vhgp", 0)):
         with pytest.raises(TrainingError, match=f"inducing: {wanted} is not accepted"):
             inducing_inputs(kind, 100, wanted)
-
-
-@pytest.mark.slow
-def test_sparse_push_model_of_many_windows_is_trained_saved_loaded_and_tabulated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rows = table(400)
-    monkeypatch.setattr(train, "MOST_DENSE_ROWS", 399)
-    monkeypatch.setattr(train, "DEFAULT_INDUCING", 20)
-    model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, mean="zero"))
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    assert all(isinstance(regression, SparseVHGP) for regression in model.predictor.regressions)
-    save_model(model, tmp_path / "sparse.pushmodel")
-    again = load_model(tmp_path / "sparse.pushmodel")
-    push = rows.inputs[:40], rows.duration[:40]
-    np.testing.assert_array_equal(again.predict_rows(*push).covariance, model.predict_rows(*push).covariance)
-    tabulated = tabulate(again)
-    assert tabulated.tabulated, tabulated.how
-    variance = np.diagonal(model.predict_rows(*push).covariance, axis1=1, axis2=2)
-    of_table = np.diagonal(tabulated.predict_rows(*push).covariance, axis1=1, axis2=2)
-    np.testing.assert_allclose(of_table, variance, rtol=1e-2)
-    truth = 1e-6 * np.exp(4.0 * rows.inputs[:40, 2] - 2.0)
-    assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4
