@@ -23,6 +23,7 @@ from push_predictor.models.mechanics.parameters import BY_NAME as PARAMETERS_BY_
 from push_predictor.models.mechanics.surface import PowerSurface, uniform_ellipsoid
 from push_predictor.models.mechanisms import LARGEST, LIBRARY, REFINEMENTS, Mechanism, mechanism_named
 from push_predictor.models.pushes import Push
+from push_predictor.types import Array
 
 EVERY = (*LIBRARY, *REFINEMENTS)
 EVERY_MECHANISM = pytest.mark.parametrize("mechanism", EVERY, ids=lambda m: m.name)
@@ -35,6 +36,14 @@ def some(n: int, seed: int = 0, duration: float = 0.2) -> Push:
     inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
     covariates = {"slider_heading": rng.uniform(-3.0, 3.0, n), "elapsed_time": np.linspace(0.0, 1000.0, n)}
     return Push(inputs, np.full(n, duration), covariates)
+
+
+def displaced(fitted: FittedMechanics, push: Push, changed: dict[str, float]) -> Array:
+    """By the forward model itself, whose headings are those of the pushes."""
+    normal = fitted.outline.inward_normal(push.inputs[:, 1])
+    heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+    values = {**fitted.values, **changed}
+    return fitted.mechanics.displacement(values, push.inputs, push.duration, {"push_heading": heading})
 
 
 # --- the table -------------------------------------------------------------------------------------------------------
@@ -71,19 +80,12 @@ def test_a_response_is_the_central_difference_of_displacements(mechanism: Mechan
     fitted, push = PATCHED, some(12)
     response = mechanism.response(fitted, push)
     assert response.shape == (12, 3, len(mechanism.quantities))
-    normal = fitted.outline.inward_normal(push.inputs[:, 1])
-    heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
     for k, name in enumerate(mechanism.quantities):
         step, value = 0.5 * PARAMETERS_BY_NAME[name].spread, fitted.value(name)
         low, high = value - step, value + step
         if name in ("inertia", "contact_friction"):
             low = max(low, 0.0)
-        more, less = (
-            fitted.mechanics.displacement(
-                {**fitted.values, name: end}, push.inputs, push.duration, {"push_heading": heading}
-            )
-            for end in (high, low)
-        )
+        more, less = (displaced(fitted, push, {name: end}) for end in (high, low))
         expected = (more - less) / (high - low)
         assert response[:, :, k] * IN_METRES == pytest.approx(expected * IN_METRES, rel=1e-9, abs=1e-9)
 
@@ -175,18 +177,11 @@ def test_responses_of_an_effect_of_size_zero_are_those_of_its_mechanism(name: st
 
 @pytest.mark.parametrize("name", NAMES)
 def test_shift_is_the_direct_difference_of_displacements(name: str) -> None:
-    """Of the forward model itself, whose headings are those of the pushes."""
     push, on, mechanism = some(30, 4), square(), mechanism_named(name)
     size = 0.3 * np.array([LARGEST[quantity] for quantity in mechanism.quantities])
-    normal = on.outline.inward_normal(push.inputs[:, 1])
-    heading = push.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
     values = {quantity: on.value(quantity) + s for quantity, s in zip(mechanism.quantities, size, strict=True)}
-    changed, plain = (
-        on.mechanics.displacement(v, push.inputs, push.duration, {"push_heading": heading})
-        for v in ({**on.values, **values}, on.values)
-    )
     shift = joint_shift(on, [effect(name, *size)], push)
-    assert shift == pytest.approx(changed - plain, abs=1e-15)
+    assert shift == pytest.approx(displaced(on, push, values) - displaced(on, push, {}), abs=1e-15)
     assert name == "rim_pressure" or size_of(shift) > 1e-6  # the ellipsoid has no rim
 
 

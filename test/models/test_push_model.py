@@ -108,21 +108,13 @@ def test_a_number_of_rows_is_drawn_by_the_seed() -> None:
 
 
 def test_constant_inputs_are_dropped_and_constant_outcomes_rejected() -> None:
-    table = noisy_pushes(60)
+    table, rig, zero = noisy_pushes(60), square_rig(), TrainingOptions(mean="zero")
     table.inputs[:, 0] = 0.02
-    assert (
-        len(
-            train_model(
-                table, square_rig(), "gp", name="g", options=TrainingOptions(mean="zero")
-            ).predictor.scaling.columns
-        )
-        == 2
-    )
+    assert len(train_model(table, rig, "gp", name="g", options=zero).predictor.scaling.columns) == 2
     table.outcomes[:, 1] = 0.0
-    with pytest.raises(TrainingError, match="dy: does not vary"):
-        train_model(table, square_rig(), "gp", name="g", options=TrainingOptions(mean="zero"))
-    with pytest.raises(TrainingError, match="'forest' is not accepted"):
-        train_model(table, square_rig(), "forest", name="g", options=TrainingOptions(mean="zero"))
+    for kind, message in (("gp", "dy: does not vary"), ("forest", "'forest' is not accepted")):
+        with pytest.raises(TrainingError, match=message):
+            train_model(table, rig, kind, name="g", options=zero)
 
 
 @pytest.mark.parametrize(

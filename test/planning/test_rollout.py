@@ -459,22 +459,14 @@ def test_outliers_count_no_more_than_large_residuals() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "field"),
+    ("field", "values"),
     [
-        ({"observed": np.zeros((1, 3))}, "observed"),
-        ({"observed": np.full((2, 3), np.nan)}, "observed"),
-        ({"distance": np.array([1.0])}, "distance"),
-        ({"distance": np.array([0.004, 0.0])}, "distance"),
-        ({"distance": np.array([0.004, np.inf])}, "distance"),
+        ("observed", [np.zeros((1, 3)), np.full((2, 3), np.nan)]),
+        ("distance", [np.array([1.0]), np.array([0.004, 0.0]), np.array([0.004, np.inf])]),
     ],
 )
-def test_windows_that_do_not_match_are_refused(change: dict[str, Array], field: str) -> None:
-    with pytest.raises(RequestError, match=field):
-        EarlierWindows(
-            **{
-                "predictions": predictions(2),
-                "observed": np.zeros((2, 3)),
-                "distance": np.array([0.008, 0.004]),
-                **change,
-            }
-        )
+def test_windows_that_do_not_match_are_refused(field: str, values: list[Array]) -> None:
+    sound = {"predictions": predictions(2), "observed": np.zeros((2, 3)), "distance": np.array([0.008, 0.004])}
+    for value in values:
+        with pytest.raises(RequestError, match=field):
+            EarlierWindows(**{**sound, field: value})
