@@ -119,6 +119,8 @@ def test_each_change_of_the_rim_is_on_surfaces_of_its_own() -> None:
         shift = even.shifted(("rim_exponent",), np.full((len(still), 1), exponent), push)[0]
         moved = mechanics_model({"rim_exponent": exponent}).predictor.mechanics.displacement(push.inputs, push.duration)
         np.testing.assert_allclose(still + shift, moved, rtol=0.0, atol=1e-15)
+    half = np.where(np.arange(len(still)) < 12, 7.0, 0.0)[:, None]  # at once with none, on the surfaces of both
+    np.testing.assert_allclose(even.shifted(("rim_exponent",), half, push)[0][:12], shift[:12], rtol=0.0, atol=1e-15)
 
 
 # --- recordings whose rigs have different support points ---

@@ -15,6 +15,7 @@ from repository import BAGS
 from sensed_motion import outcomes_of, sensed
 
 from push_predictor.errors import RequestError, RigError
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.finder import find_windows
@@ -148,6 +149,9 @@ def test_committed_bags_equal_the_output_of_their_command(name: str, monkeypatch
     assert np.array_equal(kept.slider.stamp, made.slider.stamp)
     assert np.array_equal(kept.pusher.stamp, made.pusher.stamp)
     assert np.median(np.abs(kept.slider.x - made.slider.x)) < 1e-12
+    assert np.median(np.abs(wrap_angle(kept.slider.heading - made.slider.heading))) < 1e-12
+    assert kept.wrench is not None and made.wrench is not None
+    assert np.median(np.abs(kept.wrench.fx - made.wrench.fx)) < 1e-12
     assert np.max(np.abs(kept.slider.x - made.slider.x)) < 1e-4
 
 
