@@ -8,11 +8,10 @@ from __future__ import annotations
 import gc
 import weakref
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
 import pytest
-from synthetic import RADIUS, square_rig
+from synthetic import RADIUS, square_pushes
 
 from benchmarks.planning.rollout_truth import EnergyDistance
 from push_predictor.errors import CovariateError, RequestError
@@ -41,21 +40,11 @@ AT_REST = np.zeros(3)
 PUSH = [0.02, 0.1, 0.2, 1.0]  # five windows
 
 
-@cache
-def rows(count: int = 40) -> PushTable:
-    """Windows of 0.2 s, five a push."""
-    rng = np.random.default_rng(0)
-    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
-    outcomes = analytical_mechanics(shape_outline("rect1"), RADIUS).displacement(inputs, np.full(count, 0.2))
-    outcomes += rng.standard_normal((count, 3)) * SD
-    return PushTable(inputs, np.full(count, 0.2), outcomes, np.array([f"p{k // 5}" for k in range(count)]))
-
-
 def model_with(covariance: Array, shape: str = "rect1") -> PushModel:
     """The analytical model of a shape, every window of 0.2 s with one covariance (3, 3)."""
     rig = Rig(shape, shape_outline(shape), RADIUS, "abs", 0.837)
     predictor = MechanicsPredictor(analytical_mechanics(rig.outline, RADIUS), covariance)
-    return PushModel("made", "analytical", rig, predictor, rows(), Provenance((), 8, 0, "0"))
+    return PushModel("made", "analytical", rig, predictor, square_pushes(40)[0], Provenance((), 8, 0, "0"))
 
 
 def heading_of(contact: float, angle: float, model: PushModel) -> float:
@@ -246,7 +235,7 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
 @pytest.fixture(scope="module")
 def learnt() -> PushModel:
     """A GP of 40 windows of 0.2 s."""
-    return train_model(rows(), square_rig(), "gp", name="learnt", options=TrainingOptions(mean="zero"))
+    return train_model(*square_pushes(40), "gp", name="learnt", options=TrainingOptions(mean="zero"))
 
 
 @pytest.mark.parametrize(
