@@ -84,7 +84,8 @@ def test_held_out_vhgp_is_close_to_vhgp_solved_on_other_blocks() -> None:
 
 def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units() -> None:
     table = noisy_pushes(80, windows_per_push=4)
-    predictor = train_model(table, square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero")).predictor
+    model = train_model(table, square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero"))
+    predictor = model.predictor.with_independent_outputs()
     assert isinstance(predictor, GaussianProcessPredictor)
     block = np.arange(80) // 4 % BLOCKS
     found = predictor.held_out_moments(Push.of(table), block)
