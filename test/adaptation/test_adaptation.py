@@ -219,10 +219,6 @@ def test_the_outputs_of_a_learnt_model_are_taken_one_by_one() -> None:
     assert changes(adapted_to(learnt, table)) == pytest.approx(changes(adapted_to(apart, table)), abs=1e-9)
 
 
-def wrong(model: PushModel, **options: object) -> Adaptation:
-    return Adaptation(model, **options)  # type: ignore[arg-type]
-
-
 def test_what_cannot_follow_is_refused_by_name(deployed: PushModel) -> None:
     learnt = train_model(*square_pushes(30), "gp", name="blind", options=TrainingOptions(mean="zero"))
     with pytest.raises(RequestError, match="model: 'blind' is not accepted, give a model about mechanics"):
@@ -235,7 +231,7 @@ def test_what_cannot_follow_is_refused_by_name(deployed: PushModel) -> None:
         ({"speed": np.nan}, "speed: nan"),
     ):
         with pytest.raises(RequestError, match=message):
-            wrong(deployed, **options)
+            Adaptation(deployed, **options)  # type: ignore[arg-type]
     adaptation = Adaptation(deployed)
     for table in (empty_table(), pushes(2, 1)):
         with pytest.raises(RequestError, match="those of one push"):

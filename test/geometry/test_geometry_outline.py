@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from scipy.special import ellipe
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.convex import is_convex
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import (
@@ -186,14 +185,6 @@ def test_a_corner_itself_is_on_the_outline_with_the_normal_of_one_of_its_edges(o
     assert found.distance == pytest.approx(0.0, abs=1e-15)
     for normal, before, after in zip(found.normal, np.roll(normals, 1, axis=0), normals, strict=True):
         assert min(np.linalg.norm(normal - before), np.linalg.norm(normal - after)) < 1e-9
-
-
-def test_a_star_that_is_wound_twice_is_not_convex():
-    """Though it turns to the left at each vertex."""
-    angles = 0.8 * np.pi * np.arange(5)
-    star = Outline(0.05 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    assert not is_convex(star.vertices)
-    assert star.project(np.array([[0.06, 0.0]])).distance[0] == pytest.approx(0.01)
 
 
 @given(some_outline, contacts)
