@@ -93,7 +93,7 @@ def test_demands_the_covariate_that_a_parameter_needs(parameter: MechanicsParame
         mechanics().displacement({parameter.name: parameter.high / 2.0}, *one())
 
 
-# --- whole pushes on the ellipsoid, against closed forms and fine steps ----------------------------------------------
+# --- whole pushes: the end, corners, a notch --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("travel", [0.004, 0.0145])

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tabulated models: an accurate table inside the domain, the model itself everywhere else; the splines of a table."""
+"""Tabulated models: an accurate table inside the domain, the model itself everywhere else; its compiled code."""
 
 from __future__ import annotations
 
@@ -291,7 +291,7 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
 
 
-# --- splines on boxes ---
+# --- the compiled code ---
 
 
 def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refused() -> None:
