@@ -155,6 +155,12 @@ def test_patch_of_an_outline_with_hidden_parts_stays_inside_it() -> None:
     assert sampled.length == pytest.approx(exact.length, rel=0.03)
 
 
+@pytest.mark.parametrize("outline", [square(0.09), NOTCHED], ids=["square", "notched"])
+def test_pressure_at_the_rim_reaches_further(outline: Outline) -> None:
+    lengths = [patch(outline, e).length for e in (-4.0, -1.0, 0.0, 1.0, 4.0, 12.0)]
+    assert np.all(np.diff(lengths) > 0.0)
+
+
 def test_pressure_of_a_disc_follows_its_exponent() -> None:
     """With pressure in proportion to rho^e the mean distance is (e + 2) / (e + 3) of the radius."""
     for e in (0.0, 1.0, 4.0):
