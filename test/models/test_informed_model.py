@@ -13,6 +13,7 @@ import pytest
 from learnt_models import learnt, targets
 from synthetic import RADIUS, square_rig
 
+from push_predictor.models import train, train_learnt
 from push_predictor.models.features import DEVIATION
 from push_predictor.models.gaussian_process import vhgp
 from push_predictor.models.gaussian_process.bound import VhgpParameters
@@ -21,6 +22,7 @@ from push_predictor.models.gaussian_process.prediction import exact_log_density
 from push_predictor.models.gaussian_process.regression import ConstantNoise, best_held_out, fit_constant, held_out_score
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
@@ -94,6 +96,31 @@ def test_a_tie_goes_to_mechanics_and_so_does_what_pushes_cannot_decide() -> None
     assert not zero_is_better(noise + 0.9 * error, zero)
     assert zero_is_better(noise + 1.1 * error, zero)
     assert not zero_is_better(zero, noise + 1.1 * error)
+
+
+def test_auto_is_decided_by_held_out_pushes_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same pushes under both means, one number a push; the answer is followed, with few rows and with many."""
+    seen: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def answer(zero: np.ndarray, mechanics: np.ndarray) -> bool:
+        seen.append((zero, mechanics))
+        return better
+
+    monkeypatch.setattr(train_learnt, "zero_is_better", answer)
+    table = pushes(40, 3)
+    for most, better in ((500, True), (20, False)):
+        monkeypatch.setattr(train, "MOST_MEAN_ROWS", most)
+        predictor = learnt(trained(table, "gp", mean="auto"))
+        assert (predictor.mean is None) == better
+        assert len(predictor.regressions[0].outputs) == 40
+    assert [zero.shape for zero, _ in seen] == [mechanics.shape for _, mechanics in seen]
+    assert [len(zero) for zero, _ in seen] == [20, len(set(drawn(table, 20).push_id))]
+    # The densities are in the same units: with mechanics these pushes are more likely, by nats, not by orders.
+    assert 0.0 < float(np.mean(seen[0][1] - seen[0][0])) < 20.0
+
+
+def drawn(table: PushTable, count: int) -> PushTable:
+    return table.take(train.training_rows(replace(table), None, 0, count))
 
 
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
@@ -267,6 +294,20 @@ def test_noise_of_the_recorded_speed_is_no_input() -> None:
     jittery = learnt(trained_at(pushes_at(0.02, jitter=0.05)))
     assert 0 not in jittery.scaling.columns and jittery.scaling.speeds == pytest.approx((0.02, 0.02), rel=0.05)
     assert 0 in learnt(trained_at(pushes_at(0.02, 0.03, jitter=0.05))).scaling.columns
+
+
+@pytest.mark.parametrize("about", (None, MECHANICS))
+@pytest.mark.parametrize("speed", (0.02, 0.08))
+def test_density_without_tails_is_that_of_the_moments(about: FittedMechanics | None, speed: float) -> None:
+    table = pushes_at(speed, seed=2)
+    predictor = learnt(trained_at(pushes_at(0.02), about=about, tails=False))
+    mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, {}))
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    expected = -0.5 * (np.log(2.0 * np.pi * variance) + (table.outcomes - mean) ** 2 / variance)
+    push = Push(table.inputs, table.duration, {})
+    assert predictor.tails is None
+    found = predictor._log_density(predictor.latent(table.inputs), push, table.outcomes)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
