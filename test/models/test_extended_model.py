@@ -15,7 +15,7 @@ import pytest
 from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, mechanics, pushes, slippery
 from learnt_models import learnt
 from made_up_traces import gain
-from synthetic import square_rig
+from synthetic import square_rig, translating_push
 
 from push_predictor.cli import main
 from push_predictor.errors import RequestError
@@ -31,7 +31,10 @@ from push_predictor.models.request import PushRequest, check_pushes, check_reque
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import MEAN_TOLERANCE, tabulate
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend, refit_base
@@ -310,3 +313,24 @@ def test_predict_command_accepts_and_requires_the_covariate(
     assert main(["info", str(model_file), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}
+
+
+def turned_a_little(recording: Recording) -> Recording:
+    """A slider with a constant heading would be refused: its quaternions are probably in another order."""
+    heading = np.linspace(0.0, 1e-3, len(recording.slider))
+    return replace(recording, slider=replace(recording.slider, heading=heading))
+
+
+def test_evaluate_and_validate_name_the_missing_covariate(
+    bases: dict[str, PushModel], model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    warm = replace(slippery(0.2), basis=replace(DRIFT, drivers=("topic:/warmth",)))
+    save_model(extended(bases["gp"], warm), tmp_path / "warm")
+    write_table(tmp_path / "table.csv", replace(pushes(10, 1), covariates={}))
+    write_recording(tmp_path / "bag", turned_a_little(translating_push()))
+    assert main(["validate", str(model_file), str(tmp_path / "bag"), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["n_test"] == 5  # windows have the time
+    for command, model, data in (("evaluate", model_file, "table.csv"), ("validate", tmp_path / "warm", "bag")):
+        assert main([command, str(model), str(tmp_path / data)]) == 1
+        name = "elapsed_time" if command == "evaluate" else "topic:/warmth"
+        assert f"covariate {name}: 'missing' is not accepted" in capsys.readouterr().err

@@ -126,6 +126,7 @@ def test_constant_inputs_are_dropped_and_constant_outcomes_rejected() -> None:
         ({"contact": 1.0}, r"contact: 1.0 .* \[0, 1\)"),
         ({"contact": -1e-9}, "contact"),
         ({"angle": np.pi / 2}, r"angle: 1.57.* \(-pi/2, pi/2\)"),
+        ({"angle": -np.pi / 2}, "angle: -1.57"),
         ({"duration": 0.0}, "duration: 0.0"),
         ({"duration": 1.0}, r"duration: 1.0 .* 0.18 to 0.22 s"),
         ({"covariates": {"topic:/heat": float("nan")}}, "covariate topic:/heat: nan"),
