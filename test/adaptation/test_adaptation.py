@@ -301,6 +301,7 @@ def test_a_push_far_from_what_is_known_moves_the_parameters_less_than_by_bayes()
     )
     by_bayes = gain @ (100.0 / (1.0 + 3.0 * CORRELATION) * np.einsum("nkp,nk->p", SLOPES, odd.residual))
     assert np.linalg.norm(after.mean - found.mean) < 0.1 * np.linalg.norm(by_bayes)
+    assert np.all(after.noise.factor < 1.2 * found.noise.factor)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
