@@ -96,6 +96,11 @@ def models() -> dict[str, PushModel]:
     return trained
 
 
+@pytest.fixture(scope="module")
+def tables(models: dict[str, PushModel]) -> dict[str, TabulatedModel]:
+    return {name: tabulate(models[name]) for name in NAMES}
+
+
 def extended(base: PushModel) -> PushModel:
     """The base with two effects that share a covariance, and the generic one; its regressions learnt other outcomes."""
     drift = DriverBasis("linear", ("elapsed_time",), (5.0,), (3.0,))
@@ -147,9 +152,9 @@ def assert_same_bits(one: Prediction, other: Prediction) -> None:
 
 @EVERY_MODEL
 def test_a_model_and_its_table_predict_the_same_bits_after_saving_and_loading(
-    models: dict[str, PushModel], name: str, tmp_path: Path
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str, tmp_path: Path
 ) -> None:
-    model, table = models[name], tabulate(models[name])
+    model, table = models[name], tables[name]
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
     assert is_model_file(tmp_path / "m") and (loaded.kind, loaded.needs) == (model.kind, model.needs)
@@ -168,8 +173,10 @@ def test_a_model_and_its_table_predict_the_same_bits_after_saving_and_loading(
 
 
 @EVERY_MODEL
-def test_a_table_answers_as_its_model(models: dict[str, PushModel], name: str) -> None:
-    table = tabulate(models[name])
+def test_a_table_answers_as_its_model(
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str
+) -> None:
+    table = tables[name]
     assert table.tabulated == isinstance(models[name].predictor.base, GaussianProcessPredictor)
     found, exact = answers(table), answers(models[name])
     assert np.max(np.abs(found.mean - exact.mean) / exact.std) < MEAN_TOLERANCE
@@ -181,9 +188,11 @@ def test_a_table_answers_as_its_model(models: dict[str, PushModel], name: str) -
 
 
 @EVERY_MODEL
-def test_a_push_alone_has_the_prediction_that_it_has_among_others(models: dict[str, PushModel], name: str) -> None:
+def test_a_push_alone_has_the_prediction_that_it_has_among_others(
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str
+) -> None:
     """A positive definite one, also beyond the domain, with no more process noise than there is in all."""
-    for served in (models[name], tabulate(models[name])):
+    for served in (models[name], tables[name]):
         together = answers(served)
         for k in range(len(INPUTS)):
             alone = answers(served, slice(k, k + 1))
