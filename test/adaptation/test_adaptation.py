@@ -112,16 +112,6 @@ def test_before_the_first_push_the_mean_is_the_deployed_one_and_the_covariance_l
     assert np.all(np.linalg.eigvalsh(after.covariance - before.covariance) > -1e-12)
 
 
-def test_one_bad_push_moves_little(deployed: PushModel) -> None:
-    good = pushes(20, 1)
-    slipped = replace(pushes(1, 3), outcomes=pushes(1, 3).outcomes + [0.0, 0.004, 0.3])
-    adaptation = adapted_to(deployed, good)
-    adaptation.update(slipped)
-    by_name = changes(adaptation)
-    assert abs(by_name["contact_friction"]) < 0.05 and abs(by_name["centre_y"]) < 0.002
-    assert np.all(adaptation.noise < 1.2)
-
-
 def test_noise_that_doubled_is_found(deployed: PushModel) -> None:
     table = pushes(80, 1)
     mean = deployed.predict_rows(table.inputs, table.duration).mean
@@ -229,10 +219,6 @@ def test_the_outputs_of_a_learnt_model_are_taken_one_by_one() -> None:
     assert changes(adapted_to(learnt, table)) == pytest.approx(changes(adapted_to(apart, table)), abs=1e-9)
 
 
-def wrong(model: PushModel, **options: object) -> Adaptation:
-    return Adaptation(model, **options)  # type: ignore[arg-type]
-
-
 def test_what_cannot_follow_is_refused_by_name(deployed: PushModel) -> None:
     learnt = train_model(*square_pushes(30), "gp", name="blind", options=TrainingOptions(mean="zero"))
     with pytest.raises(RequestError, match="model: 'blind' is not accepted, give a model about mechanics"):
@@ -245,7 +231,7 @@ def test_what_cannot_follow_is_refused_by_name(deployed: PushModel) -> None:
         ({"speed": np.nan}, "speed: nan"),
     ):
         with pytest.raises(RequestError, match=message):
-            wrong(deployed, **options)
+            Adaptation(deployed, **options)  # type: ignore[arg-type]
     adaptation = Adaptation(deployed)
     for table in (empty_table(), pushes(2, 1)):
         with pytest.raises(RequestError, match="those of one push"):
@@ -315,6 +301,7 @@ def test_a_push_far_from_what_is_known_moves_the_parameters_less_than_by_bayes()
     )
     by_bayes = gain @ (100.0 / (1.0 + 3.0 * CORRELATION) * np.einsum("nkp,nk->p", SLOPES, odd.residual))
     assert np.linalg.norm(after.mean - found.mean) < 0.1 * np.linalg.norm(by_bayes)
+    assert np.all(after.noise.factor < 1.2 * found.noise.factor)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])

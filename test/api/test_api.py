@@ -32,7 +32,7 @@ from push_predictor import (
     validate,
 )
 from push_predictor.cli import main
-from push_predictor.errors import PushPredictorError, RequestError, RigError, TrainingError
+from push_predictor.errors import PushPredictorError, RequestError, RigError
 from push_predictor.planning.rollout import rollout
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.table_file import write_table
@@ -197,21 +197,6 @@ def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp
         assert train(tmp_path / "rows.csv", kind="analytical", rig=rig).rig.pusher_radius == model.rig.pusher_radius
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({"data": []}, RequestError, "data: .* at least one recording"),
-        ({"data": "absent.mcap"}, PushPredictorError, "absent.mcap"),
-        ({"data": FEW, "kind": "forest"}, TrainingError, "'forest' is not accepted, give one of vhgp, gp, analyt"),
-        ({"data": FEW, "kind": "gp", "n_train": 0}, TrainingError, "n_train: 0 is not accepted"),
-    ],
-)
-def test_a_wrong_call_of_train_is_refused_by_field(arguments, error, message):
-    with pytest.raises(error, match=message):
-        train(**arguments)
-
-
 # --- models and predictions -------------------------------------------------------------------------------------------
 
 
@@ -221,14 +206,6 @@ def test_a_saved_model_predicts_the_same_and_paths_are_str_or_path(model: PushMo
     pushes = Pushes(0.02, [0.1, 0.4], 0.3)
     for path in (tmp_path / "m.pushmodel", str(tmp_path / "m.pushmodel")):
         np.testing.assert_array_equal(load_model(path).predict(pushes).mean, model.predict(pushes).mean)
-
-
-@pytest.mark.slow
-def test_the_standard_deviation_is_the_root_of_the_covariances_diagonal(model: PushModel):
-    prediction = model.predict(Pushes(0.02, [0.1, 0.4, 0.7], [0.0, 0.3, -0.3]))
-    assert prediction.std.shape == prediction.mean.shape == (3, 3) and len(prediction) == 3
-    for k in range(3):
-        np.testing.assert_allclose(prediction.std[:, k] ** 2, prediction.covariance[:, k, k], rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -246,21 +223,13 @@ def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain
     ("pushes", "message"),
     [
         (Pushes(-0.02, 0.1, 0.3), "velocity: -0.02 is not accepted, give a finite number above 0, in m/s"),
-        (Pushes(0.02, 0.1, [0.3, 0.0, 1.6]), r"angle\[2\]: 1.6 is not accepted"),
-        (Pushes(0.02, 0.1, 0.3, duration=2.0), "duration: 2.0 is not accepted, give 0.18 to 0.22 s"),
+        (Pushes(0.02, [0.1, 0.2, 1.5], 0.3, duration=[0.2, 0.19, 0.19]), r"contact\[2\]: 1.5"),  # of all durations
     ],
 )
 def test_a_push_that_the_model_cannot_predict_is_refused_as_a_service_would(
     model: PushModel, pushes: Pushes, message: str
 ):
     with pytest.raises(RequestError, match=message):
-        model.predict(pushes)
-
-
-@pytest.mark.slow
-def test_the_index_in_the_error_counts_all_pushes_also_where_durations_differ(model: PushModel):
-    pushes = Pushes(0.02, [0.1, 0.2, 1.5], 0.3, duration=[0.2, 0.19, 0.19])
-    with pytest.raises(RequestError, match=r"contact\[2\]: 1.5"):
         model.predict(pushes)
 
 
@@ -321,20 +290,12 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
 
 
 @pytest.mark.slow
-def test_the_chosen_push_moves_the_slider_towards_the_goal(model: PushModel):
+def test_the_chosen_push_moves_the_slider_towards_the_goal_and_at_the_goal_there_is_none(model: PushModel):
     goal = Goal([0.03, 0.0, 0.0], 0.01, None)
     choice = choose_push(model, [0.0, 0.0, 0.0], goal)
     assert choice is not None
     assert np.hypot(*(choice.mean[:2] - goal.pose[:2])) < 0.03
     assert "probability" in repr(choice) and len(repr(choice).splitlines()) == 3
-
-
-@pytest.mark.slow
-def test_at_the_goal_there_is_nothing_to_push(model: PushModel):
-    assert choose_push(model, (0.03, 0.0, 0.0), Goal((0.03, 0.0, 0.0), 0.01, None)) is None
-
-
-@pytest.mark.slow
-def test_a_slider_pose_of_another_shape_is_refused(model: PushModel):
+    assert choose_push(model, (0.03, 0.0, 0.0), goal) is None
     with pytest.raises(RequestError, match="slider"):
-        choose_push(model, [0.0, 0.0], Goal((0.03, 0.0, 0.0), 0.01, None))
+        choose_push(model, [0.0, 0.0], goal)

@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from mistakes import tracked
 from repository import BAGS
 
 from push_predictor import DataWarning, PushModel, trace, train, validate
-from push_predictor.errors import PushPredictorError, RecordingError
+from push_predictor.errors import RecordingError
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table_file import write_table
@@ -48,19 +47,9 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> PushModel:
 
 
 @pytest.fixture
-def loaded_only(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    """A trace that ends once its data are loaded."""
-
-    def enough(*_: Any, **__: Any) -> None:
-        raise PushPredictorError("loaded")
-
-    monkeypatch.setattr("push_predictor.residuals.trace.trace", enough)
-
-    def traced(*arguments: Any, **options: Any) -> None:
-        with pytest.raises(PushPredictorError, match="loaded"):
-            trace(*arguments, **options, watch=quiet)
-
-    yield traced
+def loaded_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trace ends once its data are loaded."""
+    monkeypatch.setattr("push_predictor.residuals.trace.trace", lambda *_, **__: None)
 
 
 def warned(call: Callable[[], object]) -> list[str]:
@@ -72,31 +61,28 @@ def warned(call: Callable[[], object]) -> list[str]:
     return [str(each.message) for each in caught]
 
 
-def test_a_turned_and_shifted_recording_warns_wherever_it_enters(
-    turned: Path, model: PushModel, loaded_only: Callable[..., None]
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda model, path, **strict: train(path, kind="analytical", watch=quiet, **strict),
+        lambda model, path, **strict: validate(model, path, **strict),
+        lambda model, path, **strict: trace(model, path, watch=quiet, **strict),
+    ],
+    ids=["train", "validate", "trace"],
+)
+def test_a_turned_and_shifted_recording_warns_wherever_it_enters_and_is_an_error_if_strict(
+    turned: Path, model: PushModel, loaded_only: None, call: Callable[..., object]
 ) -> None:
-    for call in (
-        lambda: train(turned, kind="analytical", watch=quiet),
-        lambda: validate(model, turned),
-        lambda: loaded_only(model, turned),
-    ):
-        found = [text for text in warned(call) if "turned by" in text]
-        assert len(found) == 1 and found[0].startswith(f"{turned}: ")
+    found = [text for text in warned(lambda: call(model, turned)) if "turned by" in text]
+    assert len(found) == 1 and found[0].startswith(f"{turned}: ")
+    with pytest.raises(RecordingError, match="turned by"):
+        call(model, turned, strict=True)
 
 
-def test_strict_makes_the_warning_an_error(turned: Path, model: PushModel) -> None:
-    for call in (
-        lambda: train(turned, kind="analytical", watch=quiet, strict=True),
-        lambda: validate(model, turned, strict=True),
-        lambda: trace(model, turned, watch=quiet, strict=True),
-    ):
-        with pytest.raises(RecordingError, match="turned by"):
-            call()
-
-
-def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel, loaded_only: Callable[..., None]) -> None:
+@pytest.mark.usefixtures("loaded_only")
+def test_a_sound_recording_is_silent_and_passes_if_strict(model: PushModel) -> None:
     assert warned(lambda: train(ROUND, kind="analytical", watch=quiet, strict=True)) == []
-    assert warned(lambda: loaded_only(model, HEXAGON, strict=True)) == []
+    assert warned(lambda: trace(model, HEXAGON, watch=quiet, strict=True)) == []
 
 
 def test_a_learnt_model_of_few_pushes_warns(tmp_path: Path) -> None:

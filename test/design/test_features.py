@@ -72,14 +72,9 @@ def test_a_learnt_model_has_the_variance_of_its_functions(kind: str) -> None:
     of_function = moments.covariance - moments.process_covariance
     expected = np.diagonal(of_function, axis1=1, axis2=2) / found.noise_sd**2
     variance = np.sum(found.values**2, axis=2)
+    np.testing.assert_allclose(found.noise_sd**2, np.diagonal(moments.process_covariance, axis1=1, axis2=2))
     np.testing.assert_allclose(variance, expected, rtol=1e-6, atol=1.1 * NEGLIGIBLE)
     assert variance.max() > 20 * NEGLIGIBLE
-
-
-def test_noise_is_that_of_the_process() -> None:
-    model, push = learnt("vhgp"), some()
-    process = model.predict_rows(push.inputs, push.duration).process_covariance
-    np.testing.assert_allclose(features_of(model, push).noise_sd ** 2, np.diagonal(process, axis1=1, axis2=2))
 
 
 def test_the_outputs_of_functions_have_weights_of_their_own() -> None:
@@ -144,29 +139,18 @@ def test_residuals_and_mechanics_add_up() -> None:
     assert variance.max() > 5 * NEGLIGIBLE
 
 
-def test_an_effect_adds_its_uncertainty_and_scales_that_of_the_base() -> None:
-    table = drifting_pushes(40)
-    base = trained("gp", table)
-    model = extended(base, slippery(0.1, 0.05), scale=(2.0, 2.0, 2.0))
-    push = Push(*(some().inputs, some().duration), {"elapsed_time": np.full(40, 800.0)})
-    alone, found = features_of(base, push), features_of(model, push)
-    np.testing.assert_allclose(found.noise_sd, 2.0 * alone.noise_sd)
-    uncertainty = model.predictor.shift(push).covariance / found.noise_sd[:, :, None] / found.noise_sd[:, None]
-    assert uncertainty.max() > NEGLIGIBLE
-    np.testing.assert_allclose(squares(found.values), squares(alone.values) + uncertainty, rtol=1e-6, atol=1e-9)
-
-
-def test_effects_that_were_estimated_together_share_their_uncertainty() -> None:
+def test_effects_add_their_common_uncertainty_and_scale_that_of_the_base() -> None:
     base = trained("gp", drifting_pushes(40))
-    model = extended(base, slippery(0.1, 0.05), grain(0.1))
+    model = extended(base, slippery(0.1, 0.05), grain(0.1), scale=(2.0, 2.0, 2.0))
     assert isinstance(model.predictor, ExtendedPredictor)
     together = replace(model.predictor, cross={(0, 1): np.array([[4e-4, -3e-4]])})
     covariates = {"elapsed_time": np.full(40, 800.0), "slider_heading": np.linspace(-3.0, 3.0, 40)}
     push = Push(some().inputs, some().duration, covariates)
-    found = features_of(replace(model, predictor=together), push)
-    units = found.noise_sd[:, :, None] * found.noise_sd[:, None]
-    expected = squares(features_of(base, push).values) + together.shift(push).covariance / units
-    np.testing.assert_allclose(squares(found.values), expected, rtol=1e-6, atol=1e-9)
+    alone, found = features_of(base, push), features_of(replace(model, predictor=together), push)
+    np.testing.assert_allclose(found.noise_sd, 2.0 * alone.noise_sd)
+    uncertainty = together.shift(push).covariance / found.noise_sd[:, :, None] / found.noise_sd[:, None]
+    assert uncertainty.max() > NEGLIGIBLE
+    np.testing.assert_allclose(squares(found.values), squares(alone.values) + uncertainty, rtol=1e-6, atol=1e-9)
     assert np.abs(together.shift(push).covariance - model.predictor.shift(push).covariance).max() > 0.0
 
 
@@ -206,19 +190,11 @@ def variances(parts: tuple[Array, Array, Array], chosen: list[int]) -> Array:
     return np.asarray(np.diag(parts[2] @ left_over(parts, chosen) @ parts[2].T))
 
 
-def test_before_any_push_all_variance_is_left(parts: tuple[Array, Array, Array]) -> None:
-    assert Information(*parts).variance == pytest.approx(np.sum(parts[2] ** 2) / M)
-
-
-def test_each_gain_is_the_fall_of_the_loss_when_that_push_is_known(parts: tuple[Array, Array, Array]) -> None:
-    expected = [loss(parts, []) - loss(parts, [k]) for k in range(C)]
-    np.testing.assert_allclose(Information(*parts).gains(), expected)
-
-
 def test_updates_in_turn_equal_conditioning_on_all(parts: tuple[Array, Array, Array]) -> None:
     found = Information(*parts)
-    for chosen in ([2], [2, 5], [2, 5, 2]):
-        found.observe(chosen[-1])
+    for chosen in ([], [2], [2, 5], [2, 5, 2]):
+        for k in chosen[-1:]:
+            found.observe(k)
         assert found.variance == pytest.approx(np.mean(variances(parts, chosen)))
         covariance = left_over(parts, chosen)
         np.testing.assert_allclose(found.covariance, parts[0] @ covariance @ parts[0].transpose(0, 2, 1))

@@ -148,10 +148,6 @@ class TestSuggestedPushes:
         assert np.all((found.inputs[:, 2] >= -0.5) & (found.inputs[:, 2] <= 0.9))
         np.testing.assert_allclose(found.duration * found.inputs[:, 0], 0.02)
 
-    def test_leave_less_and_less_variance(self, suggested: Suggested) -> None:
-        left = suggested.variance_left
-        assert left[-1] > 0.0 and left[0] < 1.0 and np.all(np.diff(left) < 0.0)
-
     def test_of_a_learnt_model_are_spread_evenly_up_to_the_tenth(self, untrained: PushModel) -> None:
         known, short = few_pushes(7), Limits(travel=0.004)
         expected = candidate_pushes(known, short, 64)
@@ -269,29 +265,19 @@ def _way(contact: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    ("field", "values"),
     [
-        ("speed", (0.0, 0.1)),
-        ("speed", (0.1, 0.05)),
-        ("speed", (0.1, np.inf)),
-        ("speed", (np.nan, 0.1)),
-        ("speed", (1e-310, 0.1)),
-        ("speed", (0.03 / 601.0, 0.1)),
-        ("angle", (-1.6, 0.0)),
-        ("angle", (0.0, 1.6)),
-        ("angle", (0.5, 0.4)),
-        ("travel", 0.0),
-        ("travel", 1.1),
-        ("transfer_speed", 0.0),
-        ("transfer_speed", np.inf),
-        ("excluded", ((-0.1, 0.2),)),
-        ("excluded", ((0.1, 1.2),)),
-        ("excluded", ((0.0, 0.995),)),
+        ("speed", [(0.0, 0.1), (0.1, 0.05), (0.1, np.inf), (np.nan, 0.1), (1e-310, 0.1), (0.03 / 601.0, 0.1)]),
+        ("angle", [(-1.6, 0.0), (0.0, 1.6), (0.5, 0.4)]),
+        ("travel", [0.0, 1.1]),
+        ("transfer_speed", [0.0, np.inf]),
+        ("excluded", [((-0.1, 0.2),), ((0.1, 1.2),), ((0.0, 0.995),)]),
     ],
 )
-def test_a_value_out_of_range_is_refused_by_name(field: str, value: Any) -> None:
-    with pytest.raises(RequestError, match=field):
-        Limits(**{field: value})
+def test_a_value_out_of_range_is_refused_by_name(field: str, values: list[Any]) -> None:
+    for value in values:
+        with pytest.raises(RequestError, match=field):
+            Limits(**{field: value})
 
 
 def test_a_push_may_last_ten_minutes_and_a_window_be_a_metre_long() -> None:

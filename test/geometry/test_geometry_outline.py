@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from scipy.special import ellipe
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.convex import is_convex
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import (
@@ -70,17 +69,6 @@ def test_perimeter_and_area_of_an_ellipse_equal_those_of_the_curve(a, b):
     outline, large, small = ellipse(a, b), max(a, b), min(a, b)
     assert outline.perimeter == pytest.approx(4.0 * large * ellipe(1.0 - (small / large) ** 2), rel=1e-6)
     assert outline.area == pytest.approx(np.pi * a * b)
-
-
-@EVERY_OUTLINE
-def test_inward_normals_are_perpendicular_unit_vectors_into_the_slider(outline):
-    normal, point = outline.inward_normal(GRID), outline.point(GRID)
-    along = outline.point(GRID + 1e-6) - outline.point(GRID - 1e-6)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0)
-    assert np.abs(np.sum(normal * along, axis=1)).max() < 1e-4
-    assert np.all(outline.project(point + 1e-4 * normal).distance < 0.0)
-    assert np.all(outline.project(point - 1e-4 * normal).distance > 0.0)
 
 
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
@@ -199,24 +187,11 @@ def test_a_corner_itself_is_on_the_outline_with_the_normal_of_one_of_its_edges(o
         assert min(np.linalg.norm(normal - before), np.linalg.norm(normal - after)) < 1e-9
 
 
-def test_a_star_that_is_wound_twice_is_not_convex():
-    """Though it turns to the left at each vertex."""
-    angles = 0.8 * np.pi * np.arange(5)
-    star = Outline(0.05 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    assert not is_convex(star.vertices)
-    assert star.project(np.array([[0.06, 0.0]])).distance[0] == pytest.approx(0.01)
-
-
 @given(some_outline, contacts)
 def test_contact_is_recovered_from_edge_and_fraction(outline, contact):
     edge, fraction = outline.edge(np.array([contact]))
     assert 0.0 <= fraction[0] <= 1.0
     assert outline.contact_on_edge(int(edge[0]), float(fraction[0])) == pytest.approx(contact, abs=1e-12)
-
-
-def test_edges_of_a_polygon_share_the_perimeter_by_their_length():
-    legs = 0.15 / TRIANGLE.perimeter
-    assert np.diff(TRIANGLE.edge_starts) == pytest.approx([legs, np.sqrt(2.0) * legs, legs])
 
 
 @EVERY_OUTLINE

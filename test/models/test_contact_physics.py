@@ -106,20 +106,6 @@ def test_pusher_neither_enters_nor_leaves_and_slips_to_one_side_only(kind: str) 
         assert own.twist[same] * [1.0, 1.0, 0.03] == pytest.approx(both.twist[same] * [1.0, 1.0, 0.03], abs=1e-6)
 
 
-@EVERY_SURFACE
-def test_very_high_friction_sticks_unless_the_pusher_would_have_to_pull(kind: str) -> None:
-    contact, angle = contacts(200, 2)
-    at = instant(mechanics("rect1", kind), contact, angle, {"contact_friction": 1e3})
-    (_, sideways), (_, across) = at.along(at.contact), at.along(at.ahead)
-    sticks = np.abs(across - sideways) < 1e-4
-    assert np.mean(sticks) > 0.6
-    if kind == "ellipsoid":
-        surface = mechanics("rect1", kind).support
-        assert isinstance(surface, PowerSurface)
-        wanted = lynch(at, surface, *np.full((2, 200), 1e3))[1]
-        assert np.array_equal(sticks, np.abs(wanted) < np.arctan(1e3) - 1e-9)
-
-
 @given(st.floats(0.0, 0.999), st.floats(-1.45, 1.45), st.floats(0.0, 1.5), st.sampled_from(KINDS))
 def test_turn_direction_follows_mason_voting_theorem(contact: float, angle: float, friction: float, kind: str) -> None:
     """Mason 1986: two of the push direction and the two edges of the friction cone agree on the side to turn to."""

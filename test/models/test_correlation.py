@@ -26,13 +26,10 @@ from push_predictor.models.predictors.correlation import (
     LONGEST,
     Correlation,
     correlated,
-    covariances,
     fit_correlation,
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.prediction_table import unbounded
-from push_predictor.models.tabulated.spline import table_moments
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -62,8 +59,9 @@ trained_once = cache(trained)
 
 
 def correlation_of(model: PushModel) -> Correlation:
-    assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is not None
-    return model.predictor.correlation
+    found = learnt(model).correlation
+    assert found is not None
+    return found
 
 
 def alone(model: PushModel) -> GaussianProcessPredictor:
@@ -74,10 +72,6 @@ def alone(model: PushModel) -> GaussianProcessPredictor:
 def with_fitted_correlation(model: PushModel) -> GaussianProcessPredictor:
     """Its predictor with a correlation that is fitted again."""
     return replace(alone(model), correlation=fit_correlation(alone(model).regressions, model.training.push_id))
-
-
-def without(model: PushModel) -> PushModel:
-    return replace(model, predictor=alone(model))
 
 
 def of(model: PushModel, inputs: Array) -> Array:
@@ -126,43 +120,6 @@ def test_correlation_equals_that_of_many_nearby_rows() -> None:
     assert found == pytest.approx(r, abs=0.03)
 
 
-def test_many_points_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch, model: PushModel) -> None:
-    correlation = correlation_of(model)
-    asked = np.random.default_rng(1).standard_normal((500, 2))
-    whole = correlation.at(asked)
-    monkeypatch.setattr("push_predictor.models.predictors.correlation._WEIGHTS_AT_ONCE", 7 * len(correlation.features))
-    assert correlation.at(asked) == pytest.approx(whole, abs=1e-12)
-
-
-def bounded(numbers: Array) -> Array:
-    """The correlation matrices (n, 3, 3) of numbers (n, 3) in a table: covariances of unit variances."""
-    values = np.column_stack([np.ones((len(numbers), 6)), np.zeros((len(numbers), 3)), numbers])
-    found, of_process = np.empty((len(numbers), 3, 3)), np.empty((len(numbers), 3, 3))
-    table_moments(values, np.zeros(3), found, of_process)
-    return of_process
-
-
-@given(
-    numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
-    latent=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
-    process=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
-)
-def test_outcome_process_and_their_difference_are_covariances(numbers: Array, latent: Array, process: Array) -> None:
-    total, of_process = covariances(latent, process, bounded(numbers))
-    for covariance, variances in ((total, latent + process), (of_process, process), (total - of_process, latent)):
-        assert np.diagonal(covariance, axis1=1, axis2=2) == pytest.approx(variances, rel=1e-6)
-    for covariance in (total, of_process):
-        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        assert np.all(np.linalg.eigvalsh(covariance / sd[:, :, None] / sd[:, None, :]) > 0.0)
-
-
-@given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
-def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
-    matrices = bounded(numbers)
-    assert np.all(np.linalg.eigvalsh(matrices) > 0.0)
-    assert bounded(unbounded(matrices)) == pytest.approx(matrices, abs=1e-7)
-
-
 # --- fit -------------------------------------------------------------------------------------------------
 
 
@@ -174,7 +131,7 @@ def test_a_correlation_that_changes_its_sign_is_found(model: PushModel) -> None:
 
 def test_correlation_increases_likelihood_of_new_pushes(model: PushModel) -> None:
     new = pushes(400, 1, 0.8)
-    with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
+    with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, replace(model, predictor=alone(model))))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
         with_it.mean, with_it.covariance, new.outcomes
     )
@@ -190,15 +147,14 @@ def test_correlation_increases_likelihood_of_new_pushes(model: PushModel) -> Non
 @pytest.mark.slow
 def test_no_correlation_is_fitted_to_independent_outputs() -> None:
     model = trained(strength=0.0, n=120)
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    scaling, found = model.predictor.scaling, 0
+    scaling, found = learnt(model).scaling, 0
     for seed in range(14):
         table = pushes(120, seed, 0.0)
         features = scaling.features(model.rig.outline, table.inputs)
         scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
         regressions = tuple(
             GaussianProcess(features, column, r.parameters)
-            for r, column in zip(model.predictor.regressions, scaled.T, strict=True)
+            for r, column in zip(learnt(model).regressions, scaled.T, strict=True)
             if isinstance(r, GaussianProcess)
         )
         found += fit_correlation(regressions, table.push_id) is not None
@@ -206,8 +162,7 @@ def test_no_correlation_is_fitted_to_independent_outputs() -> None:
 
 
 def test_no_correlation_is_fitted_to_too_few_pushes() -> None:
-    model = trained(n=FEWEST_PUSHES * PER_PUSH - 1 * PER_PUSH)
-    assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is None
+    assert learnt(trained(n=(FEWEST_PUSHES - 1) * PER_PUSH)).correlation is None
 
 
 def test_residuals_are_bounded_by_their_expected_length(model: PushModel) -> None:
@@ -239,8 +194,7 @@ def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch
     assert of(model, np.array([[0.02, 0.12, 0.6]]))[0] > 0.5
     save_model(model, tmp_path / "m")
     found = correlation_of(load_model(tmp_path / "m"))
-    assert isinstance(model.predictor, GaussianProcessPredictor)
-    everywhere, block = model.predictor.regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
+    everywhere, block = learnt(model).regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
     assert np.array_equal(found.held_out(everywhere, block), correlation.held_out(everywhere, block))
     own = correlation.rows[7]
     others = block[correlation.rows] != block[own]
@@ -249,7 +203,6 @@ def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch
 
 
 def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
-    assert isinstance(model.predictor, GaussianProcessPredictor)
     correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH
     mean, total, process = model.held_out_moments(block)
     plain = replace(model, predictor=alone(model)).held_out_moments(block)

@@ -19,7 +19,6 @@ from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.pushes import Push
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 BLOCKS = 6
@@ -84,37 +83,18 @@ def test_held_out_vhgp_is_close_to_vhgp_solved_on_other_blocks() -> None:
 
 
 def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units() -> None:
-    rng, n = np.random.default_rng(3), 80
-    inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
-    outcomes = rng.standard_normal((n, 3)) * [1e-3, 1e-3, 1e-2] + [4e-3, 0.0, 0.0]
-    push_id = np.array([f"push-{k // 4}" for k in range(n)])
-    predictor = train_model(
-        PushTable(inputs, np.full(n, 0.2), outcomes, push_id),
-        square_rig(),
-        "gp",
-        name="gp",
-        options=TrainingOptions(mean="zero"),
-    ).predictor
+    table = noisy_pushes(80, windows_per_push=4)
+    model = train_model(table, square_rig(), "gp", name="gp", options=TrainingOptions(mean="zero"))
+    predictor = model.predictor.with_independent_outputs()
     assert isinstance(predictor, GaussianProcessPredictor)
-    block = np.arange(n) // 4 % BLOCKS
-    found = predictor.held_out_moments(Push(inputs, np.full(n, 0.2), {}), block)
+    block = np.arange(80) // 4 % BLOCKS
+    found = predictor.held_out_moments(Push.of(table), block)
     for number in range(BLOCKS):
         out = block == number
         without = tuple(conditioned(r, r.inputs[~out], r.outputs[~out]) for r in predictor.regressions)
-        push = Push(inputs[out], np.full(int(out.sum()), 0.2), {})
-        for whole, part in zip(found, replace(predictor, regressions=without).moments(push), strict=True):
+        moments = replace(predictor, regressions=without).moments(Push.of(table.take(out)))
+        for whole, part in zip(found, moments, strict=True):
             np.testing.assert_allclose(whole[out], part, rtol=1e-6, atol=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_push_model_holds_out_one_push_by_default(kind: str) -> None:
-    model = train_model(noisy_pushes(60), square_rig(), kind, name=kind, options=TrainingOptions(mean="zero"))
-    push = np.unique(model.training.push_id, return_inverse=True)[1]
-    for found, expected in zip(model.held_out_moments(), model.held_out_moments(push), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    rows = model.training
-    trained_on = model.predict_rows(rows.inputs, rows.duration).mean
-    assert np.array_equal(model.held_out_moments().mean, trained_on) == (kind == "analytical")
 
 
 def test_held_out_moments_of_extended_model_include_its_effects() -> None:

@@ -19,10 +19,9 @@ from synthetic import square_rig, translating_push
 
 from push_predictor.cli import main
 from push_predictor.errors import RequestError
-from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariates import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import PriorPredictor
@@ -37,10 +36,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.joint_fit import FitRows, estimated, fitted
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend, refit_base
-from push_predictor.residuals.extension.held_out_gain import held_out_windows
 
 WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
 FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
@@ -145,20 +142,6 @@ def test_exact_density_has_the_predicted_variance(vhgp: PushModel) -> None:
     np.testing.assert_allclose((weights * steps[:, None] ** 2).sum(axis=0), 1.0, rtol=1e-2)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_tabulated_model_predicts_single_push_as_in_a_batch(bases: dict[str, PushModel], kind: str) -> None:
-    model, table = extended(bases[kind], slippery(0.2, sd=0.1), grain(0.1)), pushes(5, 1)
-    tabulated = tabulate(model)
-    assert tabulated.tabulated == (kind in ("vhgp", "gp"))
-    among = predicted(tabulated, table)
-    for k in range(len(table)):
-        alone = predicted(tabulated, table.take([k]))
-        for name in FIELDS:
-            np.testing.assert_allclose(getattr(alone, name)[0], getattr(among, name)[k], rtol=1e-7, atol=1e-12)
-    sd = np.sqrt(np.diagonal(among.covariance, axis1=1, axis2=2))
-    assert np.max(np.abs(among.mean - predicted(model, table).mean) / sd) < 1e-3
-
-
 def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
     predictor = model.predictor
@@ -173,29 +156,6 @@ def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     push = Push.of(table)
     design = np.concatenate(joint(predictor.mechanics, predictor.effects, push).designs, axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
-
-
-@pytest.mark.slow
-def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> None:
-    """Two correlated covariates: neither coefficient is determined, but their sum is."""
-    table = pushes(100, 4, slippery(0.2))
-    slid = table.covariates["elapsed_time"] + np.repeat(40.0 * np.random.default_rng(5).standard_normal(100), 3)
-    table = replace(table, covariates={**table.covariates, "slid_distance": slid})
-    by_distance = replace(DRIFT, drivers=("slid_distance",))
-    terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
-    base = refit_base(bases["analytical"], table)
-    both, one = (with_effects(base, table, some) for some in (terms, terms[:1]))
-    push = Push.of(table)
-    np.testing.assert_allclose(both.predictor.shift(push)[1], joint_covariance(both, table), rtol=1e-9, atol=1e-18)
-    # Without the errors of the mechanics, which widen the interval of a size.
-    evidence = evidence_of(base, table)
-    candidates = [candidate(evidence, *term) for term in terms]
-    rows = FitRows(evidence)
-    (effects, cross), ((effect,), _) = (estimated(fitted(rows, some)) for some in (candidates, candidates[:1]))
-    together = replace(both.predictor, effects=effects, cross=cross)
-    uncertainty = together.shift(push)[1]
-    alone, apart = (p.shift(push)[1] for p in (replace(one.predictor, effects=(effect,)), replace(together, cross={})))
-    assert np.trace(uncertainty.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
 
 
 @pytest.mark.slow
@@ -307,51 +267,6 @@ def test_unneeded_covariates_are_ignored(bases: dict[str, PushModel]) -> None:
 # --- estimation -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "count", "seeds"), [pytest.param("gp", 30, 4, marks=pytest.mark.long), ("analytical", 40, 5)]
-)
-def test_planted_effects_are_found_within_their_intervals(
-    bases: dict[str, PushModel], kind: str, count: int, seeds: int
-) -> None:
-    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
-    away = []
-    for seed in range(10, 10 + seeds):
-        table = pushes(count, seed, slippery(0.15), grain(0.1))
-        predictor = with_effects(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
-        found = np.concatenate([effect.coefficients for effect in predictor.effects])
-        sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in predictor.effects])
-        away.append((found - [0.15, 0.1, 0.05]) / sd)
-    # In units of their own deviations: Student's t with some 25 blocks, its root mean square known to 0.25 here.
-    assert 0.6 < np.sqrt(np.mean(np.square(away))) < 1.5
-    assert np.max(np.abs(away)) < 4.0
-    assert np.max(np.abs(np.mean(away, axis=0))) < 1.3  # not one-sided
-    assert np.all(sd < [0.05, 0.05, 0.05])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(45, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
-    refit = refit_base(bases[kind], table)
-    after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
-    nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
-    assert nmse.low < nmse.value < nmse.high < 0.0
-    assert nlpd.low < nlpd.value < nlpd.high < 0.0
-    coverage = metrics_json(compare(after, held_out))["coverage"]
-    assert all(0.88 < share <= 1.0 for share in coverage["0.95"].values())
-
-
-@pytest.mark.slow
-def test_absent_effect_improves_nothing(bases: dict[str, PushModel]) -> None:
-    table, held_out = pushes(45, 7), pushes(60, 8)
-    refit = refit_base(bases["gp"], table)
-    after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases["gp"])
-    _, nlpd = gain(held_out_windows(refit).calibrated(), after, held_out)  # both with deviations of held-out pushes
-    assert abs(nlpd.value) < 0.05
-    assert nlpd.high > 0.0
-
-
 def test_refit_keeps_physics_and_estimates_covariance(bases: dict[str, PushModel]) -> None:
     base, table = bases["analytical"], pushes(60, 9)
     loud = replace(table, outcomes=table.outcomes + 5.0 * NOISE * np.random.default_rng(0).standard_normal((180, 3)))
@@ -372,15 +287,6 @@ def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushMod
     more = with_effects(refit, table, [GRAIN])
     assert [effect.mechanism for effect in more.predictor.effects] == ["contact_friction", "anisotropic_friction"]
     assert np.all(np.abs(more.predictor.effects[1].coefficients) < 0.1)
-
-
-def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
-    table, held_out = pushes(150, 12, slippery(0.3)), pushes(60, 13, slippery(0.3))
-    refit = refit_base(bases["analytical"], table)
-    after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
-    assert gain(refit, after, held_out)[1].high < 0.0
-    design = design_of(None, DRIFT, mechanics(), Push.of(table), np.ones(3))
-    assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 
 # --- the command line -------------------------------------------------------------------

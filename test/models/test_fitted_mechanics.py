@@ -20,8 +20,6 @@ from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Push, Pushes
-from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model
 from push_predictor.models.train_mechanics import on_supports, predictor_about
 from push_predictor.recordings.load import different_supports, load_data
@@ -42,11 +40,6 @@ def mechanics_model(values: dict[str, float], **covariates: Array) -> PushModel:
     mechanics = PushMechanics(rig.outline, rig.pusher_radius, None, supports)
     fitted = FittedMechanics(mechanics, values, 1e-4 * np.eye(len(values)))
     return PushModel("m", "analytical", rig, predictor_about(fitted, table), table, Provenance((), 8, 0, "0"))
-
-
-def saved(model: PushModel, tmp_path: Path) -> PushModel:
-    save_model(model, tmp_path / "m.pushmodel")
-    return load_model(tmp_path / "m.pushmodel")
 
 
 @pytest.fixture(scope="module")
@@ -71,25 +64,20 @@ def test_needs_the_covariates_of_its_parameters() -> None:
     ],
     ids=["push_heading", "recording"],
 )
-def test_a_served_push_has_the_domain_of_the_model_alone_and_among_others(
+def test_the_domain_is_that_of_the_headings_and_recordings_of_training(
     values: dict[str, float], covariates: dict[str, Array]
 ) -> None:
     model = mechanics_model(values, **covariates)
     (name,) = covariates
-    inputs, duration, given = np.tile([0.02, 0.3, 0.2], (2, 1)), np.full(2, 0.2), np.array([0.0, 1.0])
-    for served in (model, tabulate(model)):
-        assert served.predict_rows(inputs, duration, {name: given}).in_domain.tolist() == [True, False]
-        for k, inside in enumerate((True, False)):
-            alone = served.predict_rows(inputs[:1], duration[:1], {name: given[k : k + 1]})
-            assert alone.in_domain.tolist() == [inside]
+    pushes = Pushes(0.02, 0.3, 0.2, covariates={name: [0.0, 1.0]})
+    assert model.predict(pushes).in_domain.tolist() == [True, False]
 
 
-def test_support_of_the_recording_is_used_and_saved(by_recording: PushModel, tmp_path: Path) -> None:
+def test_support_of_the_recording_is_used(by_recording: PushModel) -> None:
     assert by_recording.needs == ("recording",)
-    again, push = saved(by_recording, tmp_path), Pushes(0.02, 0.05, 0.0, covariates={"recording": [0.0, 1.0]})
+    push = Pushes(0.02, 0.05, 0.0, covariates={"recording": [0.0, 1.0]})
     wide, narrow = abs(by_recording.predict(push).mean[:, 2])
     assert narrow > 2.0 * wide
-    np.testing.assert_allclose(again.predict(push).mean, by_recording.predict(push).mean, rtol=1e-9)
 
 
 def test_model_of_several_supports_takes_those_of_other_recordings(by_recording: PushModel) -> None:
@@ -131,6 +119,8 @@ def test_each_change_of_the_rim_is_on_surfaces_of_its_own() -> None:
         shift = even.shifted(("rim_exponent",), np.full((len(still), 1), exponent), push)[0]
         moved = mechanics_model({"rim_exponent": exponent}).predictor.mechanics.displacement(push.inputs, push.duration)
         np.testing.assert_allclose(still + shift, moved, rtol=0.0, atol=1e-15)
+    half = np.where(np.arange(len(still)) < 12, 7.0, 0.0)[:, None]  # at once with none, on the surfaces of both
+    np.testing.assert_allclose(even.shifted(("rim_exponent",), half, push)[0][:12], shift[:12], rtol=0.0, atol=1e-15)
 
 
 # --- recordings whose rigs have different support points ---

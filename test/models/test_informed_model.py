@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_m
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
 from push_predictor.models.train_learnt import fitted_mean, zero_is_better
 from push_predictor.recordings.table import PushTable
@@ -210,17 +208,6 @@ def test_a_regression_must_be_worth_its_hyperparameters() -> None:
     assert best_held_out([fit_constant(inputs, wave, heavy_tails=False), found := fit_gp(inputs, wave)], block) is found
 
 
-def test_the_search_of_a_vhgp_begins_from_the_gps_that_decided_about_the_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object, **__: object) -> None:
-        raise AssertionError("a GP of all rows was fitted")
-
-    monkeypatch.setattr("push_predictor.models.gaussian_process.vhgp.fit_gp", refused)
-    auto = learnt(trained(pushes(24, 0), mean="auto"))
-    assert any(isinstance(regression, ConstantNoise) for regression in auto.regressions)
-    with pytest.raises(AssertionError, match="all rows"):
-        trained(pushes(24, 0), mean="zero")
-
-
 # --- the speed: per path length within the training's speeds, less certain beyond them ---
 
 
@@ -318,6 +305,7 @@ def test_density_without_tails_is_that_of_the_moments(about: FittedMechanics | N
     variance = np.diagonal(covariance, axis1=1, axis2=2)
     expected = -0.5 * (np.log(2.0 * np.pi * variance) + (table.outcomes - mean) ** 2 / variance)
     push = Push(table.inputs, table.duration, {})
+    assert predictor.tails is None
     found = predictor._log_density(predictor.latent(table.inputs), push, table.outcomes)
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
@@ -327,17 +315,3 @@ def test_outcomes_are_learnt_as_they_are_where_asked() -> None:
     np.testing.assert_allclose(targets(learnt(model)), model.training.outcomes, rtol=1e-9, atol=1e-15)
     for first, second in zip(at(model, 0.02), at(model, 0.02, 0.4), strict=True):
         np.testing.assert_array_equal(first, second)
-
-
-def test_a_table_predicts_the_same_at_all_speeds(slow: PushModel) -> None:
-    several = trained_at(pushes_at(0.02, 0.03, n=90), slow.kind)
-    for model in (slow, several):
-        tabulated = tabulate(model)
-        assert tabulated.tabulated, tabulated.how
-        for speed, n in product((0.005, 0.02, 0.025, 0.03, 0.06, 0.15), (1, 6)):
-            inputs = np.column_stack([np.full(n, speed), np.linspace(0.02, 0.9, n), np.linspace(-0.8, 0.8, n)])
-            assert not tabulated.exact_count(inputs)
-            found, expected = (m.predict_rows(inputs, np.full(n, 0.2)) for m in (tabulated, model))
-            assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 2e-3
-            np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
-            np.testing.assert_array_equal(found.in_domain, expected.in_domain)

@@ -28,9 +28,7 @@ from push_predictor.types import Array
 
 RADIUS, LEVER = 0.00475, 0.03  # m; a turn counts as the path of a point at the lever
 OUTLINES = {
-    "ell": Outline(
-        np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.0], [0.0, 0.0], [0.0, 0.05], [-0.05, 0.05]]),
-    ),
+    "ell": Outline(np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.0], [0.0, 0.0], [0.0, 0.05], [-0.05, 0.05]])),
     "triangle": Outline(np.array([[-0.045, -0.026], [0.045, -0.026], [0.0, 0.052]])),
 }
 ON_THREE = PressureDistribution(np.array([[-0.03, -0.02], [0.03, -0.02], [0.0, 0.03]]), np.array([0.3, 0.3, 0.4]))

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every kind of model: a push alone or among others, the same bits from its file; what no model has is refused."""
+"""Every kind of model: alone or among others, from its table or its file; what no model has is refused."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from push_predictor.models.gaussian_process.regression import ConstantNoise, Con
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import (
     ExtendedPredictor,
     GaussianProcessPredictor,
@@ -37,18 +38,26 @@ from push_predictor.models.store.archive import archived, read_archive
 from push_predictor.models.store.codec import Reader, encode
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, model_digest, save_model
 from push_predictor.models.store.stored import CLASSES, GIVEN
+from push_predictor.models.store.table_cache import read_tables, write_tables
+from push_predictor.models.tabulated.tabulated_model import (
+    COVARIANCE_TOLERANCE,
+    MEAN_TOLERANCE,
+    TabulatedModel,
+    tabulate,
+)
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.types import Array
 
 CORNERS = np.array([[0.04, 0.04, 0.2], [-0.04, 0.04, 0.3], [-0.04, -0.04, 0.1], [0.04, -0.03, 0.39], [0.01, 0.0, 0.17]])
-INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5]])
-DURATION = np.full(3, 0.2)
+INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5], [0.06, 0.6, 1.2]])  # the last: beyond
+DURATION = np.full(4, 0.2)
 COVARIATES = {
-    "elapsed_time": np.array([0.0, 10.0, 20.0]),
-    "push_heading": np.array([0.3, -2.0, 1.1]),
-    "recording": np.array([1.0, 2.0, 1.0]),
+    "elapsed_time": np.array([0.0, 10.0, 20.0, 0.0]),
+    "push_heading": np.array([0.3, -2.0, 1.1, 0.3]),
+    "recording": np.array([1.0, 2.0, 1.0, 1.0]),
 }
+PARTS = ("mean", "covariance", "process_covariance", "in_domain")
 LEARNT = ("gp", "vhgp", "sparse vhgp", "gp about mechanics")
 
 
@@ -85,6 +94,11 @@ def models() -> dict[str, PushModel]:
     trained["correlation of some rows"] = with_some_rows(trained["gp"])
     trained["with tails"] = train_model(pushes(60), rig, "gp", name="tailed", options=TrainingOptions(mean="zero"))
     return trained
+
+
+@pytest.fixture(scope="module")
+def tables(models: dict[str, PushModel]) -> dict[str, TabulatedModel]:
+    return {name: tabulate(models[name]) for name in NAMES}
 
 
 def extended(base: PushModel) -> PushModel:
@@ -124,35 +138,82 @@ NAMES += [*LEARNT, "analytical", "prior"]
 NAMES += [f"{kind}, extended" for kind in (*LEARNT, "analytical", "prior")]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_model_predicts_the_same_bits_after_saving_and_loading(
-    models: dict[str, PushModel], name: str, tmp_path: Path
+EVERY_MODEL = pytest.mark.parametrize("name", NAMES)
+
+
+def answers(model: PushModel | TabulatedModel, rows: slice = slice(None)) -> Prediction:
+    return model.predict_rows(INPUTS[rows], DURATION[rows], {name: column[rows] for name, column in COVARIATES.items()})
+
+
+def assert_same_bits(one: Prediction, other: Prediction) -> None:
+    for part in PARTS:
+        assert np.array_equal(getattr(one, part), getattr(other, part)), part
+
+
+@EVERY_MODEL
+def test_a_model_and_its_table_predict_the_same_bits_after_saving_and_loading(
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str, tmp_path: Path
 ) -> None:
-    model = models[name]
+    model, table = models[name], tables[name]
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
     assert is_model_file(tmp_path / "m") and (loaded.kind, loaded.needs) == (model.kind, model.needs)
-    one, other = (m.predict_rows(INPUTS, DURATION, COVARIATES) for m in (model, loaded))
-    for part in ("mean", "covariance", "process_covariance", "in_domain"):
-        assert np.array_equal(getattr(one, part), getattr(other, part)), part
+    assert_same_bits(answers(loaded), answers(model))
     assert (loaded.name, loaded.provenance) == (model.name, model.provenance)
     assert model_digest(loaded) == model_digest(model)
     if model.predictor.learnt:
         block = np.arange(len(model.training)) % 4
         for ours, theirs in zip(model.held_out_moments(block), loaded.held_out_moments(block), strict=True):
             assert np.array_equal(ours, theirs)
+    if table.tabulated:
+        write_tables(tmp_path / "tables", "digest", table)
+        read = read_tables(tmp_path / "tables", "digest", loaded)
+        assert read is not None
+        assert_same_bits(answers(read), answers(table))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_push_alone_has_the_prediction_that_it_has_among_others(models: dict[str, PushModel], name: str) -> None:
-    together = models[name].predict_rows(INPUTS, DURATION, COVARIATES)
-    for k in range(len(INPUTS)):
-        covariates = {key: column[k : k + 1] for key, column in COVARIATES.items()}
-        alone = models[name].predict_rows(INPUTS[k : k + 1], DURATION[k : k + 1], covariates)
-        np.testing.assert_allclose(alone.mean[0], together.mean[k], rtol=1e-8, atol=1e-12)
-        for part in ("covariance", "process_covariance"):
-            np.testing.assert_allclose(getattr(alone, part)[0], getattr(together, part)[k], rtol=1e-6, atol=1e-14)
-        assert alone.in_domain[0] == together.in_domain[k]
+@EVERY_MODEL
+def test_a_table_answers_as_its_model(
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str
+) -> None:
+    table = tables[name]
+    assert table.tabulated == isinstance(models[name].predictor.base, GaussianProcessPredictor)
+    found, exact = answers(table), answers(models[name])
+    assert np.max(np.abs(found.mean - exact.mean) / exact.std) < MEAN_TOLERANCE
+    for part in ("covariance", "process_covariance"):
+        units = np.sqrt(np.diagonal(getattr(exact, part), axis1=1, axis2=2))
+        ratios = (getattr(found, part) - getattr(exact, part)) / units[:, :, None] / units[:, None]
+        np.testing.assert_allclose(ratios, 0.0, atol=COVARIANCE_TOLERANCE)
+    assert np.array_equal(found.in_domain, exact.in_domain) and found.tails is exact.tails
+
+
+@EVERY_MODEL
+def test_a_push_alone_has_the_prediction_that_it_has_among_others(
+    models: dict[str, PushModel], tables: dict[str, TabulatedModel], name: str
+) -> None:
+    """A positive definite one, also beyond the domain, with no more process noise than there is in all."""
+    for served in (models[name], tables[name]):
+        together = answers(served)
+        for k in range(len(INPUTS)):
+            alone = answers(served, slice(k, k + 1))
+            np.testing.assert_allclose(alone.mean[0], together.mean[k], rtol=1e-8, atol=1e-12)
+            for part in ("covariance", "process_covariance"):
+                np.testing.assert_allclose(getattr(alone, part)[0], getattr(together, part)[k], rtol=1e-6, atol=1e-14)
+            assert alone.in_domain[0] == together.in_domain[k]
+        assert np.linalg.eigvalsh(together.covariance).min() > 0.0
+        assert np.linalg.eigvalsh(together.covariance - together.process_covariance).min() > -1e-15
+        none = answers(served, slice(0))
+        assert [getattr(none, part).shape for part in PARTS] == [(0, 3), (0, 3, 3), (0, 3, 3), (0,)]
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("prior")])
+def test_one_push_is_held_out_by_default(models: dict[str, PushModel], name: str) -> None:
+    model, rows = models[name], models[name].training
+    push = np.unique(rows.push_id, return_inverse=True)[1]
+    for found, expected in zip(model.held_out_moments(), model.held_out_moments(push), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    own = model.predict_rows(rows.inputs, rows.duration, rows.covariates).mean
+    assert np.array_equal(model.held_out_moments().mean, own) == (not model.predictor.learnt)
 
 
 def test_outputs_are_stored_only_where_they_do_not_follow(models: dict[str, PushModel], tmp_path: Path) -> None:
@@ -266,11 +327,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("analytical", put("predictor.fitted.mechanics.support.length", 1e-9), "too close together"),
     ("analytical", put("predictor.fitted.mechanics.support.centre", [1.0]), r"support\.centre: shape \(1,\)"),
     ("analytical", put("predictor.fitted.mechanics.support.power", 1.0), r"support\.power: numbers from 1 to 100"),
-    (
-        "analytical",
-        put("predictor.covariance", [[0.0] * 3] * 3),
-        "covariance of a training push is not",
-    ),
+    ("analytical", put("predictor.covariance", [[0.0] * 3] * 3), "covariance of a training push is not"),
     ("prior", put("predictor.noise.factor", [1.0, 0.0, 1.0]), r"predictor\.noise\.factor: numbers from"),
     (
         "prior",
@@ -337,7 +394,7 @@ def test_nonsense_anywhere_in_a_file_is_refused_or_changes_no_prediction(
     """At some places of the record, and in each array: not finite, too short, with another shape, not numbers."""
     save_model(models[name], tmp_path / "m")
     record, arrays = read_archive(tmp_path / "m")
-    expected, rng = models[name].predict_rows(INPUTS, DURATION, COVARIATES), np.random.default_rng(NAMES.index(name))
+    expected, rng = answers(models[name]), np.random.default_rng(NAMES.index(name))
     every = list(places(record))
     changed = []
     for place in rng.permutation(len(every))[:12]:
@@ -351,9 +408,7 @@ def test_nonsense_anywhere_in_a_file_is_refused_or_changes_no_prediction(
     for damaged, with_arrays in changed:
         (tmp_path / "m").write_bytes(archived(damaged, with_arrays))
         with suppress(ModelFileError):
-            found = load_model(tmp_path / "m").predict_rows(INPUTS, DURATION, COVARIATES)
-            for part in ("mean", "covariance", "process_covariance", "in_domain"):
-                assert np.array_equal(getattr(found, part), getattr(expected, part)), part
+            assert_same_bits(answers(load_model(tmp_path / "m")), expected)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -58,28 +57,17 @@ def file(model: PushModel, tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def computed_once(model: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables are computed once for all tests that use this, which are about their files."""
+@pytest.fixture(autouse=True)
+def computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are computed once for all tests, which are about their files."""
     monkeypatch.setattr(table_cache, "tabulate", once)
 
 
-@pytest.fixture(scope="module")
-def tables(model: PushModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The file of the model's tables, and how it predicts with them."""
-    place = tmp_path_factory.mktemp("computed")
-    save_model(model, place / "small.pushmodel")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PUSH_PREDICTOR_CACHE", str(place / "tables"))
-        how = load_served(place / "small.pushmodel").how
-    return only(place / "tables"), how
-
-
 @pytest.fixture
-def kept(tables: tuple[Path, str], folder: Path, computed_once: None) -> Path:
-    """A copy of it in the folder of kept tables."""
-    folder.mkdir()
-    return Path(shutil.copy(tables[0], folder))
+def kept(file: Path, folder: Path) -> Path:
+    """The file of its tables in the folder of kept tables."""
+    load_served(file)
+    return only(folder)
 
 
 def once(model: PushModel) -> TabulatedModel:
@@ -110,7 +98,6 @@ def rewrite(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]]
     path.write_bytes(archived(record, arrays))
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_a_kept_table_predicts_as_the_one_computed(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,8 +111,9 @@ def test_a_kept_table_predicts_as_the_one_computed(
     assert kept.how == computed.how and kept.error == computed.error and kept.tabulated
 
 
-def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path) -> None:
+def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take 50 MB."""
+    monkeypatch.setattr(table_cache, "tabulate", tabulate)
     load_served(file)
     served = load_served(file)
     regressions = served.model.predictor.base.regressions  # type: ignore[attr-defined]  # of a VHGP
@@ -139,6 +127,7 @@ def test_a_server_does_not_keep_the_matrices(file: Path, folder: Path) -> None:
 def test_a_model_without_tables_predicts_exactly_until_they_are_computed(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(table_cache, "tabulate", tabulate)
     registry, rows = ModelRegistry(), model.training
     assert registry.load_all([str(file)], at_once=True) == [] and not folder.exists()
     at_once = registry.get("small")
@@ -182,7 +171,6 @@ def test_completion_does_not_undo_what_was_loaded_meanwhile(
     assert registry.get("small").model.kind == "analytical" and registry.names == ["small", "other"]
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_training_writes_the_table_next_to_the_model(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,7 +187,6 @@ def test_a_device_gets_no_table_next_to_it(model: PushModel, tmp_path: Path) -> 
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_a_validation_uses_the_table_of_the_server(
     file: Path, model: PushModel, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -254,17 +241,16 @@ def rewritten(change: Callable[[dict[str, Any], dict[str, np.ndarray]], object])
     ],
 )
 def test_a_damaged_table_or_that_of_another_model_is_computed_again(
-    file: Path, kept: Path, tables: tuple[Path, str], damage: Callable[[Path], object], monkeypatch: pytest.MonkeyPatch
+    file: Path, kept: Path, damage: Callable[[Path], object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right, computed = read_archive(kept)[0], list[PushModel]()
+    right, how, computed = read_archive(kept)[0], load_served(file).how, list[PushModel]()
     damage(kept)
     monkeypatch.setattr(table_cache, "tabulate", lambda model: computed.append(model) or once(model))
-    assert load_served(file).how == tables[1] and read_archive(kept)[0] == right and len(computed) == 1
+    assert load_served(file).how == how and read_archive(kept)[0] == right and len(computed) == 1
     monkeypatch.setattr(table_cache, "tabulate", never)
-    assert load_served(file).how == tables[1]
+    assert load_served(file).how == how
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, model: PushModel, folder: Path) -> None:
     load_served(file)
     other = file.with_name("other.pushmodel")
@@ -277,7 +263,6 @@ def test_models_that_predict_alike_share_a_table_and_others_do_not(file: Path, m
     assert len(list(folder.iterdir())) == 2
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_cache, "MOST_TABLES", 2)
     for version in (1, 2, 1, 3):
@@ -287,7 +272,6 @@ def test_only_the_tables_used_last_are_kept(file: Path, folder: Path, monkeypatc
     assert {path.name for path in folder.iterdir()} == {f"{digest}.1.tables", f"{digest}.3.tables"}
 
 
-@pytest.mark.usefixtures("computed_once")
 def test_a_folder_that_takes_no_files_is_no_error(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PUSH_PREDICTOR_CACHE", str(file / "tables"))
     assert load_served(file).tabulated

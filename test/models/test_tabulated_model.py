@@ -1,16 +1,12 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tabulated models: an accurate table inside the domain, the model itself everywhere else; the splines of a table."""
+"""Tabulated models: an accurate table inside the domain, the model itself everywhere else; its compiled code."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import product
-from math import comb
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,15 +17,12 @@ from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.gaussian_process.regression import fit_constant
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.table_cache import read_tables, write_tables
 from push_predictor.models.tabulated import prediction_table as table_of
 from push_predictor.models.tabulated.grid_posterior import on_grid
-from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along_all
 from push_predictor.models.tabulated.prediction_table import FASTEST, prediction_table, wide_box
 from push_predictor.models.tabulated.spline import spline_values, table_moments
 from push_predictor.models.tabulated.tabulated_model import (
@@ -57,7 +50,6 @@ OUTLINES = {
     "triangle": triangle(),
 }
 SIZES = {"mean": 1e-3, "covariance": 1e-9, "process_covariance": 1e-9, "in_domain": 0.0}  # SI, of the smaller ones
-FIELDS = tuple(SIZES)
 
 
 def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> PushTable:
@@ -152,11 +144,6 @@ EACH = [
 ]
 
 
-@pytest.mark.parametrize(("shape", "kind"), EACH)
-def test_table_is_accurate(shape: str, kind: str) -> None:
-    assert_true_to_the_model(tabulated(shape, kind))
-
-
 def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
     exact = np.array([[1.0, 0.0, 0.99], [0.0, 1.0, 0.0], [0.99, 0.0, 1.0]])
     found = exact.copy()
@@ -190,10 +177,7 @@ NARROW = {
 
 @pytest.mark.parametrize(
     ("shape", "narrow"),
-    [
-        *(("square", narrow) for narrow in NARROW),
-        *(("circle", "one contact"), ("ellipse", "a part of an edge")),
-    ],
+    [*(("square", narrow) for narrow in NARROW), *(("circle", "one contact"), ("ellipse", "a part of an edge"))],
 )
 def test_constant_inputs_have_no_axis(shape: str, narrow: str) -> None:
     low, high = (np.array(limit) for limit in NARROW[narrow])
@@ -228,32 +212,18 @@ def test_single_push_gets_the_prediction_it_has_in_a_batch(
 
 
 @pytest.mark.parametrize(("shape", "kind"), EACH)
-def test_the_table_reaches_all_contacts_all_angles_and_twice_the_speed(shape: str, kind: str) -> None:
+def test_a_table_is_accurate_and_reaches_all_contacts_all_angles_and_twice_the_speed(shape: str, kind: str) -> None:
     answers = tabulated(shape, kind)
     outside = outside_pushes(answers.model, 200)
     assert np.ptp(outside, axis=0) == pytest.approx([0.1, 1.0, 3.1], rel=0.05)
     assert answers.exact_count(outside) == 0 and not of(answers, outside).in_domain.any()
-    assert_true_to_the_model(answers, outside)
+    for inputs in (None, outside):
+        assert_true_to_the_model(answers, inputs)
 
 
 def test_a_table_is_compared_with_the_model_outside_the_domain_too() -> None:
     model = trained_widely("square", "gp")
     assert np.sum(~model.in_domain(probed(model, 20).inputs)) == 20
-
-
-def test_an_output_of_constant_noise_has_a_table_and_its_file(tmp_path: Path) -> None:
-    model = trained_widely("square", "vhgp")
-    predictor = learnt(model)
-    first, second, third = predictor.regressions
-    constant = fit_constant(second.inputs, second.outputs, heavy_tails=True)
-    mixed = replace(model, predictor=replace(predictor, regressions=(first, constant, third)))
-    computed, outside = tabulate(mixed), outside_pushes(mixed, 100)
-    assert_true_to_the_model(computed, outside)
-    write_tables(tmp_path / "tables", "digest", computed)
-    read = read_tables(tmp_path / "tables", "digest", mixed)
-    assert read is not None
-    for name in FIELDS:
-        assert np.array_equal(getattr(of(read, outside), name), getattr(of(computed, outside), name))
 
 
 @pytest.mark.parametrize("shape", ["square", "circle"])
@@ -265,7 +235,7 @@ def test_faster_pushes_are_predicted_by_the_model_unless_it_is_per_path(shape: s
     assert not table.in_domain.any() and model.exact_count(fast) == 30
     known = of(model, inside(model.model, 5))
     mixed = of(model, np.concatenate([fast, inside(model.model, 5)]))
-    for name in FIELDS:
+    for name in SIZES:
         assert np.array_equal(getattr(table, name), getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
         assert np.array_equal(getattr(mixed, name)[30:], getattr(known, name))
@@ -290,11 +260,6 @@ def test_boundary_of_the_domain_is_inside() -> None:
         table, exact = of(model, rim), of(model.model, rim)
         assert np.array_equal(table.in_domain, exact.in_domain)
         assert table.mean == pytest.approx(exact.mean, abs=1e-5)
-
-
-def test_no_rows_give_no_predictions() -> None:
-    prediction = of(tabulated("square", "vhgp"), np.empty((0, 3)))
-    assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
 
 
 def test_analytical_model_has_no_table() -> None:
@@ -326,46 +291,7 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
 
 
-# --- services ------------------------------------------------------------------------------------
-
-
-# --- splines on boxes ---
-
-
-AXES = (Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7), Axis(3.0, 4.0, 3))
-ENDS = np.array([[axis.low, axis.high] for axis in AXES])
-
-
-def b_spline(u: Array) -> Array:
-    """The cardinal cubic B-spline, from its sum of truncated powers; not zero between 0 and 4."""
-    return sum((-1) ** k * comb(4, k) * np.maximum(u - k, 0.0) ** 3 / 6.0 for k in range(5))
-
-
-def by_formula(axes: Sequence[Axis], coefficients: Array, points: Array, box: Array) -> Array:
-    """Sum of all products of B-splines, with those that are zero too."""
-    factors = []
-    for axis, x in zip(axes, points.T, strict=True):
-        place = (x - axis.low) * axis.cells / (axis.high - axis.low)
-        factors.append(b_spline(place[:, None] + 3.0 - np.arange(axis.cells + 3)))
-    found = coefficients[box]
-    for factor in factors:
-        found = np.einsum("ni,ni...->n...", factor, found)
-    return np.asarray(found)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-@pytest.mark.parametrize("functions", [1, 9, 16])
-def test_compiled_spline_is_the_sum_of_its_basis(count: int, functions: int) -> None:
-    """At random points, at knots, and at both ends of every axis, in several boxes; summed in single precision."""
-    axes, draw = AXES[:count], np.random.default_rng(0)
-    coefficients = draw.standard_normal((3, *(axis.cells + 3 for axis in axes), functions)).astype(np.float32)
-    corners = np.array(list(product(*ENDS[:count])))
-    knots = np.array([[axis.low + (axis.high - axis.low) * k / axis.cells for axis in axes] for k in range(3)])
-    points = np.concatenate([draw.uniform(*ENDS[:count].T, (60, count)), corners, knots])
-    box = draw.integers(0, 3, len(points))
-    expected = by_formula(axes, coefficients.astype(np.float64), points, box)
-    rounding = 4**count * np.finfo(np.float32).eps * np.abs(coefficients).max()
-    np.testing.assert_allclose(TensorSpline(axes, coefficients)(points, box), expected, rtol=0.0, atol=rounding)
+# --- the compiled code ---
 
 
 def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refused() -> None:
@@ -376,31 +302,6 @@ def test_more_functions_or_axes_than_the_compiled_code_has_places_for_are_refuse
                 np.zeros((1, axes)), np.zeros(1, np.intp), one, one, np.ones(1, np.intp),
                 np.zeros((4, functions), np.float32), np.zeros((1, functions)),
             )  # fmt: skip
-
-
-def through(axes: Sequence[Axis], values: Array) -> TensorSpline:
-    """The spline that takes values (cells_1 + 1, ..., K) at the knots."""
-    return TensorSpline(axes, along_all([axis.coarse_to_coefficients(axis.cells) for axis in axes], values[None]))
-
-
-def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
-    axes = AXES[:2]
-
-    def cubic(x: Array, y: Array) -> Array:
-        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
-
-    knots = np.meshgrid(*(np.linspace(axis.low, axis.high, axis.cells + 1) for axis in axes), indexing="ij")
-    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
-    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
-    found = through(axes, cubic(*knots))(points, np.zeros(len(points), np.intp))
-    assert found == pytest.approx(cubic(*points.T), abs=1e-5)  # coefficients have single precision
-
-
-def test_few_nodes_resolve_a_smooth_function() -> None:
-    axis = Axis(0.2, 3.0, 10)
-    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
-        knots = axis.nodes_to_knots(count) @ np.exp(-(axis.nodes(count) ** 2))
-        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
 
 
 @pytest.mark.parametrize("coupled", [False, True])

@@ -33,7 +33,6 @@ from push_predictor.models.predictors.tails import (
 )
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Push
-from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -163,22 +162,6 @@ def test_every_push_counts_the_same_in_conformal_intervals() -> None:
     assert np.all(found >= alone[13]) and np.all(found <= alone[16])
 
 
-def test_conformal_intervals_cover_new_pushes_of_any_distribution() -> None:
-    """Pushes with a shared error, of which half the training sets cover too much and half too little."""
-    rng, shares = np.random.default_rng(0), []
-    for _ in range(35):
-        windows = rng.integers(1, 8, size=30)
-        push = np.repeat(np.arange(30), windows)
-        z = (np.exp(rng.standard_normal((30, 3)))[push] * (1.0 + 0.3 * rng.random((len(push), 3)))) * rng.choice(
-            [-1, 1]
-        )
-        old = push < 25
-        tails = fitted(z[old], push[old].astype(str))
-        inside = np.abs(z[~old]) <= tails.half_width(0.8, "conformal") * tails.factor
-        shares.append(inside.mean(axis=0))
-    assert np.all(np.mean(shares, axis=0) > 0.8 - 0.05) and np.all(np.mean(shares, axis=0) < 0.8 + 0.08)
-
-
 # The fit
 
 
@@ -202,19 +185,12 @@ def test_joint_region_is_fitted_under_the_correlation() -> None:
     assert np.mean(away <= tails.joint_radius(0.95)) == pytest.approx(0.95, abs=0.015)
 
 
-def test_final_prediction_error_of_independent_windows() -> None:
-    sample = residuals_of(50, 1)
-    factor = fitted(*sample, counts=(10, 2, 0)).factor / fitted(*sample).factor
-    assert factor == pytest.approx(np.sqrt([60.0 / 40.0, 52.0 / 48.0, 1.0]), rel=1e-3)
-
-
-def test_windows_of_a_push_count_for_less_than_independent_ones() -> None:
+def test_the_final_prediction_error_widens_and_windows_of_a_push_count_for_less_than_independent_ones() -> None:
     z, names = residuals_of(100, 1)
-    together = np.array([f"p{k // 10}" for k in range(100)])
-    apart, shared = (fitted(z, push, (4, 4, 4)).factor / fitted(z, push).factor for push in (names, together))
-    effective = 100.0 / (1.0 + 0.45 * 9.0)
-    assert apart == pytest.approx(np.full(3, np.sqrt(104.0 / 96.0)), rel=1e-3)
-    assert shared == pytest.approx(np.full(3, np.sqrt((effective + 4.0) / (effective - 4.0))), rel=1e-3)
+    together, counts = np.array([f"p{k // 10}" for k in range(100)]), np.array([4, 2, 0])
+    for push, number in ((names, 100.0), (together, 100.0 / (1.0 + 0.45 * 9.0))):
+        factor = fitted(z, push, tuple(counts)).factor / fitted(z, push).factor
+        assert factor == pytest.approx(np.sqrt((number + counts) / (number - counts)), rel=1e-3)
 
 
 def test_few_windows_have_about_the_usual_degrees() -> None:
@@ -275,25 +251,18 @@ def test_covariances_are_those_of_the_regressions_times_the_factors() -> None:
     assert found.mean == pytest.approx(plain.mean) and found.tails is tails_of(model) and plain.tails is None
 
 
-def test_exact_density_is_the_t_density_of_the_reported_moments() -> None:
+@pytest.mark.parametrize("effects", [False, True])
+def test_exact_density_is_the_t_density_of_the_reported_moments(effects: bool) -> None:
     model, test = trained("gp"), shared_errors(5, 3)
+    if effects:  # they shift and widen it
+        always, size = DriverBasis("constant"), (np.array([0.1]), np.array([[0.01]]))
+        tip = Effect("contact_friction", "velocity", always, *size, np.ones(3))
+        model = replace(model, predictor=ExtendedPredictor(learnt(model), (tip,), np.array([2.0, 1.0, 0.5])))
     tails, answer = tails_of(model), predicted(model, test)
     scale = answer.std * np.sqrt((tails.degrees - 2.0) / tails.degrees)
     expected = stats.t(tails.degrees, answer.mean, scale).logpdf(test.outcomes)
     assert model.exact_log_density(test) == pytest.approx(expected)
-
-
-def test_effects_shift_and_widen_the_t_density() -> None:
-    model, test = trained("gp"), shared_errors(5, 3)
-    tip = Effect(
-        "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
-    )
-    extended = replace(model, predictor=ExtendedPredictor(learnt(model), (tip,), np.array([2.0, 1.0, 0.5])))
-    tails, answer = tails_of(extended), predicted(extended, test)
-    scale = answer.std * np.sqrt((tails.degrees - 2.0) / tails.degrees)
-    expected = stats.t(tails.degrees, answer.mean, scale).logpdf(test.outcomes)
-    assert extended.exact_log_density(test) == pytest.approx(expected)
-    assert answer.tails is tails_of(model)
+    assert answer.tails is tails is tails_of(trained("gp"))
 
 
 def test_tails_come_from_held_out_pushes() -> None:
@@ -314,14 +283,3 @@ def test_informed_model_takes_the_residuals_of_mechanics_fitted_without_the_push
     counts = [regression.parameters.count for regression in learnt(model).regressions]
     own = fit_tails(table.outcomes - held.mean, held.covariance, table.push_id, counts)
     assert own is not None and np.prod(tails_of(model).factor) > 1.01 * np.prod(own.factor)
-
-
-def test_a_table_gives_the_model_s_covariance_and_tails() -> None:
-    model, test = trained("gp"), shared_errors(20, 3)
-    table, answer = tabulate(model), predicted(model, test)
-    assert table.tabulated
-    for rows in (slice(None), slice(0, 1)):
-        found = table.predict_rows(test.inputs[rows], test.duration[rows])
-        assert found.covariance == pytest.approx(answer.covariance[rows], rel=0.02, abs=1e-12)
-        assert found.process_covariance == pytest.approx(answer.process_covariance[rows], rel=0.02, abs=1e-12)
-        assert found.tails is tails_of(model)

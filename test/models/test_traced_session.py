@@ -178,7 +178,9 @@ def test_info_list_models_and_repr_state_the_defaults(
 ) -> None:
     model = traced(base, stepped("push_index", 10.5))
     save_model(model, tmp_path / "m")
-    assert "needs covariates: none\n  defaults of covariates: push_index 90\n" in repr(load_model(tmp_path / "m"))
+    loaded = load_model(tmp_path / "m")
+    assert loaded.predictor.session == SESSION
+    assert "needs covariates: none\n  defaults of covariates: push_index 90\n" in repr(loaded)
     assert "defaults" not in repr(base)
     assert main(["info", str(tmp_path / "m"), "--json", "-"]) == 0
     info = json.loads(capsys.readouterr().out)
@@ -186,8 +188,3 @@ def test_info_list_models_and_repr_state_the_defaults(
     registry = ModelRegistry()
     registry.load(tmp_path / "m")
     assert "covariates=-; defaults=push_index 90; " in registry.describe("deployed")
-
-
-def test_session_is_the_same_after_saving(base: PushModel, tmp_path: Path) -> None:
-    save_model(traced(base, stepped("push_index", 10.5)), tmp_path / "m")
-    assert load_model(tmp_path / "m").predictor.session == SESSION

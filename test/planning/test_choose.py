@@ -65,13 +65,6 @@ def test_predictable_push_wins_over_a_better_aimed_noisy_push():
     assert number(choice) == 1 and choice.probability > 0.99
 
 
-def test_nearest_mean_wins_without_noise():
-    goal = Goal(np.array([0.010, 0.0, 0.0]), 0.002, 0.05)
-    means = [[0.0112, 0.0, 0.0], [0.0103, 0.0002, 0.005], [0.0103, 0.0002, 0.02]]
-    choice = choose_push(made_up(means, [0.0, 0.0, 0.0]), AT_ORIGIN, goal)
-    assert number(choice) == 1 and choice.probability == 1.0
-
-
 def test_no_push_is_chosen_at_the_goal():
     pushes = made_up([[0.01, 0.0, 0.0]], [0.0])
     assert choose_push(pushes, np.array([0.0011, 0.0, 0.09]), Goal(np.zeros(3), 0.0012, 0.1)) is None
@@ -105,12 +98,6 @@ def test_push_is_chosen_with_one_step_lookahead():
     pushes = made_up([[0.010, 0.0, 0.0], [0.006, 0.0, 0.0], [0.005, 0.0, 0.0]], [0.0, 0.0, 0.0])
     choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.011, 0.0, 0.0]), 0.0004, 0.05))
     assert number(choice) in (1, 2) and choice.expected == pytest.approx(2.0)
-
-
-def test_first_of_two_pushes_is_a_predictable_one():
-    pushes = made_up([[0.006, 0.0, 0.0], [0.0061, 0.0, 0.0], [0.005, 0.0, 0.0]], [0.002, 0.0001, 0.0001])
-    choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.011, 0.0, 0.0]), 0.0006, 0.05))
-    assert number(choice) in (1, 2) and choice.expected < 2.05
 
 
 def test_longest_push_is_chosen_far_from_the_goal():

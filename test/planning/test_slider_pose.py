@@ -16,8 +16,7 @@ from repository import BAGS
 from synthetic import triangle
 
 from push_predictor.errors import RequestError
-from push_predictor.geometry.frames import rotate, to_world, wrap_angle
-from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -276,21 +275,3 @@ def test_what_is_no_push_is_refused_by_field(push: WorldPush, stated: str) -> No
 @pytest.mark.parametrize("gap", [0.99 * MAX_GAP, -0.99 * MAX_DEPTH])
 def test_a_tip_within_the_errors_of_tracker_and_outline_touches(shape: str, gap: float) -> None:
     assert np.isfinite(slider_after(model_of(shape), push_at(shape, 0.1, 0.2, gap)).pose).all()
-
-
-def test_concave_outline_is_touched_at_the_tip() -> None:
-    """A tip between two arms is outside, though the outline is around it."""
-    vertices = np.array([[-0.04, -0.04], [0.06, -0.04], [0.06, -0.02], [0.0, -0.02], [0.0, 0.02], [0.06, 0.02]])
-    vertices = np.vstack([vertices, [[0.06, 0.04], [-0.04, 0.04]]])
-    outline = Outline(vertices - Outline(vertices).centroid)
-    model = replace(model_of("rect1"), rig=Rig("c", outline, RADIUS, "abs", 0.8))
-    tip = np.array([RADIUS, 0.0]) - Outline(vertices).centroid
-    push = WorldPush(np.zeros(3), tip, np.array([-SPEED, 0.0]), DURATION)
-    expected = model.predict_rows(np.array([[SPEED, *contact_and_angle(outline, tip)]]), np.array([DURATION])).mean[0]
-    np.testing.assert_allclose(slider_after(model, push).pose, expected * [-1.0, -1.0, 1.0], atol=1e-9)
-
-
-def contact_and_angle(outline: Outline, tip: np.ndarray) -> tuple[float, float]:
-    nearest = outline.project(tip[None])
-    normal = nearest.normal[0]
-    return float(nearest.contact[0]), float(wrap_angle(np.pi - np.arctan2(-normal[1], -normal[0])))

@@ -93,6 +93,15 @@ def test_no_two_folders_of_a_room_import_each_other(room: str) -> None:
     assert not [arrow for arrow in arrows if arrow[::-1] in arrows]
 
 
+def test_folders_of_models_import_only_from_those_before_them_and_mechanics_no_regression() -> None:
+    order = ["gaussian_process", "mechanics", "effects", "predictors", "tabulated", "store"]
+    assert sorted(order) == sorted(path.parent.name for path in (PACKAGE / "models").glob("*/__init__.py"))
+    for k, folder in enumerate(order):
+        forbidden = [*order[k + 1 :], *(order[:k] if folder == "mechanics" else ())]
+        for path in modules(f"models/{folder}"):
+            assert not [other for other in forbidden if imports_room(imports_of(path), f"models.{other}")], path
+
+
 @pytest.mark.parametrize("product", ["push_predictor", "msg_adapters", "push_predictor_paper/push_predictor_paper"])
 def test_no_folder_has_more_modules_than_one_can_survey(product: str) -> None:
     for package in (REPOSITORY / product).rglob("__init__.py"):

@@ -38,3 +38,11 @@ def test_a_slider_slides_on_until_it_rests_and_only_then_the_tip_is_placed_elsew
     assert 1e-4 < slid[0, 0] < 1e-3 and np.array_equal(rig.stop(ONLY) - pushed, slid)
     np.testing.assert_allclose(tip, [[-0.045 - 0.00475 + 0.005, 0.0]], atol=1e-12)
     np.testing.assert_allclose(beside, [[0.0, -0.045 - 0.00475]], atol=1e-12)
+
+
+def test_a_slow_slider_beside_it_does_not_coarsen_the_motion_of_a_fast_one():
+    both, alone = (LiveRig(square_spec(3), np.zeros((2, 3))) for _ in range(2))
+    for rig, who in ((both, np.arange(2)), (alone, ONLY)):
+        rig.place(who, np.full(len(who), 0.1))
+        rig.push(who, np.array([0.1, 0.002])[: len(who)], np.full(len(who), 0.3), 0.1)
+    np.testing.assert_allclose(both.sliders[0], alone.sliders[0], atol=1e-12)

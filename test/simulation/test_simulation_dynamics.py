@@ -10,11 +10,10 @@ from functools import cache
 import numpy as np
 import pytest
 from even_physics import no_noise, uniform_field
-from scipy.optimize import minimize
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.table import PushTable
-from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run, steps_of
+from push_predictor.simulation.dynamics import Motion, run, steps_of
 from push_predictor.simulation.physics import GRAVITY, KNOT_SPACING, PERSISTENT_SHARE, Physics, noise_from_draws
 from push_predictor.simulation.pushes import PusherPath, PushPlan, grid_pushes, pusher_path, random_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes
@@ -66,94 +65,6 @@ def travelled(motion: Motion) -> Array:
     return motion.slider[:, -1] - motion.slider[:, 0]
 
 
-def relative(difference: Array, reference: Array) -> Array:
-    """Root mean square of a difference over that of the reference, per column."""
-    return np.asarray(np.sqrt(np.mean(difference**2, axis=0) / np.mean(reference**2, axis=0)))
-
-
-def at_speeds(plan: PushPlan, *speeds: float) -> PushPlan:
-    """All pushes of the plan at each speed in turn."""
-    k = len(speeds)
-    speed = np.repeat(speeds, len(plan))
-    return PushPlan(np.tile(plan.contact, k), np.tile(plan.angle, k), speed, np.tile(plan.travel, k))
-
-
-def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, sticks: bool, steps: int = 50) -> Array:
-    """Poses (n, 3) after quasi-static pushes over `distance` beyond the touch.
-
-    The slider's twist is the one of least frictional power that the contact allows (Peshkin and Sanderson 1988): a
-    sticking contact hands on the tip's velocity, a frictionless one its normal part.
-    """
-    inward = physics.outline.inward_normal(plan.contact)
-    tips = physics.outline.point(plan.contact) - physics.radius * inward
-    directions = rotate(inward, plan.angle)
-    lever = 0.03
-    ends = []
-    for tip, direction, shares in zip(tips, directions, physics.shares, strict=False):
-        pose, guess = np.zeros(3), np.zeros(1 if sticks else 2)
-        for step in range(steps):
-            here = tip + (step / steps) * distance * direction
-            nearest = physics.outline.project(to_body(here[None], pose[None]))
-            normal = rotate(nearest.normal, pose[None, 2])[0]
-            arm, arms = rotate(nearest.point, pose[None, 2])[0], rotate(physics.support, pose[2])
-            across = np.array([-normal[1], normal[0]])
-
-            # The twist is linear in what the contact leaves free: the turn, and the slip if it does not stick.
-            given = direction if sticks else (direction @ normal) * normal
-            free = np.array([[arm[1] / lever, -arm[0] / lever, 1.0 / lever], [*across, 0.0]])[: len(guess)]
-            of_free = free[:, None, :2] + free[:, None, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-
-            def power(values: Array, given=given, of_free=of_free, shares=shares) -> tuple[float, Array]:
-                velocity = given + np.tensordot(values, of_free, 1)
-                speed = np.linalg.norm(velocity, axis=1)
-                gradient = np.sum(of_free * (shares / speed)[:, None] * velocity, axis=(1, 2))
-                return float(shares @ speed), gradient
-
-            guess = minimize(power, guess, jac=True, method="BFGS", options={"gtol": 1e-6}).x
-            pose = pose + (np.array([*given, 0.0]) + guess @ free) * distance / steps
-        ends.append(pose)
-    return np.array(ends)
-
-
-def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: float) -> Array:
-    """Poses (n, 3) when the tips have travelled `distance` beyond the commanded touch."""
-    inward = physics.outline.inward_normal(plan.contact)
-    touch, direction = physics.outline.point(plan.contact) - physics.radius * inward, rotate(inward, plan.angle)
-    along = np.sum((motion.pusher - touch[:, None]) * direction[:, None], axis=2)
-    reached = np.argmax(along > distance - 1e-5, axis=1)  # half a step before; not again when the tip retracts
-    return motion.slider[np.arange(len(plan)), reached]
-
-
-SLOW = PushPlan(np.array([0.04, 0.33]), np.array([0.3, -0.5]), np.full(2, 0.005), np.full(2, 0.0055))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "shape", ["rect1", *(pytest.param(shape, marks=pytest.mark.long) for shape in ("ellip2", "hex"))]
-)
-def test_slow_push_minimises_dissipation(shape: str) -> None:
-    twice = at_speeds(SLOW, 0.005, 0.005)
-    physics = even_physics(slider_named(shape), len(twice), np.repeat([20.0, 0.0], len(SLOW)))
-    found = np.split(at_distance(push(physics, twice, rest=0.0), twice, physics, 0.005), 2)
-    for here, sticks in zip(found, (True, False), strict=True):
-        expected = least_dissipation_path(physics, SLOW, 0.005, sticks)
-        assert np.all(np.abs(here - expected)[:, :2] < 5e-5)  # 1 % of the distance
-        assert np.all(np.abs(here - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("shape", ["rect1", pytest.param("ellip2", marks=pytest.mark.long)])
-def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
-    plan = random_pushes(8, [0.005], 0.005, np.random.default_rng(1))
-    physics = even_physics(slider_named(shape), 24, friction=0.15)
-    slowest, slow, fast = np.split(
-        travelled(push(physics, at_speeds(plan, 0.005, 0.01, 0.15), rest=0.0, coarse=2.0)), 3
-    )
-    assert np.all(relative(slow - slowest, slowest) < 0.005)
-    assert np.all(relative(fast - slowest, slowest) > 0.05)
-    assert np.any(relative(fast - slowest, slowest) > 0.12)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", ["rect1", "ellip3"])
 def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -> None:
@@ -167,27 +78,6 @@ def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -
 
 
 @pytest.mark.slow
-def test_friction_dissipates_energy_until_rest() -> None:
-    slider = slider_named("ellip2")
-    velocity = np.random.default_rng(3).normal(size=(8, 3)) * [0.05, 0.05, 1.0]
-    motion = let_go(even_physics(slider, 8), velocity, duration=0.13)
-    speed = np.diff(motion.slider, axis=1) / LET_GO_STEP
-    energy = 0.5 * (slider.mass * np.sum(speed[..., :2] ** 2, axis=2) + slider.inertia * speed[..., 2] ** 2)
-    assert np.all(np.diff(energy, axis=1) <= 1e-9 * energy[:, :1])
-    assert np.all(energy[:, -1] < 1e-12 * energy[:, 0])
-
-
-@pytest.mark.slow
-def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
-    plan = random_pushes(8, [0.04, 0.1], 0.005, np.random.default_rng(4), angle_limit=1.0)
-    mirrored = np.concatenate([plan.contact, (0.25 - plan.contact) % 1.0])  # left and right of the square
-    angle = np.concatenate([plan.angle, -plan.angle])
-    both = PushPlan(mirrored, angle, np.tile(plan.speed, 2), np.tile(plan.travel, 2))
-    one, other = np.split(travelled(push(even_physics(slider_named("rect1"), 16), both, rest=0.0, coarse=3.0)), 2)
-    assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
-
-
-@pytest.mark.slow
 def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     plan = random_pushes(6, [0.04, 0.1], 0.005, np.random.default_rng(5))
     poses = np.random.default_rng(6).normal(size=(6, 3)) * [0.03, 0.03, 1.0]
@@ -198,16 +88,6 @@ def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     there, here = np.split(travelled(motion), 2)
     assert np.allclose(rotate(there[:, :2], -poses[:, 2]), here[:, :2], atol=1e-9)
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
-
-
-def test_surface_friction_changes_the_force_but_not_the_motion_of_a_slow_push() -> None:
-    plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.01), np.full(2, 0.008))
-    light, heavy = (
-        push(even_physics(slider_named("rect1"), 2, friction=f), plan, rest=0.0, coarse=2.0) for f in (0.15, 0.3)
-    )
-    assert np.all(relative(travelled(heavy) - travelled(light), travelled(light)) < 0.005)
-    force = [np.median(np.hypot(m.wrench[..., 0], m.wrench[..., 1]), axis=1) for m in (light, heavy)]
-    assert force[1] / force[0] == pytest.approx(2.0, rel=0.01)
 
 
 def test_force_through_the_centre_equals_friction_times_weight() -> None:
@@ -230,21 +110,6 @@ def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
     rubbing = np.abs(normal[:, 0] * force[:, 1] - normal[:, 1] * force[:, 0])
     assert np.min(pressing) >= -1e-9
     assert np.all(rubbing <= 0.25 * pressing + 1e-9)
-
-
-@pytest.mark.slow
-def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
-    plan = random_pushes(6, [0.04, 0.12], 0.005, np.random.default_rng(9))
-    physics = even_physics(slider_named("rect1"), 6)
-    motion = push(physics, plan)
-    gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
-    gap = gap.reshape(motion.time.shape)
-    stopping_distance = plan.speed * physics.mass / DAMPING  # of a slider that a damper alone stops
-    yielding = 2.0 * FRICTION * physics.mass * GRAVITY / STIFFNESS
-    assert np.all(np.min(gap, axis=1) > -stopping_distance - yielding)
-    assert np.all(gap[:, -1] > 0.0)
-    assert np.all(motion.wrench[:, -1] == 0.0)
-    assert np.max(np.abs(motion.slider[:, -1] - motion.slider[:, -20])) < 1e-7
 
 
 @pytest.mark.parametrize("shape", ["rect1", "ellip1", "ellip2", "ellip3", "hex"])

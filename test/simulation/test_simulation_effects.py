@@ -85,19 +85,15 @@ def friction_changes(values: Sequence[float]) -> Changes:
 
 
 def streams(recording: Recording) -> list[Array]:
-    assert recording.wrench is not None
     slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
-    return [
-        slider.stamp,
-        slider.x,
-        slider.y,
-        slider.heading,
-        pusher.x,
-        pusher.y,
-        wrench.stamp,
-        wrench.fx,
-        wrench.torque,
-    ]
+    assert wrench is not None
+    of_wrench = [wrench.stamp, wrench.fx, wrench.torque]
+    return [slider.stamp, slider.x, slider.y, slider.heading, pusher.x, pusher.y, *of_wrench]
+
+
+def assert_same_streams(one: Recording, other: Recording) -> None:
+    for ours, theirs in zip(streams(one), streams(other), strict=True):
+        assert np.array_equal(ours, theirs)
 
 
 def test_changes_of_zero_leave_the_recording_identical() -> None:
@@ -107,15 +103,11 @@ def test_changes_of_zero_leave_the_recording_identical() -> None:
         grip=lambda moment: np.ones(len(moment.travelled)),
         pull=lambda moment: np.zeros((len(moment.travelled), 3)),
     )
-    same = simulate(replace(ON_ABS, changes=none))
-    for one, other in zip(streams(recording_of(ON_ABS)), streams(same), strict=True):
-        assert np.array_equal(one, other)
+    assert_same_streams(simulate(replace(ON_ABS, changes=none)), recording_of(ON_ABS))
 
 
 def test_pickled_spec_gives_the_same_recording() -> None:
-    same = simulate(pickle.loads(pickle.dumps(ON_ABS)))
-    for one, other in zip(streams(recording_of(ON_ABS)), streams(same), strict=True):
-        assert np.array_equal(one, other)
+    assert_same_streams(simulate(pickle.loads(pickle.dumps(ON_ABS))), recording_of(ON_ABS))
 
 
 def test_directed_drag_without_anisotropy_equals_isotropic_drag() -> None:
@@ -177,31 +169,6 @@ def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     assert turn > 0.005  # the loaded left side lags, so the slider turns left
 
 
-@pytest.mark.slow
-def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
-    grain = Changes(grain=lambda moment: np.outer(of_push([0.02, 0.02, 0.02, 0.0, 0.0, 0.0], moment), [0.0, 1.0]))
-    headings = np.tile([0.3, 0.3 + np.pi, 0.3 + np.pi / 2.0], 2)
-    with_it, without = np.split(outcomes_by_push(at_headings(headings, grain)), 2)
-    along, opposite, right = with_it - without
-    assert abs(along[1]) > 3e-5
-    assert opposite == pytest.approx(along, abs=0.02 * abs(along[1]))
-    assert right[1] == pytest.approx(-along[1], rel=0.1)
-
-
-def at_headings(headings: Array, changes: Changes) -> SimulationSpec:
-    """The same push of sliders with these headings."""
-    start = np.column_stack([np.zeros((len(headings), 2)), headings])
-    return spec_of(middle_pushes(np.zeros(len(headings))), changes=changes, start=start)
-
-
-def test_grain_of_the_slider_turns_with_it() -> None:
-    def grain(moment: Moment) -> Array:
-        return rotate(np.tile([0.0, 0.4], (len(moment.travelled), 1)), 2.0 * moment.pose[:, 2])
-
-    one, other = outcomes_by_push(at_headings(np.array([0.9, -0.5]), Changes(grain=grain)))
-    assert one == pytest.approx(other, rel=0.02, abs=1e-7)
-
-
 def test_resting_slider_stays_on_a_gentle_slope() -> None:
     spec = spec_of(middle_pushes(np.zeros(1)), changes=Changes(pull=lambda moment: np.array([[0.3, 0.3, 0.0]])))
     (batch,) = run_pushes(spec)
@@ -253,8 +220,7 @@ def test_recorded_topic_does_not_change_the_pushes() -> None:
     assert set(with_topic.scalars) == {"surface/temperature", "room/light"}
     stream = with_topic.scalars["room/light"]
     assert stream.value == pytest.approx(5.0 + (stream.stamp - stream.stamp[0]) / 1e9, abs=0.01)
-    for one, other in zip(streams(recording_of(ON_ABS)), streams(with_topic), strict=True):
-        assert np.array_equal(one, other)
+    assert_same_streams(with_topic, recording_of(ON_ABS))
 
 
 def test_pauses_delay_the_pushes() -> None:

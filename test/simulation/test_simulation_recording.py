@@ -15,6 +15,7 @@ from repository import BAGS
 from sensed_motion import outcomes_of, sensed
 
 from push_predictor.errors import RequestError, RigError
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording
 from push_predictor.recordings.windows.finder import find_windows
@@ -64,12 +65,6 @@ def test_stamps_increase_and_the_clocks_differ(simulated: Recording) -> None:
     assert len(np.intersect1d(streams[0], streams[1])) < 0.2 * len(streams[0])
 
 
-def test_same_spec_gives_the_same_recording(simulated: Recording) -> None:
-    again = simulate(spec_of())
-    assert np.array_equal(again.slider.stamp, simulated.slider.stamp)
-    assert np.array_equal(again.slider.heading, simulated.slider.heading)
-
-
 @pytest.mark.slow
 def test_recordings_of_different_specs_share_no_stamps(simulated: Recording) -> None:
     others = (simulate(spec_of(*short, 0.002)) for short in ((2, 2), (3, 2), (2, 3)))
@@ -90,17 +85,6 @@ def test_dropouts_occur_at_the_specified_rate() -> None:
     none, some = (sensed(spec, sensors=Sensors(dropout_interval=interval)).slider for interval in (0.0, 0.5))
     assert np.all(np.diff(none.stamp) < 25_000_000)
     assert np.sum(np.diff(some.stamp) > 25_000_000) == pytest.approx(seconds(some)[-1] / 0.5, rel=0.4)
-
-
-def test_slider_moves_only_when_pushed_or_reset(simulated: Recording) -> None:
-    slider = simulated.slider
-    pushed = np.hypot(simulated.wrench.fx, simulated.wrench.fy) > 0.4
-    touched = np.interp(slider.stamp, simulated.wrench.stamp, pushed) > 0.0
-    moved = np.hypot(np.diff(slider.x), np.diff(slider.y)) / np.diff(seconds(slider)) > 0.025
-    explained = touched | lifted_at(simulated, slider.stamp)
-    coasting = np.convolve(explained, np.ones(9), mode="same") > 0
-    assert np.any(moved & lifted_at(simulated, slider.stamp)[1:])
-    assert np.all(coasting[1:][moved])
 
 
 def test_force_is_zero_while_the_tip_is_lifted(simulated: Recording) -> None:
@@ -165,6 +149,9 @@ def test_committed_bags_equal_the_output_of_their_command(name: str, monkeypatch
     assert np.array_equal(kept.slider.stamp, made.slider.stamp)
     assert np.array_equal(kept.pusher.stamp, made.pusher.stamp)
     assert np.median(np.abs(kept.slider.x - made.slider.x)) < 1e-12
+    assert np.median(np.abs(wrap_angle(kept.slider.heading - made.slider.heading))) < 1e-12
+    assert kept.wrench is not None and made.wrench is not None
+    assert np.median(np.abs(kept.wrench.fx - made.wrench.fx)) < 1e-12
     assert np.max(np.abs(kept.slider.x - made.slider.x)) < 1e-4
 
 

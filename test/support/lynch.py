@@ -14,8 +14,6 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.models.mechanics.surface import PowerSurface
 from push_predictor.types import Array
 
-TOUCHING = 2e-5  # m
-
 
 @dataclass(frozen=True)
 class Instant:
@@ -81,25 +79,3 @@ def sweeps(outline: Outline, radius: float, inputs: Array, duration: Array) -> S
     normal = outline.inward_normal(inputs[:, 1])
     start = outline.point(inputs[:, 1]) - radius * normal
     return Sweeps(outline, radius, start, rotate(normal, inputs[:, 2]), inputs[:, 0] * duration)
-
-
-def in_equal_steps(path: Sweeps, surface: PowerSurface, friction: float, steps: int) -> Array:
-    """Poses (n, 3) by equal steps of the classical fourth-order Runge-Kutta method, while the disc touches."""
-    pose, step = np.zeros((len(path.travel), 3)), path.travel / steps
-    coefficient = np.full(len(pose), friction)
-
-    def rate(pose: Array, done: Array) -> tuple[Array, Array]:
-        nearest = path.outline.project(to_body(path.start + done[:, None] * path.ahead, pose))
-        at = Instant(nearest.point, -nearest.normal, rotate(path.ahead, -pose[:, 2]), pose)
-        twist = lynch(at, surface, coefficient, coefficient)[0]
-        twist[at.along(at.ahead)[0] <= 0.0] = 0.0
-        return np.column_stack([rotate(twist[:, :2], pose[:, 2]), twist[:, 2]]), nearest.distance - path.radius
-
-    h = step[:, None]
-    for k in range(steps):
-        k1, gap = rate(pose, k * step)
-        k2 = rate(pose + 0.5 * h * k1, (k + 0.5) * step)[0]
-        k3 = rate(pose + 0.5 * h * k2, (k + 0.5) * step)[0]
-        k4 = rate(pose + h * k3, (k + 1) * step)[0]
-        pose = pose + np.where((gap < TOUCHING)[:, None], h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), 0.0)
-    return pose

@@ -69,7 +69,8 @@ def design_of(
 
 def products(responses: Array, values: Array) -> Array:
     """Products (n, 3, p * m), p first, of responses (n, 3, p) and columns (n, m) of a basis."""
-    return np.asarray((responses[:, :, :, None] * values[:, None, None, :]).reshape(len(responses), 3, -1))
+    size = responses.shape[2] * values.shape[1]
+    return np.asarray((responses[:, :, :, None] * values[:, None, None, :]).reshape(len(responses), 3, size))
 
 
 def generic_responses(mechanics: FittedMechanics, push: Push, outcome_scale: Array) -> Array:
