@@ -68,11 +68,7 @@ def test_of_two_effects_the_oracle_has_both(table: PushTable, monkeypatch: pytes
     monkeypatch.setattr(oracle, "held_out_gain", lambda *_: better)
     traced = {"value": -0.2, "low": -0.3, "high": -0.1}
     for truth in (record, {**record, "second": None}, {**record, "second": second}):
-        assert oracle_gain(Path("new"), Path("model"), truth) == {
-            "value": -0.3,
-            "low": -0.4,
-            "high": -0.2,
-            "traced": traced,
-        }
+        found = oracle_gain(Path("new"), Path("model"), truth)
+        assert found == {"value": -0.3, "low": -0.4, "high": -0.2, "traced": traced}
     first = ("contact_friction", "elapsed_time")
     assert given == [[first], [first], [first, ("tilted_surface", "session")]]

@@ -39,11 +39,11 @@ def comparison(error: float, pushes: int) -> Comparison:
     return Comparison("m", 10, ids, observed + off, covariance, observed, None, np.zeros(3))
 
 
-def outcome(recording: Recording, later: dict[str, float], pushes: int = 20, failed: str = "") -> Outcome:
+def outcome(recording: Recording, later: dict[str, float], pushes: int = 20) -> Outcome:
     """The outcome of a loop; later: the error of each model on the later pushes."""
     split = Split("mlab one to two", recording, recording, recording, "a support was changed")
-    traced = None if failed else Traced("", {"verdict": "mechanism_only", "effects": [EFFECT]}, None)
-    closed = ClosedLoop(Story({}, {}, 30, None), None, traced, failed)
+    traced = Traced("", {"verdict": "mechanism_only", "effects": [EFFECT]}, None)
+    closed = ClosedLoop(Story({}, {}, 30, None), None, traced, "")
     counts = {"training": (50, 1000), "traced": (1, 15), "later": (pushes, 3 * pushes)}
     alarm = {"fired": False, "pushes": 30, "log10_evidence": 0.9, "off": None}
     return Outcome(split, counts, alarm, closed, {name: comparison(error, pushes) for name, error in later.items()})
@@ -57,12 +57,6 @@ def test_extension_that_beats_both_models_on_later_pushes_is_called_better(recor
     assert to_text(found).startswith("mlab one to two. The extended model is better on the later pushes.")
     values = to_json(found)["differences"]["extended − refit"]["nlpd"]
     assert values["low"] <= values["value"] <= values["high"] < 0.0
-
-
-def test_refused_trace_is_the_answer_and_its_reason_is_given(recording: Recording) -> None:
-    found = outcome(recording, {DEPLOYED: 0.5}, failed="too few pushes")
-    assert "Nothing was found: the trace refused these data." in to_text(found)
-    assert to_json(found)["trace"] == {"failed": "too few pushes"}
 
 
 def test_one_later_push_has_no_interval(recording: Recording) -> None:
@@ -83,12 +77,6 @@ def test_without_the_data_it_states_which_folder_is_absent_and_succeeds(
     said = capsys.readouterr().out
     assert said.count("SKIPPED") == 2 and str(tmp_path / "absent" / "mlab") in said and "--data FOLDER" in said
     assert not list(tmp_path.iterdir())
-
-
-def test_share_of_no_pushes_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SystemExit) as refused:
-        main(["--data", str(tmp_path), "--traced-share", "1"])
-    assert refused.value.code == 2
 
 
 @pytest.mark.long

@@ -107,22 +107,6 @@ def test_windows_of_a_log_add_up_to_the_measured_pushes(logs: dict[str, Split], 
         assert window.angle == pytest.approx(table.inputs[row, 2], abs=0.01)
 
 
-def test_forces_of_a_log_are_those_that_the_importer_has(logs: dict[str, Split], table: PushTable) -> None:
-    for row, window in enumerate(windows_of(logs[WOOD].traced, 5.3)):
-        assert window.covariates["normal_force"] == pytest.approx(table.covariates["normal_force"][row], rel=0.3)
-    assert np.all(table.covariates["normal_force"] > 0.3)
-
-
-def test_rig_that_the_nodes_get_hides_the_support(logs: dict[str, Split]) -> None:
-    for split in logs.values():
-        for part in (split.training, split.traced, split.later):
-            assert require_rig(part).support_points is None
-
-
-def test_known_change_is_that_of_the_support(logs: dict[str, Split]) -> None:
-    assert "45.2 mm in training, 39.2 mm later; pressure_spread +0.00 in training, −0.14 later" in logs[WOOD].known
-
-
 def test_logs_are_in_order_of_time_also_where_a_file_is_not(logs: dict[str, Split]) -> None:
     assert any(name.startswith(f"mlab {MIXED}") for name in logs)
     for split in logs.values():

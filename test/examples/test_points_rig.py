@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from benchmarks.points_rig.drivers import Driver
-from benchmarks.points_rig.effects import Effect
 from benchmarks.points_rig.outlines import rectangle
 from benchmarks.points_rig.pairs import make_pair, write_pair
-from benchmarks.points_rig.pieces import clean_ratio
 from benchmarks.points_rig.rigs import GRAVITY, Rig, draw_rig
 from benchmarks.points_rig.sensors import Streams
 from benchmarks.points_rig.sessions import Session, plan_session
@@ -116,18 +113,6 @@ def test_bags_contain_the_readings(rig: Rig, tmp_path: Path) -> None:
     assert [read.wrench.fx[0], read.wrench.fy[0], read.wrench.torque[0]] == [1.0, 2.0, 0.3]
     assert [scalar.value.tolist() for scalar in read.scalars.values()] == [[45.5, 46.5]]
     assert read.rig.object_mass == pytest.approx(rig.mass, abs=1e-3)
-
-
-@pytest.mark.long
-def test_the_clean_ratio_is_zero_without_a_change_and_large_with_a_large_one(
-    rig: Rig, session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("benchmarks.points_rig.pieces.JUDGED_PUSHES", 4)
-    noisy = replace(rig, noise=1.0)
-    change = Effect("centre_of_friction", 0.018, Driver("constant"), 0.0)
-    assert clean_ratio(noisy, session, 3, (), 1.0) == 0.0
-    assert clean_ratio(noisy, session, 3, (replace(change, value=0.0),), 1.0) < 1e-9
-    assert clean_ratio(noisy, session, 3, (change,), 1.0) > 1.0
 
 
 @pytest.mark.long
