@@ -92,12 +92,3 @@ def test_load_shares_beat_even_pressure_where_the_load_is_concentrated_or_spread
     """Measured 0.13 against 0.28, 0.22 against 0.38, 0.26 against 0.27."""
     table = pushes(surface, support)
     assert score(model(loaded(support)), table) < share * score(model(uniform_ellipsoid(TRIANGLE)), table)
-
-
-@pytest.mark.parametrize("surface", ["hardboard", "plywood"])
-def test_load_shares_equal_even_pressure_where_the_load_is_even(pushes, surface):
-    """c is 39 mm by the shares and 45 mm by even pressure; measured 0.122 and 0.122, 0.120 and 0.128."""
-    table = pushes(surface, "3pts3")
-    assert score(model(loaded("3pts3")), table) == pytest.approx(
-        score(model(uniform_ellipsoid(TRIANGLE)), table), abs=0.01
-    )
