@@ -53,13 +53,6 @@ def test_rosdep_is_given_the_folders_of_the_packages_that_are_built():
     assert all((REPOSITORY / folder / "package.xml").is_file() for folder in folders)
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "docs/explanation/unproven.md"])
-def test_every_documented_call_of_rosdep_names_the_nested_package(document: str):
-    text = (REPOSITORY / document).read_text()
-    for call in re.findall(r"rosdep install [^`\n]+", text):
-        assert "push_predictor_interfaces" in call, call
-
-
 def test_the_executable_and_its_command_exist():
     executable, *command = words_after("ros2", "run", "push_predictor")
     assert (REPOSITORY / "scripts" / "run" / executable).is_file()

@@ -189,13 +189,6 @@ def test_what_the_papers_package_imports_is_a_dependency():
         assert KEY_OF.get(name, name) in keys_of("push_predictor_paper", "exec"), name
 
 
-def test_what_the_messages_are_made_of_is_a_dependency():
-    listed = (FOLDERS["push_predictor_interfaces"] / "CMakeLists.txt").read_text()
-    used = set(re.search(r"DEPENDENCIES ([\w ]+)\)", listed)[1].split())  # type: ignore[index]
-    assert used <= keys_of("push_predictor_interfaces", "build") & keys_of("push_predictor_interfaces", "exec")
-    assert keys_of("push_predictor_interfaces", "buildtool") == {"ament_cmake", "rosidl_default_generators"}
-
-
 def test_rosdep_knows_every_key_and_no_rule_is_left_over():
     kinds = ("build", "buildtool", "exec", "test")
     declared = {key for name in FOLDERS for key in keys_of(name, *kinds)} - set(FOLDERS)
