@@ -17,7 +17,6 @@ from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
-from push_predictor.recordings.checks.check import DataChecks
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig
@@ -93,14 +92,6 @@ def test_every_command_that_reads_data_checks_them(
         status, (line,) = run(WARNED, "--strict")
         assert status == 1 and line.startswith(f"push_predictor {command}: {altered[WARNED]}: ")
         assert "change the sign" in line
-
-
-def test_a_warning_is_shown_once_however_often_the_data_are_read(altered: dict[str, Path]) -> None:
-    shown: list[str] = []
-    checks, recording = DataChecks(False, shown.append), read_recording(altered[WARNED])
-    for _ in range(2):
-        checks(altered[WARNED], recording, None)
-    assert len(shown) == 1
 
 
 def test_a_table_in_millimetres_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
