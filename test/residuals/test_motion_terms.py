@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 import pytest
 from made_up_traces import NOISE, planted, pushes, slippery
-from search_bench import gate_of, in_library
+from search_bench import gate_of
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -28,19 +28,9 @@ from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import Naming
 from push_predictor.residuals.selection.search import Term, _Search
 
+TRIED = ("contact_friction", "pressure_spread")
 ALWAYS = DriverBasis("constant")
 ALONG_X = DriverBasis("linear", ("slider_x",), (0.0,), (0.1,))
-
-
-@pytest.fixture(scope="module")
-def deployed() -> PushModel:
-    return train_model(pushes(100, 1), square_rig(), "analytical", name="deployed")
-
-
-@pytest.fixture(autouse=True)
-def a_library_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Computing responses takes most of the time."""
-    in_library(monkeypatch, "contact_friction", "pressure_spread")
 
 
 def found(model: PushModel, table: PushTable) -> tuple[MotionTerm, ...]:

@@ -182,11 +182,6 @@ def test_changed_contact_friction_is_not_reported_as_surface_friction() -> None:
     assert found(made(2, contact_friction=0.4), made(1)).effects == ()
 
 
-def test_reports_every_candidate_tested() -> None:
-    tested = {(t.mechanism, t.covariate) for t in found(made(2), made(1)).tested}
-    assert {("surface_friction", name) for name in ("elapsed_time", "model_inputs", "topic:/hum")} <= tested
-
-
 def test_windows_without_a_force_give_no_finding() -> None:
     table = made(2)
     assert found(replace(table, covariates={}), table) == found(replace(table, covariates={}), None)

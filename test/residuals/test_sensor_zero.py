@@ -14,7 +14,6 @@ from scipy.signal import lfilter
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect
 from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, zero_shift
-from push_predictor.residuals.evidence.drivers import screening_bases
 from push_predictor.types import Array
 
 PUSHES, WINDOWS = 150, 3  # per push
@@ -122,7 +121,3 @@ def test_a_change_is_an_effect_up_to_the_level_and_a_candidate_beyond() -> None:
         finding = zero_shift(biased, sound, level)
         assert len(finding.effects) == count
         assert [(t.mechanism, t.covariate) for t in finding.tested] == [("wrench_bias", "session")]
-
-
-def test_zero_is_not_tried_as_a_cause() -> None:
-    assert {name for name, _ in screening_bases(made(1))} == {"push_index"}
