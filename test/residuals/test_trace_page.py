@@ -34,6 +34,7 @@ from push_predictor.evaluation.push_scores import push_means
 from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
+from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.chart import Bars, Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.measurement import CORRECTIONS
@@ -270,50 +271,52 @@ def test_key_picture_names_single_pushes(pages: Callable[[str], str], name: str)
     assert names <= pushes and len(names) > 0.5 * len(pushes)
 
 
-def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
+def with_columns(table: PushTable, **columns: Any) -> PushTable:
+    return replace(table, covariates={**table.covariates, **columns})
+
+
+def since_training() -> Trace:
+    """A change since training, with which no model is extended."""
     trace = trace_of("constant")
     (effect,), (term,) = trace.effects, trace.terms
-    since = DriverBasis("step", ("session",), place=0.5)
-
-    def later(table: Any) -> Any:
-        return replace(table, covariates={**table.covariates, "session": np.ones(len(table))})
-
-    changed = replace(
-        trace,
-        effects=(replace(effect, covariate="session", basis="step"),),
-        terms=(replace(term, covariate="session", basis=since),),
-        analysis=later(trace.analysis),
-        held_out=replace(trace.held_out, table=later(trace.held_out.table)),
-        extended=None,
-    )
-    page = write_trace_report(tmp_path / "trace.html", changed).read_text()
-    assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."  # nothing was extended
-    key = page[page.index("<svg") : page.index("<h2")]
-    assert "Elapsed time (s)" in key and key.count('class="dot push"') > 50
+    analysis, held = (with_columns(t, session=np.ones(len(t))) for t in (trace.analysis, trace.held_out.table))
+    since = replace(term, covariate="session", basis=DriverBasis("step", ("session",), place=0.5))
+    named = replace(effect, covariate="session", basis="step")
+    held_out = replace(trace.held_out, table=held)
+    return replace(trace, effects=(named,), terms=(since,), analysis=analysis, held_out=held_out, extended=None)
 
 
-def test_force_is_compared_with_that_in_training(tmp_path: Path) -> None:
+def pushed_harder() -> Trace:
     trace = trace_of("wrench_only")
-
-    def loaded(table: Any, force: float) -> Any:
-        return replace(table, covariates={**table.covariates, "normal_force": np.full(len(table), force)})
-
-    model = replace(trace.model, training=loaded(trace.model.training, 1.0))
-    known = replace(trace, model=model, analysis=loaded(trace.analysis, 1.2))
-    page = write_trace_report(tmp_path / "trace.html", known).read_text()
-    key = page[page.index("<svg") : page.index("<h2")]
-    assert "Normal force (N)" in key and "median in training" in key and ": 1.2 N<" in key
+    training, analysis = (
+        with_columns(t, normal_force=np.full(len(t), force))
+        for t, force in ((trace.model.training, 1.0), (trace.analysis, 1.2))
+    )
+    return replace(trace, model=replace(trace.model, training=training), analysis=analysis)
 
 
-def test_measured_gap_is_drawn_against_the_gap_that_the_error_causes(tmp_path: Path) -> None:
+def late() -> Trace:
     trace = trace_of("measurement")
-    table = trace.analysis
-    speed = table.inputs[:, 0] * np.cos(table.inputs[:, 2])
-    gaps = replace(table, covariates={**table.covariates, "contact_gap": -0.012 * speed})
-    page = write_trace_report(tmp_path / "trace.html", replace(trace, analysis=gaps)).read_text()
+    gap = -0.012 * trace.analysis.inputs[:, 0] * np.cos(trace.analysis.inputs[:, 2])
+    return replace(trace, analysis=with_columns(trace.analysis, contact_gap=gap))
+
+
+@pytest.mark.parametrize(
+    ("trace", "shown"),
+    [
+        (since_training, ["Elapsed time (s)", 'class="dot push"']),
+        (pushed_harder, ["Normal force (N)", "median in training", ": 1.2 N<"]),
+        (late, ["Gap that the error causes", "Measured gap at the contact (mm)", "as the error predicts"]),
+    ],
+)
+def test_key_picture_shows_what_the_finding_is_about(
+    tmp_path: Path, trace: Callable[[], Trace], shown: list[str]
+) -> None:
+    page = write_trace_report(tmp_path / "trace.html", trace()).read_text()
     key = page[page.index("<svg") : page.index("<h2")]
-    assert "Gap that the error causes" in key and "Measured gap at the contact (mm)" in key
-    assert "as the error predicts" in key
+    assert all(words in key for words in shown)
+    if trace is since_training:
+        assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."
 
 
 def test_held_out_section_shows_errors_before_and_after_and_scores_with_intervals(pages: Callable[[str], str]) -> None:
@@ -328,12 +331,6 @@ def test_input_shift_beside_another_verdict_is_a_warning(tmp_path: Path) -> None
     page = write_trace_report(tmp_path / "trace.html", shifted(trace_of("effect"), "effect")).read_text()
     warning = re.search(r'<p class="warning">(.*?)</p>', page)
     assert warning and warning[1].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
-
-
-@pytest.mark.parametrize("name", ["none", "effect", "input_shift"])
-def test_terminal_begins_with_the_sentences_of_the_page(name: str) -> None:
-    trace = trace_of(name)
-    assert summary_lines(trace)[:4] == [*(sentence.replace("−", "-") for sentence in answer(trace)), ""]
 
 
 def test_json_lists_the_input_shift() -> None:
@@ -405,14 +402,11 @@ def test_every_mechanism_and_covariate_has_a_phrase() -> None:
     assert all(phrases) and not any("_" in phrase for phrase in phrases)
 
 
-def test_no_number_is_minus_zero() -> None:
-    assert interval(Estimate(-8.0, -13.0, -0.2)) == "−8 (95 % CI −13 to 0)"
-
-
-def test_intervals_show_the_digits_that_they_determine() -> None:
+def test_intervals_show_the_digits_that_they_determine_and_no_minus_zero() -> None:
     assert interval(Estimate(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
     assert interval(Estimate(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
     assert interval(Estimate(0.5, float("nan"), float("nan"))) == "0.5"
+    assert interval(Estimate(-8.0, -13.0, -0.2)) == "−8 (95 % CI −13 to 0)"
 
 
 def test_advice_matches_the_rivals() -> None:
@@ -431,7 +425,9 @@ def test_tested_candidates_are_unique_pairs_with_smallest_p_and_role(drift: Trac
     assert roles["pressure_spread", "push_index"] == ""
 
 
-def test_repr_states_verdict_effects_and_whether_the_model_is_extended(drift: Trace) -> None:
+def test_repr_and_terminal_state_the_answer(drift: Trace) -> None:
+    for trace in map(trace_of, ("none", "effect", "input_shift")):
+        assert summary_lines(trace)[:4] == [*(sentence.replace("−", "-") for sentence in answer(trace)), ""]
     assert repr(drift) == "Trace of 'deployed': mechanism_only (contact_friction by elapsed_time), model extended"
     assert repr(trace_of("none")) == "Trace of 'deployed': none (no effect), model unchanged"
 
