@@ -7,19 +7,27 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import expm1
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from synthetic import square_pushes
 
+from benchmarks.blind import oracle
 from benchmarks.blind.commands import CYCLE, main
 from benchmarks.blind.effects import GROUPS, SIZES, World, _laws, draw
 from benchmarks.blind.library import library_without
+from benchmarks.blind.oracle import oracle_gain, true_term
 from benchmarks.blind.recordings import MODEL, Size, conditions, drawn_for, later_spec, make_one, rig_of
 from benchmarks.blind.scores import score_of, wilson
+from benchmarks.blind.true_parameter import covers
+from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.extension.held_out_gain import HeldOutGain
 from push_predictor.simulation.changes import Changes, Moment
 from push_predictor.simulation.rig_simulator import push_outcomes
 from push_predictor.simulation.sensors import Faults
@@ -290,3 +298,147 @@ def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     assert counted(record, "harm: extended, interval of the gain wholly above zero") == (0, 3)
     assert counted(record, "wrench-only changes reported as such") == (1, 1)
     assert "motion model changed without cause | 0 of 2" in table.read_text()
+
+
+# --- true parameter ---------------------------------------------------------------------------------------------------
+
+
+def planted(kind: str, value: float, unit: str, **other: Any) -> dict[str, Any]:
+    record = {"kind": kind, "value": value, "unit": unit, "form": "constant", "covariates": ["session"]}
+    return {**record, "friction": 0.25, "engine": "own", **other}
+
+
+def covered(
+    record: dict[str, Any], value: float, form: str = "constant", covariate: str = "model_inputs"
+) -> bool | None:
+    """Of an interval of 1 % about a value."""
+    low, high = sorted((0.99 * value, 1.01 * value))
+    reported = {
+        "mechanism": record["kind"],
+        "form": form,
+        "covariate": covariate,
+        "parameter": {"low": low, "high": high},
+    }
+    return covers(record, record, reported)
+
+
+@pytest.mark.parametrize(("kind", "value", "unit", "parameter"), [
+    ("contact_friction", -0.2, "1", -0.2),
+    ("centre_of_friction", -0.01, "m", 0.01),
+    ("anisotropic_friction", -0.3, "1", 0.3),
+    ("body_anisotropy", -0.3, "1", 0.3),
+    ("tilted_surface", -0.05, "N/N", 0.2),
+    ("tilted_surface", 0.05, "of the weight", 0.2),
+    ("surface_friction", -0.4, "1", expm1(-0.4)),
+    ("surface_friction", -0.4, "of its value", -0.4),
+    ("clock_offset", 0.015, "s", 0.015),
+    ("frame_rotation", -0.03, "rad", -0.03),
+])  # fmt: skip
+def test_constant_parameters_are_compared_in_the_unit_of_the_library(
+    kind: str, value: float, unit: str, parameter: float
+) -> None:
+    record = planted(kind, value, unit)
+    assert covered(record, parameter) is True
+    assert covered(record, 1.1 * parameter) is False
+    assert covered(record, -parameter) is False
+    assert covered(record, parameter, "step", "session") is True
+
+
+@pytest.mark.parametrize(("kind", "unit"), [
+    ("pressure_spread", "1"), ("pressure_spread", "of the load's rms radius"), ("anisotropic_friction", "of the mean"),
+    ("frame_shift", "m"), ("wrench_bias", "N"), ("ballast", "kg"),
+])  # fmt: skip
+def test_parameters_of_another_meaning_are_not_compared(kind: str, unit: str) -> None:
+    assert covered(planted(kind, 0.1, unit), 0.1) is None
+
+
+def test_truths_that_lack_what_a_comparison_needs_are_not_compared() -> None:
+    tilted, centre = planted("tilted_surface", 0.05, "N/N"), planted("centre_of_friction", 0.01, "m")
+    assert covered({key: value for key, value in tilted.items() if key != "friction"}, 0.2) is None
+    assert covered({key: value for key, value in centre.items() if key != "engine"}, 0.01) is None
+    record = planted("contact_friction", 0.2, "1")
+    reported = {"mechanism": "tilted_surface", "form": "constant", "covariate": "session"}
+    assert covers(record, record, {**reported, "parameter": {"low": 0.1, "high": 0.3}}) is None
+    assert covers(record, record, {**reported, "mechanism": "contact_friction", "parameter": None}) is None
+
+
+@pytest.mark.parametrize(("form", "covariates", "reported_form", "covariate", "share"), [
+    ("constant", ["session"], "linear", "session", None),
+    ("constant", ["session"], "step", "push_index", None),
+    ("step", ["push_index"], "step", "push_index", 1.0),
+    ("step", ["push_index"], "step", "elapsed_time", 1.0),
+    ("step", ["topic:/room/humidity"], "step", "topic:/room/humidity", 1.0),
+    ("step", ["topic:/room/humidity"], "step", "push_index", None),
+    ("step", ["push_index"], "linear", "push_index", None),
+    ("linear", ["elapsed_time"], "linear", "elapsed_time", 0.9),
+    ("linear", ["elapsed_time"], "linear", "slid_distance", 0.9),
+    ("linear", ["elapsed_time"], "step", "elapsed_time", None),
+    ("linear", ["topic:/room/humidity"], "linear", "topic:/room/humidity", None),
+    ("linear", ["velocity"], "linear", "velocity", None),
+    ("saturating", ["elapsed_time"], "linear", "elapsed_time", None),
+    ("saturating", ["elapsed_time"], "logarithmic", "elapsed_time", None),
+])  # fmt: skip
+def test_forms_must_agree(
+    form: str, covariates: list[str], reported_form: str, covariate: str, share: float | None
+) -> None:
+    record = planted("contact_friction", 0.2, "1", form=form, covariates=covariates)
+    saturating = {**record, "course": "saturating"}  # the course decides where a truth has one
+    assert form == "step" or covered(saturating, 0.2 * (share or 1.0), reported_form, covariate) is None
+    assert covered(record, 0.2 * (share or 1.0), reported_form, covariate) is (None if share is None else True)
+
+
+# --- blind oracle -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def table() -> PushTable:
+    plain, _ = square_pushes(40)
+    rng = np.random.default_rng(1)
+    index = np.arange(len(plain), dtype=np.float64)
+    covariates = {"push_index": index, "elapsed_time": 3.0 * index, "dwell_time": rng.exponential(2.0, len(plain))}
+    covariates |= {"slider_x": rng.normal(size=len(plain)), "slider_y": rng.normal(size=len(plain))}
+    covariates |= {"contact": plain.inputs[:, 1], "edge": np.floor(4.0 * plain.inputs[:, 1]), "slider_heading": index}
+    return replace(plain, covariates=covariates)
+
+
+@pytest.mark.parametrize(("covariates", "form", "name", "course", "expected"), [
+    (["session", "model_inputs"], "constant", "contact_friction", None, "constant"),
+    (["session", "slider_x"], "constant", None, None, "constant"),
+    (["push_index", "elapsed_time"], "step", "contact_friction", None, "step"),
+    (["elapsed_time"], "linear", "contact_friction", None, "linear"),
+    (["elapsed_time"], "linear", "contact_friction", "saturating", "logarithmic"),
+    (["elapsed_time"], "saturating", "contact_friction", None, "logarithmic"),
+    (["dwell_time", "time_since_contact"], "saturating", None, None, "logarithmic"),
+    (["slider_x", "slider_y", "session"], "map", None, None, "map"),
+    (["contact", "session", "edge"], "map", None, None, "quadratic"),
+    (["edge", "contact"], "category", "contact_friction", None, "category"),
+    (["slider_heading", "session"], "periodic", None, None, "periodic"),
+])  # fmt: skip
+def test_true_basis_follows_from_form_and_covariates(
+    table: PushTable, covariates: list[str], form: str, name: str | None, course: str | None, expected: str
+) -> None:
+    record = {"names": [name], "covariates": covariates, "form": form, "place": 17.0}
+    mechanism, covariate, basis = true_term(record if course is None else {**record, "course": course}, table)
+    assert (mechanism, covariate, basis.name) == (name, covariates[0], expected)
+    assert basis.place == 17.0 or form != "step"
+
+
+def test_of_two_effects_the_oracle_has_both(table: PushTable, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Any] = []
+    record = {"names": ["contact_friction"], "covariates": ["elapsed_time"], "form": "linear", "channel": "motion"}
+    second = {"names": ["tilted_surface"], "covariates": ["session"], "form": "constant"}
+    loaded = type("Loaded", (), {"table": table})
+    for name in ("load_model", "refit_base", "evidence_of"):
+        monkeypatch.setattr(oracle, name, lambda *arguments: None)
+    monkeypatch.setattr(oracle, "load_evidence", lambda paths: loaded)
+    monkeypatch.setattr(oracle, "candidate", lambda evidence, mechanism, covariate, basis: (mechanism, covariate))
+    monkeypatch.setattr(oracle, "extend", lambda base, evidence, candidates: given.append(candidates))
+    monkeypatch.setattr(oracle, "gain", lambda before, after, rest: (Estimate(0, 0, 0), Estimate(-0.3, -0.4, -0.2)))
+    better = HeldOutGain("deployed", Estimate(0, 0, 0), Estimate(-0.2, -0.3, -0.1))
+    monkeypatch.setattr(oracle, "held_out_gain", lambda *_: better)
+    traced = {"value": -0.2, "low": -0.3, "high": -0.1}
+    for truth in (record, {**record, "second": None}, {**record, "second": second}):
+        found = oracle_gain(Path("new"), Path("model"), truth)
+        assert found == {"value": -0.3, "low": -0.4, "high": -0.2, "traced": traced}
+    first = ("contact_friction", "elapsed_time")
+    assert given == [[first], [first], [first, ("tilted_surface", "session")]]

@@ -31,7 +31,7 @@ from push_predictor.residuals.evidence.drivers import (
     standard_basis,
     step_places,
 )
-from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
+from push_predictor.residuals.evidence.input_shift import about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
@@ -141,17 +141,6 @@ def test_mechanics_that_learnt_nothing_extrapolate_to_other_speeds_alone(known: 
     assert "angle" in {each.covariate for each in input_shift(trained(narrow), known).inputs}
 
 
-def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTable) -> None:
-    slow = with_inputs(known, 0, np.full(len(known), 0.02))
-    fast = with_inputs(known, 0, np.full(len(known), 0.06))
-    model = trained(slow, "analytical")
-    evidence = evidence_of(model, fast)
-    wider = widened(evidence, model, input_shift(model, fast))
-    assert wider.z == pytest.approx(evidence.z / 3.0)
-    same = evidence_of(model, slow)
-    assert widened(same, model, input_shift(model, slow)) is same
-
-
 def test_the_question_has_the_analysis_pushes_alone_each_with_its_own_deviation(known: PushTable) -> None:
     slow = with_inputs(replace(known, outcomes=1.01 * known.outcomes), 0, np.full(len(known), 0.02))  # other pushes
     half = np.arange(len(known)) % 2 == 0
@@ -216,12 +205,6 @@ def in_order(count: int) -> PushTable:
     """A window of each of these pushes."""
     nothing = np.zeros((count, 3))
     return PushTable(nothing, np.full(count, 0.2), nothing, np.arange(count).astype(np.str_))
-
-
-def test_a_contact_is_far_from_training_beyond_the_margin_and_the_gaps_of_training() -> None:
-    dense, sparse = np.linspace(0.0, 0.5, 101), np.linspace(0.0, 1.0, 9)[:-1]
-    assert _apart(1, np.array([0.52, 0.55]), dense).tolist() == [False, True]
-    assert _apart(1, np.array([0.5625]), sparse).tolist() == [False]
 
 
 def test_speeds_that_hardly_vary_are_one_speed(known: PushTable) -> None:
