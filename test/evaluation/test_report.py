@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coarse import coarse_fits
-from gaussian_comparisons import gaussian_comparison
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import f, kstest, multivariate_t
@@ -98,6 +97,17 @@ def windows_of(table: PushTable, rig: Rig) -> list[PushWindow]:
         when, inputs = (row % 8, begin, begin + 200_000_000), (velocity, contact, angle)
         windows.append(PushWindow(push, *when, *inputs, 0.2, table.outcomes[row], start, end, 0.0, {}))
     return windows
+
+
+def gaussian_comparison(sd_factor: float, pushes: int = 400, seed: int = 0) -> Comparison:
+    """Outcomes drawn from the predicted Gaussians, whose sd is then multiplied by sd_factor."""
+    rng = np.random.default_rng(seed)
+    root = np.array([[1.0, 0.0, 0.0], [0.5, 0.8, 0.0], [0.2, -0.3, 0.6]]) * 1e-3
+    mean = rng.normal(size=(5 * pushes, 3))
+    observed = mean + rng.normal(size=(5 * pushes, 3)) @ root.T
+    covariance = np.broadcast_to(sd_factor**2 * root @ root.T, (5 * pushes, 3, 3))
+    push_id = np.repeat([f"p{k}" for k in range(pushes)], 5)
+    return Comparison("made up", 100, push_id, mean, covariance, observed, None, np.zeros(3))
 
 
 @pytest.fixture(scope="module")
