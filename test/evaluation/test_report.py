@@ -469,6 +469,7 @@ def test_small_motions_are_enlarged_and_large_ones_are_not() -> None:
     outline = shape_outline("rect1")
     assert magnification(outline, np.array([[0.0004, 0.0, 0.0]])) == 20.0
     assert magnification(outline, np.array([[0.05, 0.0, 0.0]])) == 1.0
+    assert magnification(outline, np.array([[0.0004, 0.0, 0.0], [0.05, 0.0, 0.0]])) == 1.0  # all in one picture
 
 
 # --- calibration and drift ------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from scipy.signal import lfilter
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect
 from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, zero_shift
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES
 from push_predictor.types import Array
 
 PUSHES, WINDOWS = 150, 3  # per push
@@ -71,6 +72,12 @@ def test_bias_from_a_push_on_is_found_as_a_step_with_its_size() -> None:
         assert shift.p_value < 1e-4
         for size, truth in zip(shift.parameters, (0.3, -0.2), strict=True):
             assert size.low < truth < size.high and size.high - size.low < 0.03
+
+
+def test_a_step_may_have_no_more_than_the_fewest_pushes_behind_it() -> None:
+    bias = np.where(np.arange(25)[:, None] >= 25 - FEWEST_PUSHES, (0.0, 0.5), 0.0)
+    shift = found(reading(bias), None)
+    assert (shift.basis, shift.parameters[1].value) == ("step", pytest.approx(0.5))
 
 
 def test_smallest_bias_that_is_found_is_as_documented() -> None:

@@ -47,7 +47,7 @@ from push_predictor.residuals.reporting.figures.driver_basis import (
     strength_of,
 )
 from push_predictor.residuals.reporting.figures.gallery import effect_figures
-from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, error_charts, means_along
+from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, error_charts, gap_chart, means_along
 from push_predictor.residuals.reporting.page import role_of, write_trace_report
 from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval, shift_size
 from push_predictor.residuals.reporting.sentences import answer, evidence, separating_words, summary_lines, worth
@@ -315,6 +315,11 @@ def test_key_picture_shows_what_the_finding_is_about(
     page = write_trace_report(tmp_path / "trace.html", trace()).read_text()
     key = page[page.index("<svg") : page.index("<h2")]
     assert all(words in key for words in shown)
+    if trace is late:  # which the gap follows exactly
+        chart = gap_chart(late())
+        assert chart is not None
+        dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
+        np.testing.assert_allclose(dots.x, dots.y, atol=1e-9)
     if trace is since_training:
         assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."
 

@@ -287,6 +287,9 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
 def test_a_covariate_that_varies_along_a_push_is_rejected_by_name() -> None:
     with pytest.raises(RequestError, match=r"contact_gap.*give one of .*elapsed_time"):
         Question.of(learnt(), faultless(), covariates=["contact_gap"])
+    for alpha in (0.0, 1.0):
+        with pytest.raises(RequestError, match=f"alpha: {alpha}"):
+            Question.of(learnt(), faultless(), alpha=alpha)
 
 
 @pytest.mark.usefixtures("a_library_of_four")
