@@ -177,16 +177,6 @@ def test_simulate_reports_the_recording(place: Place, run):
     assert made["recording"] == place.path("test.mcap") and made["pushes"] == 4 and made["seconds"] > 1.0
 
 
-def test_seed_determines_the_simulated_recording(place: Place, run):
-    call = ["simulate", "--shape", "rect1", "--surface", "abs", *SHORT, "--pushes", "1"]
-    made = []
-    for number, seed in enumerate(("2", "2", "3")):
-        path = place.folder / f"again{number}" / "test.mcap"
-        assert run(*call, "--seed", seed, "--out", str(path)).status == 0
-        made.append(path.read_bytes())
-    assert made[0] == made[1] != made[2]
-
-
 def test_train_reports_model_windows_and_pushes(place: Place):
     assert ": gp, trained on 24 of 24 windows, 6 pushes" in place.printed["gp"]
     learned = json.loads(place.printed["vhgp"])

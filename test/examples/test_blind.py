@@ -15,19 +15,16 @@ import numpy as np
 import pytest
 from synthetic import square_pushes
 
-from benchmarks.blind import oracle
-from benchmarks.blind.commands import CYCLE, main
-from benchmarks.blind.effects import GROUPS, SIZES, World, _laws, draw
+from benchmarks.blind.commands import main
+from benchmarks.blind.effects import GROUPS, SIZES, World, draw
 from benchmarks.blind.library import library_without
-from benchmarks.blind.oracle import oracle_gain, true_term
+from benchmarks.blind.oracle import true_term
 from benchmarks.blind.recordings import MODEL, Size, conditions, drawn_for, later_spec, make_one, rig_of
 from benchmarks.blind.scores import score_of, wilson
 from benchmarks.blind.true_parameter import covers
-from push_predictor.evaluation.estimate import Estimate
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.extension.held_out_gain import HeldOutGain
 from push_predictor.simulation.changes import Changes, Moment
 from push_predictor.simulation.rig_simulator import push_outcomes
 from push_predictor.simulation.sensors import Faults
@@ -234,25 +231,6 @@ def test_every_kind_of_effect_can_be_drawn_and_changes_outcomes(group: str) -> N
         assert first != Faults()
 
 
-def test_a_fifth_of_the_effects_on_the_motion_have_a_second_one() -> None:
-    spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 8)
-    drawn = [drawn_for(spec, "library", np.random.default_rng(seed)) for seed in range(100)]
-    both = [one for one in drawn if one.second]
-    motion = CYCLE.count("library") + CYCLE.count("outside")
-    assert 0.15 < len(both) / len(drawn) * CYCLE.count("library") / motion < 0.25
-    for one in both:
-        assert one.second is not None and isinstance(one.act, Changes) and isinstance(one.second.act, Changes)
-        laws = {name for name, law in vars(one.act).items() if callable(law)}
-        assert len(laws) == 2 and all(getattr(one.act, n) is getattr(one.second.act, n) for n in _laws(one.second.act))
-        record = one.described()
-        assert "act" not in record and record["kind"] != record["second"]["kind"]
-        assert {"kind", "names", "covariates", "form", "size", "value", "unit", "place"} <= record["second"].keys()
-    whole = push_outcomes(replace(spec, changes=both[0].act)).outcomes
-    assert both[0].second is not None and isinstance(both[0].second.act, Changes)
-    assert not np.array_equal(whole, push_outcomes(replace(spec, changes=both[0].second.act)).outcomes)
-    assert all(not drawn_for(spec, "outside", np.random.default_rng(seed)).second for seed in range(20))
-
-
 def test_an_onset_is_a_step_in_mid_session() -> None:
     spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 40)
     world = World(spec.slider.outline, 10.0, 0.2, conditions(spec), np.random.default_rng(5))
@@ -421,24 +399,3 @@ def test_true_basis_follows_from_form_and_covariates(
     mechanism, covariate, basis = true_term(record if course is None else {**record, "course": course}, table)
     assert (mechanism, covariate, basis.name) == (name, covariates[0], expected)
     assert basis.place == 17.0 or form != "step"
-
-
-def test_of_two_effects_the_oracle_has_both(table: PushTable, monkeypatch: pytest.MonkeyPatch) -> None:
-    given: list[Any] = []
-    record = {"names": ["contact_friction"], "covariates": ["elapsed_time"], "form": "linear", "channel": "motion"}
-    second = {"names": ["tilted_surface"], "covariates": ["session"], "form": "constant"}
-    loaded = type("Loaded", (), {"table": table})
-    for name in ("load_model", "refit_base", "evidence_of"):
-        monkeypatch.setattr(oracle, name, lambda *arguments: None)
-    monkeypatch.setattr(oracle, "load_evidence", lambda paths: loaded)
-    monkeypatch.setattr(oracle, "candidate", lambda evidence, mechanism, covariate, basis: (mechanism, covariate))
-    monkeypatch.setattr(oracle, "extend", lambda base, evidence, candidates: given.append(candidates))
-    monkeypatch.setattr(oracle, "gain", lambda before, after, rest: (Estimate(0, 0, 0), Estimate(-0.3, -0.4, -0.2)))
-    better = HeldOutGain("deployed", Estimate(0, 0, 0), Estimate(-0.2, -0.3, -0.1))
-    monkeypatch.setattr(oracle, "held_out_gain", lambda *_: better)
-    traced = {"value": -0.2, "low": -0.3, "high": -0.1}
-    for truth in (record, {**record, "second": None}, {**record, "second": second}):
-        found = oracle_gain(Path("new"), Path("model"), truth)
-        assert found == {"value": -0.3, "low": -0.4, "high": -0.2, "traced": traced}
-    first = ("contact_friction", "elapsed_time")
-    assert given == [[first], [first], [first, ("tilted_surface", "session")]]

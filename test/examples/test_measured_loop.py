@@ -18,7 +18,7 @@ from examples import measured_loop, measured_recordings
 from examples.loop import ClosedLoop, Traced
 from examples.loop_picture import DEPLOYED, EXTENDED, Story
 from examples.measured_loop import REFIT, Outcome, main, to_json, to_text
-from examples.measured_recordings import Split, joined, mcube_splits, mlab_splits
+from examples.measured_recordings import Split, mcube_splits, mlab_splits
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.read import read_recording, require_rig
@@ -140,15 +140,6 @@ def windows_of(recording: Recording, duration: float = 0.2) -> list[PushWindow]:
     return find_windows(recording, require_rig(recording), WindowOptions(duration=duration))
 
 
-def test_joined_recordings_keep_all_samples_in_order(recording: Recording) -> None:
-    both = joined([recording, recording], "both")
-    assert both.name == "both" and both.rig is recording.rig
-    assert both.wrench is not None and recording.wrench is not None
-    np.testing.assert_array_equal(both.slider.x, np.tile(recording.slider.x, 2))
-    np.testing.assert_array_equal(both.pusher.stamp, np.tile(recording.pusher.stamp, 2))
-    np.testing.assert_array_equal(both.wrench.fx, np.tile(recording.wrench.fx, 2))
-
-
 # --- mcube ------------------------------------------------------------------------------------------------------
 
 
@@ -196,10 +187,3 @@ def test_logs_are_in_order_of_time_also_where_a_file_is_not(logs: dict[str, Spli
     for split in logs.values():
         stamps = np.concatenate([part.slider.stamp for part in (split.training, split.traced, split.later)])
         assert np.all(np.diff(stamps) > 0)
-
-
-def test_share_of_traced_pushes_moves_the_cut_and_loses_no_push(measured_data: Path, logs: dict[str, Split]) -> None:
-    fewer = next(split for split in mlab_splits(measured_data, 0.6) if split.name == WOOD)
-    whole = np.concatenate([logs[WOOD].traced.slider.stamp, logs[WOOD].later.slider.stamp])
-    np.testing.assert_array_equal(np.concatenate([fewer.traced.slider.stamp, fewer.later.slider.stamp]), whole)
-    assert len(fewer.later.slider) / len(whole) == pytest.approx(0.4, abs=0.01)
