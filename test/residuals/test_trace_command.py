@@ -9,7 +9,7 @@ import contextlib
 import io
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -152,29 +152,32 @@ def test_a_covariate_that_is_not_there_is_named_with_those_that_are(
     assert all(word in line for word in ("push_predictor trace: ", "topic:/absent", "elapsed_time", "slider_x")), line
 
 
-def test_rejects_output_folder_without_write_permission_by_name(
-    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    asked = found(extended)
-    monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere
-    assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
-    assert f"a path in a folder with write permission: {tmp_path} has none" in capsys.readouterr().err
-    assert asked == {}
+def unwritable(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr("os.access", lambda *_: False)  # root may write anywhere
 
 
-def test_rejects_report_without_jinja2_before_the_work(
-    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    asked = found(extended)
+def without_jinja2(patch: pytest.MonkeyPatch) -> None:
     html._environment.cache_clear()
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    assert run(place, "--report", str(tmp_path / "out.html")) == 1
-    error = capsys.readouterr().err
-    assert error.startswith("push_predictor trace: --report: pages need Jinja2") and error.count("\n") == 1
-    assert "pip install 'push_predictor[report]'" in error and asked == {}
-    assert run(place) == 0  # without --report it is not needed
+    patch.setitem(sys.modules, "jinja2", None)
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        (unwritable, ["a path in a folder with write permission: "]),
+        (without_jinja2, ["--report: pages need Jinja2", "pip install 'push_predictor[report]'"]),
+    ],
+)
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch, broken: Callable[[pytest.MonkeyPatch], None], words: list[str],
+) -> None:  # fmt: skip
+    asked = found(extended)
+    broken(monkeypatch)
+    assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("push_predictor trace: --report") and all(word in line for word in words) and asked == {}
+    assert run(place) == 0  # without --report neither is needed
 
 
 def test_report_needs_no_matplotlib(
