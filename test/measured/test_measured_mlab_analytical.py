@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support_points import support_of_points
 
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.geometry.outline import Outline
@@ -39,8 +38,11 @@ Pushes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def loaded(name: str) -> PowerSurface:
+    """The ellipsoid about the load-weighted mean of the points, as long as their load-weighted mean distance from it."""
     points = np.array(SUPPORT_POINTS[name])
-    return support_of_points(np.column_stack([(points[:, :2] - 50.0) / 1000.0, points[:, 2]]))
+    places, load = (points[:, :2] - 50.0) / 1000.0, points[:, 2]
+    centre = np.average(places, axis=0, weights=load)
+    return PowerSurface(centre, float(np.average(np.linalg.norm(places - centre, axis=1), weights=load)))
 
 
 def model(surface: PowerSurface) -> FittedMechanics:
