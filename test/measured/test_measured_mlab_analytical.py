@@ -38,7 +38,7 @@ Pushes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def loaded(name: str) -> PowerSurface:
-    """The ellipsoid about the load-weighted mean of the points, as long as their load-weighted mean distance from it."""
+    """The ellipsoid about the load-weighted mean of the points, as long as their mean distance from it."""
     points = np.array(SUPPORT_POINTS[name])
     places, load = (points[:, :2] - 50.0) / 1000.0, points[:, 2]
     centre = np.average(places, axis=0, weights=load)
