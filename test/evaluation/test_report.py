@@ -8,9 +8,11 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,6 +62,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.reporting.canvas import draw
 from push_predictor.reporting.chart import Band, Line
 
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
@@ -148,7 +151,19 @@ def page(
     judged = models[::2], comparisons[::2]
     with pytest.MonkeyPatch.context() as coarse:
         coarse.setattr("push_predictor.evaluation.report.maps.FINE", 12)
+        coarse.setattr("push_predictor.evaluation.report.figures.gallery.draw", kept)
         return write_validation_report(out, title, table, windows_of(table, square), *judged, facts, notes)
+
+
+PAINTED: dict[str, Any] = {}  # the figures of the page
+
+
+def kept(path: Path, size: tuple[float, float], paint: Callable[[Any], None]) -> Path:
+    def painted(figure: Any) -> None:
+        paint(figure)
+        PAINTED[path.name] = figure
+
+    return draw(path, size, painted)
 
 
 class Shown(HTMLParser):
@@ -270,6 +285,19 @@ def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list
             assert float(f"{value:.4g}") in shown
         for value in [*_numbers(coverage), *_numbers(joint), *_numbers([interval["nmse"], interval["nlpd"]])]:
             assert float(f"{value:.3g}") in shown
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("page")
+def test_counts_of_pushes_and_bars_lie_within_their_axes() -> None:
+    for name in ("map_mean.png", "map_sd.png", "calibration.png"):
+        for ax in PAINTED[name].axes:
+            (left, right), (low, high) = np.sort(ax.get_xlim()), np.sort(ax.get_ylim())
+            shown = [text.get_position() for text in ax.texts if text.get_transform() is ax.transData]
+            assert not shown or np.ptp(np.array(shown)[:, 0]) > 0.5 * (right - left), name  # all over the map
+            shown += [(bar.get_x(), bar.get_height()) for bar in ax.patches if hasattr(bar, "get_height")]
+            assert all(left <= x <= right and low <= y <= high for x, y in shown), name
+    assert any(low == pytest.approx(-high) for low, high in (ax.get_ylim() for ax in PAINTED["residuals.png"].axes))
 
 
 @pytest.mark.slow
