@@ -174,7 +174,7 @@ def test_help_imports_neither_ros_nor_scipy_nor_completion():
 def test_simulate_reports_the_recording(place: Place, run):
     assert place.printed["train recording"].startswith(f"{place.path('train')}: 6 pushes, ")
     made = json.loads(place.printed["test recording"])
-    assert made["recording"] == place.path("test.mcap") and made["pushes"] == 4 and made["seconds"] > 1.0
+    assert made["recording"] == place.path("test.mcap") and made["pushes"] == 4 and 1.0 < made["seconds"] < 100.0
 
 
 def test_train_reports_model_windows_and_pushes(place: Place):

@@ -215,6 +215,8 @@ def test_the_picture_is_to_scale(tmp_path: Path) -> None:
     radius = float(str(tree.find(f"{space}circle").get("r")))
     assert radius / np.ptp(corners[:, 0]) == pytest.approx(0.00475 / 0.09, rel=0.01)
     assert np.argmin(corners[:, 1]) in (0, 3) and corners[0, 0] < corners[2, 0]  # y points up, x to the right
+    below = [float(str(text.get("y"))) for text in tree.iter(f"{space}text")][-3:]
+    assert np.all(np.diff([corners[:, 1].max(), *below]) > 0.0)  # the legend, line by line
     assert "a <b>: 90.0 mm along x" in "".join(tree.itertext())
 
 
