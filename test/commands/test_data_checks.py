@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The checks inside train, trace and validate: each usual mistake of a recording is refused or warned about, once."""
+"""`check`, and the checks inside other commands: each usual mistake is refused or warned about, once."""
 
 from __future__ import annotations
 

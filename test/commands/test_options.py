@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options: one meaning for each name in all commands, no abbreviations."""
+"""Options: one meaning for each name in all commands, no abbreviations, and completion in the shell."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sentence that says whether a model fits a recording."""
+"""The sentence that says whether a model fits a recording, and the scores and sentences of a ladder."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Metrics, splits and normal scores by their definitions."""
+"""Metrics, sums by push, splits and normal scores by their definitions."""
 
 from __future__ import annotations
 

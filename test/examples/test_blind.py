@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Blind recordings: the truth stays out of the data, and the score separates right from wrong verdicts."""
+"""Blind recordings: the truth stays out of the data, and the score separates right from wrong verdicts and sizes."""
 
 from __future__ import annotations
 

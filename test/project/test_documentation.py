@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the documents and the files in config/ say is what the code declares."""
+"""What the documents and the files in config/ say is what the code declares, found within two links, and runs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The files that ROS's tools read: package.xml, changelogs, licences, executables and paths of the three packages."""
+"""The files that ROS's tools read, and the commands for an apt Jazzy: the tools, packages and arguments exist."""
 
 from __future__ import annotations
 

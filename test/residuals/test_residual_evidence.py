@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a search may trust: inputs inside training, blocks of pushes that share a disturbance, held-out pushes."""
+"""What a search may trust and try: inputs inside training, blocks, held-out pushes, forms, shared sums."""
 
 from __future__ import annotations
 

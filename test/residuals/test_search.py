@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Planted effects are found with the name of their mechanism and covariate, in their form, and with their onset."""
+"""Planted effects get their mechanism, covariate, form and onset; chance and what training has too pass no gate."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a reader of a trace sees: the answer in three sentences, pictures, folded tables, no raw values."""
+"""What a reader of a trace sees: the answer in three sentences, pictures and their numbers, folded tables."""
 
 from __future__ import annotations
 
