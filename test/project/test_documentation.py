@@ -96,9 +96,6 @@ def described(row: Param) -> str:
     return f"{text} Accepted: {row.low:g} to {row.high:g}." if row.low is not None else text
 
 
-# --- topics and services ---------------------------------------------------------------------------------------------
-
-
 # --- commands and links ----------------------------------------------------------------------------------------------
 
 
