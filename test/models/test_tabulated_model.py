@@ -326,6 +326,9 @@ def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
 
 
+# --- services ------------------------------------------------------------------------------------
+
+
 # --- splines on boxes ---
 
 

@@ -303,20 +303,15 @@ def test_p_values_of_one_seed_are_the_same_again() -> None:
 # --- the search -------------------------------------------------------------------------------------------------------
 
 
-WEAK = 0.02
-
-
-"""On synthetic null data the family-wise p is at most alpha with probability alpha."""
-
-REPETITIONS = 200
-LEVEL = 0.05
+WEAK, REPETITIONS, LEVEL = 0.02, 200, 0.05
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("tails", "common"), [(np.inf, 0.0), (3.0, 0.8)], ids=["normal", "heavy tails, windows of a push alike"]
 )
-def test_stay_within_binomial_bounds(tails: float, common: float) -> None:
+def test_false_alarms_stay_within_binomial_bounds(tails: float, common: float) -> None:
+    """On synthetic null data the family-wise p is at most alpha with probability alpha."""
     alarms = sum(_smallest_p(seed, tails, common) <= LEVEL for seed in range(REPETITIONS))
     error = np.sqrt(REPETITIONS * LEVEL * (1.0 - LEVEL))
     assert alarms <= REPETITIONS * LEVEL + 3.0 * error
