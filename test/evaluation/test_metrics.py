@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from scipy.special import ndtri
 from scipy.stats import multivariate_normal, norm, rankdata
 
-from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd, nmse, standardised
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
 from push_predictor.evaluation.push_scores import pooled, push_scores
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, split_by_push
 from push_predictor.evaluation.validation import Comparison, metrics_json
@@ -61,6 +61,14 @@ def test_standardised_residuals_of_a_correct_model_have_unit_covariance() -> Non
     outcomes = np.random.default_rng(1).standard_normal((20_000, 3)) @ root.T
     z = standardised(np.zeros_like(outcomes), np.tile(root @ root.T, (len(outcomes), 1, 1)), outcomes)
     assert np.cov(z.T) == pytest.approx(np.eye(3), abs=0.04)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
+def test_coverage_of_a_correct_model_equals_the_level(level: float) -> None:
+    outcomes = np.random.default_rng(2).standard_normal((20_000, 2))
+    half = np.full(2, norm.ppf(0.5 + level / 2.0))
+    shares = coverage(np.zeros_like(outcomes), np.ones_like(outcomes), outcomes, half)
+    assert shares == pytest.approx(np.full(2, level), abs=0.012)
 
 
 @given(sizes=st.lists(st.integers(1, 9), min_size=2, max_size=30), seed=st.integers(0, 99))

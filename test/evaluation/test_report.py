@@ -46,6 +46,7 @@ from push_predictor.evaluation.report.maps import (
     colour_scale,
     commonest_condition,
     fine_cells,
+    predicted_at_windows,
     push_map,
     recorded_map,
     sector_length,
@@ -244,6 +245,10 @@ def test_recorded_cell_has_mean_and_rms_deviation_from_the_prediction(square: Ri
     inside_cell &= (angle >= cells.angle[row]) & (angle < cells.angle[row + 1])
     np.testing.assert_allclose(shown.mean[row, column], table.outcomes[inside_cell].mean(axis=0))
     np.testing.assert_allclose(shown.sd[row, column], [1e-3, 2e-3, 0.03])
+    expected = predicted_at_windows(square.outline, table, predicted, 4.0 * predicted**2, cells)
+    np.testing.assert_allclose(expected.mean[row, column], predicted[inside_cell].mean(axis=0))
+    mean_square = 4.0 * np.mean(predicted[inside_cell] ** 2, axis=0)
+    np.testing.assert_allclose(expected.sd[row, column] ** 2, mean_square)
     assert shown.pushes is not None and shown.pushes[row, column] == len(set(table.push_id[inside_cell].tolist()))
 
 

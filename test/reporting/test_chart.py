@@ -45,6 +45,10 @@ def test_corners_of_the_data_are_corners_of_the_plot_area() -> None:
     assert (last.attributes["cx"], last.attributes["cy"]) == (RIGHT, TOP)
 
 
+def test_title_lowers_the_plot_area() -> None:
+    assert chart(title="dx").box["top"] > chart().box["top"] == TOP
+
+
 def test_dots_outside_the_limits_are_not_drawn() -> None:
     shapes = chart(dots((5.0, 0.5), (5.0, 1.5), (-1.0, 0.5), (5.0, np.nan))).shapes
     assert [shape.title for shape in shapes] == ["push 0"]
@@ -118,6 +122,11 @@ def test_texts_of_a_chart_are_escaped() -> None:
     evil = Dots("push", np.ones(1), np.full(1, 0.5), ["<script>"], name="<b>")
     part = str(html.charts([chart(evil, title="<i>")], "<u>"))
     assert not re.search("<script>|<b>|<i>|<u>", part) and "&lt;script&gt;" in part
+
+
+def test_charts_are_in_rows_of_the_given_width() -> None:
+    assert str(html.charts([chart()] * 6, "", 2)).count('<div class="charts">') == 3
+    assert str(html.charts([chart()] * 6, "")).count('<div class="charts">') == 1
 
 
 def test_numbers_that_are_unknown_are_dashes() -> None:

@@ -27,6 +27,7 @@ from push_predictor.residuals.candidates.joint_fit import (
     RIDGE,
     Fit,
     FitRows,
+    _blocks,
     estimated,
     fitted,
     standard_error,
@@ -171,6 +172,11 @@ def test_change_since_training_is_kept(stacked: tuple[FitRows, FitRows]) -> None
     fit = fitted(rows, candidates(rows.evidence, more))
     assert fit.coefficients[0] == pytest.approx(0.2, abs=3.0 * deviations(fit)[0])
     assert deviations(fit)[0] < 0.03
+
+
+def test_pushes_of_training_are_blocks_of_their_own(stacked: tuple[FitRows, FitRows]) -> None:
+    rows = stacked[0]
+    assert len(np.unique(_blocks(rows, rows.block))) == 80 + 80
 
 
 # --- covariance ------------------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ from push_predictor.residuals.evidence.drivers import (
     standard_basis,
     step_places,
 )
-from push_predictor.residuals.evidence.input_shift import about_mechanics, input_shift, widened
+from push_predictor.residuals.evidence.input_shift import _apart, about_mechanics, input_shift, widened
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.residualizer import SINGULAR, Residualizer, sums_by
@@ -92,6 +92,14 @@ def test_pushes_in_a_part_of_training_are_listed_and_lie_inside(
     margin = {1: 0.03, 2: 0.1}[column]
     beyond = np.mean((known.inputs[:, column] > high + margin) | (known.inputs[:, column] < low - margin))
     assert 0.7 * beyond < one.share_unvisited <= beyond  # the margin grows where contacts are few
+
+
+@pytest.mark.parametrize(("most", "listed"), [(0.25, ["contact"]), (0.9, [])])
+def test_one_side_of_a_symmetric_slider_is_a_part_and_nearly_all_of_training_is_none(
+    known: PushTable, most: float, listed: list[str]
+) -> None:
+    part = known.take(known.inputs[:, 1] < most)
+    assert [each.covariate for each in input_shift(trained(known), part).inputs] == listed
 
 
 def test_the_input_with_the_smallest_part_comes_first(known: PushTable) -> None:
@@ -205,6 +213,12 @@ def in_order(count: int) -> PushTable:
     """A window of each of these pushes."""
     nothing = np.zeros((count, 3))
     return PushTable(nothing, np.full(count, 0.2), nothing, np.arange(count).astype(np.str_))
+
+
+def test_a_contact_is_far_from_training_beyond_the_margin_and_the_gaps_of_training() -> None:
+    dense, sparse = np.linspace(0.0, 0.5, 101), np.linspace(0.0, 1.0, 9)[:-1]
+    assert _apart(1, np.array([0.52, 0.55]), dense).tolist() == [False, True]
+    assert _apart(1, np.array([0.5625]), sparse).tolist() == [False]
 
 
 def test_speeds_that_hardly_vary_are_one_speed(known: PushTable) -> None:

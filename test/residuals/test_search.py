@@ -433,6 +433,7 @@ def test_larger_or_smaller_variance_than_in_training_is_reported_as_constant(
 
 def test_slightly_larger_variance_than_in_training_is_not_reported() -> None:
     evidence = seen(learnt(), pushes(COUNT, 401))
+    assert not noise_of(evidence, evidence.z, names=None)
     slight, large = (noise_of(evidence, scale * evidence.z, 0.9) for scale in (1.05, 1.5))
     assert not slight and large[0].covariate == "model_inputs"
 

@@ -217,7 +217,7 @@ def test_size_is_first_in_mm_and_deg_then_lower_or_higher() -> None:
     mm, deg = 1e3 * metres, np.degrees(radians)
     shift = f"It shifts a window by {mm:.2g} mm and {deg:.2g} deg: contact friction 0.21 lower"
     assert answer(found)[1] == f"{shift} (95 % CI 0.17 to 0.25)."
-    assert f"{shift} (95 % CI 0.17 to 0.25, p = 0.001)." in evidence(found)
+    assert f"{shift} (95 % CI 0.17 to 0.25, p = 0.001). It explains 23 % of" in evidence(found)
 
 
 def test_harmless_bias_reaches_json_and_is_no_candidate() -> None:
