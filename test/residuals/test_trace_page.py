@@ -128,6 +128,7 @@ def test_page_begins_with_three_plain_sentences_shows_no_raw_values_and_folds_it
         ("two effects", "with elapsed time, and 1 further change was found", r"\(95 % CI", "^Use the extended model"),
         ("mechanism_only", "^Contact friction changes with elapsed time", r"\(95 % CI",
          r"^Use the extended model, and vary elapsed time and push count independently: these pushes do not"),
+        ("category", r"^Contact friction differs by side pushed\.$", "^It shifts a window by", ""),
         ("driver_only", "^Weak evidence: .* no known mechanism fits",
          r"^It shifts a window by 0\.\d+ mm and 0\.\d+ deg\.$",
          "^Keep the deployed model"),
