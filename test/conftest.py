@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse_pictures import coarse_pictures
+from coarse import coarse_pictures
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 

@@ -1,10 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The checks inside train, trace and validate: each usual mistake of a recording is refused or warned about, once."""
+"""`check`, and the checks inside other commands: each usual mistake is refused or warned about, once."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +18,7 @@ from mistakes import MISTAKES
 from repository import REPOSITORY
 
 from push_predictor.cli import main
-from push_predictor.recordings.checks.check import DataChecks
+from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig
@@ -95,14 +96,6 @@ def test_every_command_that_reads_data_checks_them(
         assert "change the sign" in line
 
 
-def test_a_warning_is_shown_once_however_often_the_data_are_read(altered: dict[str, Path]) -> None:
-    shown: list[str] = []
-    checks, recording = DataChecks(False, shown.append), read_recording(altered[WARNED])
-    for _ in range(2):
-        checks(altered[WARNED], recording, None)
-    assert len(shown) == 1
-
-
 def test_a_table_in_millimetres_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table, rig = load_data([SMALL]), read_recording(SMALL).rig
     assert rig is not None
@@ -149,3 +142,62 @@ def test_few_pushes_limit_the_results_of_the_commands_that_judge(
     assert main([*words, "--strict"]) == 1
     (line,) = lines_of(capsys)
     assert line.startswith(f"push_predictor {command}: {few}: The data contain") and line.endswith(MEANING)
+
+
+# --- check command ----------------------------------------------------------------------------------------------------
+
+
+BAG = str(REPOSITORY / "bags" / "hexagon_delrin")
+SOUND = str(REPOSITORY / "bags" / "square_abs_test")
+
+
+def wrong_rig(folder: Path, size: float) -> str:
+    rig = read_recording(Path(BAG)).rig
+    assert rig is not None
+    save_rig(replace(rig, outline=Outline(size * rig.outline.vertices)), folder / "wrong.rig.yaml")
+    return str(folder / "wrong.rig.yaml")
+
+
+def test_a_sound_recording_has_no_findings(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", SOUND, "--strict"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{SOUND}: no findings. The data contain 120 pushes (603 windows) on 4 of 4 sides, at ")
+
+
+def test_few_pushes_are_a_note_with_what_to_record_next(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--strict"]) == 0
+    assert "note     few_pushes" in (text := capsys.readouterr().out) and "at least 20 more pushes" in text
+
+
+def test_the_json_contains_the_coverage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--json", "-"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["sound"], "notes are no mistakes"
+    coverage = content["about"][BAG]["coverage"]
+    assert (coverage["pushes"], coverage["windows"]) == (10, sum(coverage["windows_by_side"]))
+
+
+def test_a_warning_fails_only_with_strict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = wrong_rig(tmp_path, 1.04)
+    assert main(["check", BAG, "--rig", rig, "--json", "-"]) == 0
+    assert not json.loads(capsys.readouterr().out)["sound"]
+    assert main(["check", BAG, "--rig", rig, "--strict"]) == 1
+    printed = capsys.readouterr()
+    assert "warning  outline_size" in printed.out
+    assert printed.err.splitlines()[-1] == f"push_predictor check: {BAG}: outline_size"  # after progress
+
+
+def test_a_refusal_fails_and_is_in_the_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--rig", wrong_rig(tmp_path, 1e3), "--json", "-"]) == 1
+    content = json.loads(capsys.readouterr().out)
+    (finding,) = content["data"][BAG]
+    assert not content["sound"]
+    assert (finding["name"], finding["severity"], finding["values"]["reach"]["unit"]) == ("units_rig", "refused", "m")
+
+
+def test_the_page_is_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "check.html"
+    assert main(["check", BAG, "--page", str(page)]) == 0
+    assert capsys.readouterr().out.endswith(f"page: {page}\n") and "No mistake was found." in page.read_text()
+    assert main(["check", BAG, "--page", str(tmp_path)]) == 1
+    assert "--page" in capsys.readouterr().err

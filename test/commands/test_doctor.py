@@ -53,22 +53,20 @@ def test_doctor_without_ros_names_it_and_checks_the_rest(
 
 
 @pytest.mark.parametrize(
-    ("code", "words"),
-    [("import time; time.sleep(60)", "no result within"), ("import os; os.abort()", "ended with status -6")],
+    ("module", "code", "words"),
+    [
+        ("rclpy", "import time; time.sleep(60)", "no result within"),
+        ("rclpy", "import os; os.abort()", "ended with status -6"),
+        ("sitecustomize", "import sys\nsys.modules.update(push_predictor_interfaces=None)\n", "push_predictor_interf"),
+    ],
 )
-def test_hanging_or_crashing_middleware_is_a_finding(
-    code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_hanging_crashing_or_missing_middleware_is_a_finding(
+    module: str, code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hide(tmp_path, "rclpy", code, monkeypatch)
+    hide(tmp_path, module, code, monkeypatch)
     monkeypatch.setattr(doctor_command, "PATIENCE", 0.5 if "sleep" in code else 60.0)
     finding = ros_node()
     assert (finding.name, finding.state) == ("ROS", "missing") and words in finding.found and finding.remedy
-
-
-def test_missing_interfaces_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    hide(tmp_path, "sitecustomize", "import sys\nsys.modules.update(push_predictor_interfaces=None)\n", monkeypatch)
-    finding = ros_node()
-    assert finding.state == "missing" and "push_predictor_interfaces" in finding.found
 
 
 def test_missing_security_is_found_before_a_node_starts(monkeypatch: pytest.MonkeyPatch) -> None:

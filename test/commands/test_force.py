@@ -94,18 +94,14 @@ def test_what_has_no_content_is_not_protected(tmp_path: Path) -> None:
     check_folder("--out", tmp_path, ["empty", "absent"], force=False)
 
 
-def test_a_link_to_a_result_is_protected(tmp_path: Path) -> None:
+def test_a_link_to_a_result_is_protected_and_a_folder_is_no_file_even_with_force(tmp_path: Path) -> None:
     (tmp_path / "result").write_text("earlier")
     (tmp_path / "link").symlink_to(tmp_path / "result")
     with pytest.raises(RequestError, match=r"--json.*link.*--force to overwrite this file"):
         check_output("--json", tmp_path / "link", force=False)
     with pytest.raises(RequestError, match="--force to overwrite result in it"):
         check_folder("--out", tmp_path, ["absent", "result"], force=False)
-
-
-def test_a_folder_is_no_file_even_with_force(tmp_path: Path) -> None:
     with pytest.raises(RequestError, match="this is a folder"):
         check_output("--json", tmp_path, force=True)
-    (tmp_path / "file").touch()
     with pytest.raises(RequestError, match="this is a file"):
-        check_folder("--out", tmp_path / "file", force=True)
+        check_folder("--out", tmp_path / "result", force=True)

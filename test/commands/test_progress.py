@@ -44,6 +44,8 @@ def test_the_text_has_elapsed_time_percent_time_left_and_stage(monkeypatch: pyte
     assert course.text(103.0) == "3 s"
     course.watch("train gp: mechanics as mean", 0.0)
     assert course.text(103.0) == "3 s, 0 %, mechanics as mean"
+    course.watch("train gp: first file", 0.01)
+    assert course.text(110.0) == "10 s, 1 %, first file"  # no time left of a start
     clock[0] = 110.0
     course.watch("train gp: dx", 0.25)
     assert course.text(112.0) == "12 s, 25 %, about 28 s left, dx"
@@ -53,15 +55,6 @@ def test_the_text_has_elapsed_time_percent_time_left_and_stage(monkeypatch: pyte
     assert course.text(145.0) == "45 s, 25 %, the same again"  # the estimate was too short
     course.watch("end", 1.5)
     assert course.text(125.0) == "25 s, 100 %, end"
-
-
-def test_no_time_left_is_shown_of_a_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = [100.0]
-    monkeypatch.setattr(module.time, "monotonic", lambda: clock[0])
-    course = Course("read")
-    clock[0] = 110.0
-    course.watch("first file", 0.01)
-    assert course.text(110.0) == "10 s, 1 %, first file"
 
 
 def test_items_in_turn_report_their_share_of_a_part_of_the_work() -> None:

@@ -100,29 +100,3 @@ def test_the_pushes_that_matter_may_be_given(folder: Path) -> None:
     matter = ["--matter", str(folder / "steep.csv")]
     assert main(["suggest", str(folder / "gp.pushmodel"), "--count", "3", *matter, "--out", str(out)]) == 0
     assert np.all(written(out)["angle"] > 0.2)
-
-
-@pytest.mark.parametrize(
-    ("options", "status", "words"),
-    [
-        (["MODEL", "--rig", "RIG"], 2, "either MODEL or --rig"),
-        ([], 2, "either MODEL or --rig"),
-        (["MODEL", "--count", "0"], 1, "count: 0"),
-        (["MODEL", "--speed-range", "0.05", "0.02"], 1, "speed: (0.05, 0.02)"),
-        (["MODEL", "--matter", "nowhere.csv"], 1, "nowhere.csv: no such file"),
-        (["MODEL", "--covariate", "warmth"], 1, "--covariate: 'warmth'"),
-        (["MODEL", "--seed", "-1"], 1, "--seed: -1"),
-        (["nowhere.pushmodel"], 1, "nowhere.pushmodel"),
-    ],
-)
-def test_what_is_wrong_is_named(
-    folder: Path, capsys: pytest.CaptureFixture[str], options: list[str], status: int, words: str
-) -> None:
-    names = {"MODEL": str(folder / "gp.pushmodel"), "RIG": str(folder / "rig.yaml")}
-    out = folder / "never.csv"
-    try:
-        ended = main(["suggest", *(names.get(word, word) for word in options), "--out", str(out)])
-    except SystemExit as end:
-        ended = int(end.code or 0)
-    assert ended == status and words in capsys.readouterr().err
-    assert not out.exists()

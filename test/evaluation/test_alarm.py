@@ -87,13 +87,6 @@ def test_smaller_residuals_give_no_alarm():
     assert fired_after(alarm, scores(200, 1)[:, :1] * 0.05) is None
 
 
-def test_alarm_is_invariant_to_the_order_of_the_calibration():
-    calibration, pushes = scores(80, 0), scores(120, 1, 1.5)
-    alarms = [Alarm(KINDS, calibration[order], 0.01) for order in (np.arange(80), np.arange(80)[::-1])]
-    states = [(fired_after(alarm, pushes), alarm.state) for alarm in alarms]
-    assert states[0] == states[1]
-
-
 def test_equal_scores_are_ranked_at_random_and_give_no_evidence():
     fired = [fired_after(Alarm(KINDS, np.zeros((30, 2)), 0.05, seed), np.zeros((60, 2))) for seed in range(30)]
     assert sum(after is not None for after in fired) <= binom.ppf(0.999, 30, 0.05)
@@ -201,12 +194,6 @@ def test_alarm_fires_after_a_change_and_not_on_pushes_like_the_training(kind: st
     assert state.fired_by in ("contact_friction: change of the contact friction", "size of the residual")
 
 
-@pytest.mark.slow
-def test_number_of_windows_of_a_push_does_not_raise_an_alarm(models: dict[str, PushModel]):
-    for windows in (1, 6):
-        assert not alarm_of(models["analytical"], made_up(60, 3, windows=windows)).fired
-
-
 def test_training_pushes_of_a_learnt_model_are_scored_by_refits_of_the_other_half(models: dict[str, PushModel]):
     """Hyperparameters that have seen a push make its residuals smaller than those of a new one."""
     model = models["gp"]
@@ -244,15 +231,6 @@ def scores_of(model: PushModel, table: PushTable) -> Array:
     prediction = model.predict_rows(table.inputs, table.duration)
     found = _scores_by_push(calibrated(model), table, prediction.mean, prediction.covariance)
     return np.array([found[push] for push in table.pushes])
-
-
-def test_score_of_a_push_does_not_depend_on_a_longer_push_among_them(models: dict[str, PushModel]):
-    """The longest window sets the steps of the integration."""
-    model, table = models["analytical"], made_up(6, 5)
-    velocity = np.repeat([0.15, 0.05, 0.05, 0.2, 0.05, 0.05], 3)
-    table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
-    alone = [scores_of(model, table.take(np.flatnonzero(table.push_id == push)))[0] for push in table.pushes]
-    np.testing.assert_allclose(scores_of(model, table), alone, rtol=1e-9, atol=1e-12)
 
 
 def test_score_is_as_wide_for_many_windows_as_for_few(models: dict[str, PushModel]):

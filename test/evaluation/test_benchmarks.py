@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from benchmarks.adaptation.methods import Scored, Tuesday
 from benchmarks.adaptation.rigs import NOTHING, WEAR
 from benchmarks.adaptation.tables import Record, rows, verdict
-from benchmarks.blind import alarm
 from benchmarks.blind.alarm import Row
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.models.push_model import PushModel
@@ -97,16 +95,3 @@ def test_alarm_before_the_change_is_false_and_after_it_has_a_delay(
 ) -> None:
     judged = Row(0, "rect1 on abs", "vhgp", change, fired, "dy" if fired else None)
     assert (judged.false, judged.delay) == (false, delay)
-
-
-def test_recordings_that_are_there_are_not_judged_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    judged: list[int] = []
-
-    def rows(seed: int, count: int) -> list[Row]:
-        judged.append(seed)
-        return [Row(seed, "hex on pu", "vhgp", None, None, None)] * count
-
-    monkeypatch.setattr(alarm, "rows_without_change", rows)
-    for models in ("2", "3"):
-        alarm.main(["unchanged", "--out", str(tmp_path), "--models", models, "--streams", "4", "--first", "7"])
-    assert judged == [7, 8, 9] and len(list(tmp_path.iterdir())) == 3

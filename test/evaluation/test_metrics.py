@@ -1,9 +1,11 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Metrics, splits and normal scores by their definitions."""
+"""Metrics, sums by push, splits and normal scores by their definitions."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,10 +15,12 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from scipy.special import ndtri
 from scipy.stats import multivariate_normal, norm, rankdata
 
-from push_predictor.evaluation.metrics import coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
+from push_predictor.evaluation.push_scores import pooled, push_scores
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, split_by_push
+from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.normal_scores import normal_scores
-from push_predictor.recordings.table import PushTable, concatenate
+from push_predictor.recordings.table import OUTPUTS, PushTable, concatenate
 from push_predictor.types import Array
 
 RNG = np.random.default_rng(0)
@@ -43,20 +47,6 @@ def test_nmse_of_a_constant_outcome_is_nan() -> None:
 def test_nlpd_equals_the_negative_log_density() -> None:
     mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
     assert gaussian_nlpd(mean, variance, OUTCOMES) == pytest.approx(-norm.logpdf(OUTCOMES, 0.0, SD))
-
-
-def test_units_shift_nlpd_by_the_logarithm_of_their_ratio() -> None:
-    scale = np.array([1e3, 1e3, 1.0])
-    mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
-    in_si = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
-    in_mm = gaussian_nlpd(mean * scale, variance * scale**2, OUTCOMES * scale).sum(axis=1)
-    assert in_mm - in_si == pytest.approx(np.full(400, 2.0 * np.log(1000.0)))
-
-
-def test_joint_density_of_independent_outputs_is_the_product() -> None:
-    mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
-    product = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
-    assert joint_nlpd(mean, np.tile(np.diag(SD**2), (400, 1, 1)), OUTCOMES) == pytest.approx(product)
 
 
 def test_joint_density_of_correlated_outputs_equals_scipy() -> None:
@@ -148,6 +138,81 @@ def test_column_with_nan_has_no_scores():
     np.testing.assert_allclose(scores[:, 1], ndtri([1 / 6, 1 / 2, 5 / 6]), atol=1e-15)
 
 
-def test_normal_scores_depend_on_order_only():
-    values = np.random.default_rng(0).standard_normal((30, 3))
-    assert np.array_equal(normal_scores(values), normal_scores(np.exp(values)))
+# --- push scores ------------------------------------------------------------------------------------------------------
+
+
+SIZES = (1, 4, 2, 7, 3, 5)
+SCALE = np.array([1e-3, 1e-3, 0.05])
+
+
+def comparison(sizes: tuple[int, ...] = SIZES, exact: bool = True, seed: int = 0) -> Comparison:
+    """Predictions of n windows that are wrong by about their sd; pushes in no order of their names."""
+    rng = np.random.default_rng(seed)
+    push_id = np.repeat([f"push-{9 - k}" for k in range(len(sizes))], sizes)
+    n = len(push_id)
+    mean, observed = SCALE * rng.standard_normal((n, 3)), SCALE * rng.standard_normal((n, 3))
+    covariance = np.array([np.diag(SCALE * rng.uniform(0.5, 2.0, 3)) ** 2 for _ in range(n)])
+    density = rng.standard_normal((n, 3)) if exact else None
+    return Comparison("made up", 10, push_id, mean, covariance, observed, density, np.zeros(3))
+
+
+def rows_of(c: Comparison, rows: np.ndarray) -> Comparison:
+    fields = {name: getattr(c, name)[rows] for name in ("push_id", "mean", "covariance", "observed")}
+    return replace(c, **fields, exact_log_density=None if c.exact_log_density is None else c.exact_log_density[rows])
+
+
+def test_totals_equal_the_json() -> None:
+    c = comparison()
+    totals, expected_json = push_scores(c).totals(), metrics_json(c)
+    for name in ("nmse", "nlpd", "exact_nlpd"):
+        assert getattr(totals, name)[0] == pytest.approx([expected_json[name][output] for output in OUTPUTS], rel=1e-12)
+    for k, level in enumerate(COVERAGE_LEVELS):
+        json_shares = [expected_json["coverage"][str(level)][output] for output in OUTPUTS]
+        assert totals.coverage[0, :, k] == pytest.approx(json_shares, rel=1e-12)
+
+
+def test_resampled_totals_give_the_interval_of_the_json() -> None:
+    c = comparison()
+    draws, expected_json = push_scores(c).resampled(), metrics_json(c)["interval"]
+    for name in ("nmse", "nlpd"):
+        low, high = np.quantile(getattr(draws, name).sum(axis=1), [0.025, 0.975])
+        assert [low, high] == pytest.approx([expected_json[name]["low"], expected_json[name]["high"]], rel=1e-12)
+
+
+def test_gaussian_density_is_exact_without_another() -> None:
+    t = push_scores(comparison(exact=False))
+    np.testing.assert_array_equal(t.exact_nlpd, t.nlpd)
+
+
+def test_pooled_folds_equal_all_rows_at_once() -> None:
+    c = comparison()
+    fold = np.unique(c.push_id, return_inverse=True)[1] % 2
+    parts, whole = pooled([push_scores(rows_of(c, fold == k)) for k in (1, 0)]), push_scores(c)
+    for name in vars(whole):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_each_fold_keeps_its_own_training_mean() -> None:
+    c = comparison(sizes=(3, 4))
+    first, second = (rows_of(c, c.push_id == push) for push in ("push-9", "push-8"))
+    moved = replace(second, training_mean=np.array([1e-3, 0.0, 0.1]))
+    spread = np.sum(first.observed**2, axis=0) + np.sum((second.observed - moved.training_mean) ** 2, axis=0)
+    expected = np.sum((c.observed - c.mean) ** 2, axis=0) / spread
+    np.testing.assert_allclose(pooled([push_scores(first), push_scores(moved)]).totals().nmse[0], expected)
+
+
+def test_push_of_several_seeds_is_one_push() -> None:
+    one, other = comparison(seed=1), comparison(seed=2)
+    both = pooled([push_scores(one), push_scores(other)])
+    assert both.push_id.tolist() == sorted(set(one.push_id.tolist()))
+    assert both.windows.sum() == 2 * sum(SIZES)
+
+
+def test_push_drawn_twice_counts_twice() -> None:
+    c = comparison()
+    t = push_scores(c)
+    weights = np.array([2.0, 0.0, 1.0, 3.0, 0.0, 0.0])
+    rows = np.repeat(np.arange(len(c.push_id)), weights[np.unique(c.push_id, return_inverse=True)[1]].astype(int))
+    expected, drawn = push_scores(rows_of(c, rows)).totals(), t.totals(weights[None])
+    for name in ("nmse", "nlpd", "exact_nlpd", "coverage"):
+        np.testing.assert_allclose(getattr(drawn, name), getattr(expected, name), rtol=1e-12)

@@ -23,9 +23,7 @@ from benchmarks.foreign.effects import Effect
 from benchmarks.foreign.plan import PushDistribution
 from benchmarks.foreign.recording import SessionInputs
 from benchmarks.foreign.rig import Rig, draw_rig
-from benchmarks.foreign.sensing import SensedSession
-from benchmarks.support.bags import Samples, write_bag
-from push_predictor import load_model, read_recording
+from push_predictor import load_model
 
 PACKAGE = Path(command.__file__).parent
 TRUTH_KEYS = {
@@ -64,14 +62,6 @@ def _make(folder: Path) -> tuple[Path, Path]:
     options = f"make --out {data} --truth {truth} --seed 2 --count 1 --training 3 --later 3"
     assert command.main(options.split()) == 0
     return data, truth
-
-
-@pytest.mark.long
-def test_the_same_seed_gives_the_same_bags(made: tuple[Path, Path], tmp_path: Path) -> None:
-    first, second = made[0] / "000", _make(tmp_path)[0] / "000"
-    for name in ("training/training_0.mcap", "new/new_0.mcap", "new/metadata.yaml"):
-        assert (first / name).read_bytes() == (second / name).read_bytes()
-    assert (first / "training/training_0.mcap").read_bytes() != (first / "new/new_0.mcap").read_bytes()
 
 
 @pytest.mark.long
@@ -130,26 +120,6 @@ def test_clean_ratio_is_zero_without_a_change_and_large_with_one(rig: Rig, input
     tilted = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, (tilt,))
     assert recording.clean_ratio(rng, rig, inputs, tilted, Change("library", (tilt,))) > 1.0
     assert recording.clean_ratio(rng, rig, inputs, unchanged, Change("library", (idle,))) < 0.01
-
-
-def test_bags_contain_the_samples_that_were_written(rig: Rig, tmp_path: Path) -> None:
-    """As the project's own reader, which shares no code with the writer, decodes them."""
-    time = np.array([0.0, 0.25, 0.5])
-    slider = Samples(time, np.array([[0.1, 0.2, 0.015, 3.0], [0.11, 0.2, 0.015, -3.0], [0.12, 0.21, 0.015, 0.5]]))
-    pusher = Samples(time, np.tile([0.05, -0.04, 0.01, 0.0], (3, 1)))
-    wrench = Samples(time + 0.1, np.array([[1.0, 2.0, 3.0, 0.1, 0.2, 0.3]] * 3))
-    room = {"/room/humidity": Samples(time[:2], np.array([[45.5], [46.5]]))}
-    topics = SensedSession(slider, pusher, wrench, room).serialised(7_000_000_000)
-    write_bag(tmp_path / "bag", topics, rig.record(), "foreign")
-    read = read_recording(tmp_path / "bag")
-    assert np.allclose(np.column_stack([read.slider.x, read.slider.y]), slider.values[:, :2], atol=1e-7)
-    assert np.allclose(read.slider.heading, slider.values[:, 3], atol=1e-12)
-    assert read.slider.stamp.tolist() == [7_000_000_000, 7_250_000_000, 7_500_000_000]
-    assert np.allclose([read.pusher.x[0], read.pusher.y[0], read.pusher.z[0]], [0.05, -0.04, 0.01], atol=1e-8)
-    assert read.wrench is not None and read.rig is not None
-    assert np.allclose([read.wrench.fx[0], read.wrench.fy[0], read.wrench.torque[0]], [1.0, 2.0, 0.3], atol=1e-7)
-    assert [scalar.value.tolist() for scalar in read.scalars.values()] == [[45.5, 46.5]]
-    assert read.rig.object_mass == pytest.approx(rig.mass, abs=1e-4)
 
 
 def test_only_the_module_that_trains_uses_the_project() -> None:

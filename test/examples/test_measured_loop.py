@@ -6,19 +6,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ros_harness import free_domain
 
-from examples import measured_loop
+from examples import measured_loop, measured_recordings
 from examples.loop import ClosedLoop, Traced
 from examples.loop_picture import DEPLOYED, EXTENDED, Story
 from examples.measured_loop import REFIT, Outcome, main, to_json, to_text
-from examples.measured_recordings import Split
+from examples.measured_recordings import Split, mcube_splits, mlab_splits
 from push_predictor.evaluation.validation import Comparison
+from push_predictor.recordings.importers import import_source
+from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import read_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 
 EFFECT = {
     "mechanism": "pressure_spread",
@@ -39,11 +47,11 @@ def comparison(error: float, pushes: int) -> Comparison:
     return Comparison("m", 10, ids, observed + off, covariance, observed, None, np.zeros(3))
 
 
-def outcome(recording: Recording, later: dict[str, float], pushes: int = 20, failed: str = "") -> Outcome:
+def outcome(recording: Recording, later: dict[str, float], pushes: int = 20) -> Outcome:
     """The outcome of a loop; later: the error of each model on the later pushes."""
     split = Split("mlab one to two", recording, recording, recording, "a support was changed")
-    traced = None if failed else Traced("", {"verdict": "mechanism_only", "effects": [EFFECT]}, None)
-    closed = ClosedLoop(Story({}, {}, 30, None), None, traced, failed)
+    traced = Traced("", {"verdict": "mechanism_only", "effects": [EFFECT]}, None)
+    closed = ClosedLoop(Story({}, {}, 30, None), None, traced, "")
     counts = {"training": (50, 1000), "traced": (1, 15), "later": (pushes, 3 * pushes)}
     alarm = {"fired": False, "pushes": 30, "log10_evidence": 0.9, "off": None}
     return Outcome(split, counts, alarm, closed, {name: comparison(error, pushes) for name, error in later.items()})
@@ -57,12 +65,6 @@ def test_extension_that_beats_both_models_on_later_pushes_is_called_better(recor
     assert to_text(found).startswith("mlab one to two. The extended model is better on the later pushes.")
     values = to_json(found)["differences"]["extended − refit"]["nlpd"]
     assert values["low"] <= values["value"] <= values["high"] < 0.0
-
-
-def test_refused_trace_is_the_answer_and_its_reason_is_given(recording: Recording) -> None:
-    found = outcome(recording, {DEPLOYED: 0.5}, failed="too few pushes")
-    assert "Nothing was found: the trace refused these data." in to_text(found)
-    assert to_json(found)["trace"] == {"failed": "too few pushes"}
 
 
 def test_one_later_push_has_no_interval(recording: Recording) -> None:
@@ -85,12 +87,6 @@ def test_without_the_data_it_states_which_folder_is_absent_and_succeeds(
     assert not list(tmp_path.iterdir())
 
 
-def test_share_of_no_pushes_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SystemExit) as refused:
-        main(["--data", str(tmp_path), "--traced-share", "1"])
-    assert refused.value.code == 2
-
-
 @pytest.mark.long
 def test_steel_block_runs_through_the_nodes_and_is_too_short_for_a_trace(
     measured_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -105,3 +101,89 @@ def test_steel_block_runs_through_the_nodes_and_is_too_short_for_a_trace(
     online, offline = (found["later"][name]["nmse"]["value"] for name in (DEPLOYED, REFIT))  # the same mean
     assert online == pytest.approx(offline, rel=1e-6) and 0.0 < online < 1.0
     assert "Nothing was found" in capsys.readouterr().out
+
+
+# --- measured recordings ----------------------------------------------------------------------------------------------
+
+
+WOOD = "mlab wood_patch to wood_30_90_30_30_30_90"
+MIXED = "30_90_30_30_30_90"  # of the log that joins two sessions, the later one first
+
+
+@pytest.fixture(scope="module", autouse=True)
+def logs_are_read_once() -> Iterator[None]:
+    """Their splits differ in where they are cut."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_recordings, "_read", cache(measured_recordings._read))
+        yield
+
+
+@pytest.fixture(scope="module")
+def blocks(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Split]:
+    return {split.name: split for split in mcube_splits(measured_data, tmp_path_factory.mktemp("mcube"))}
+
+
+@pytest.fixture(scope="module")
+def logs(measured_data: Path) -> dict[str, Split]:
+    return {split.name: split for split in mlab_splits(measured_data)}
+
+
+@pytest.fixture(scope="module")
+def table(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> PushTable:
+    """The whole pushes of the log wood_30_90, as the importer has them."""
+    source = measured_data / "mlab" / "sensor_log" / "wood_30_90_30_30_30_90"
+    written = import_source("mlab", [source], tmp_path_factory.mktemp("table")).written
+    return read_table(next(path for path in written if path.suffix == ".csv"))
+
+
+def windows_of(recording: Recording, duration: float = 0.2) -> list[PushWindow]:
+    return find_windows(recording, require_rig(recording), WindowOptions(duration=duration))
+
+
+# --- mcube ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_runs_of_a_block_have_in_one_recording_the_windows_that_each_has_alone(
+    measured_data: Path, blocks: dict[str, Split], tmp_path: Path
+) -> None:
+    runs = import_source("mcube", [measured_data / "mcube_preliminary"], tmp_path).written
+    alone = {w.start: w.displacement for run in runs for w in windows_of(read_recording(run))}
+    parts = [part for split in blocks.values() for part in (split.training, split.traced, split.later)]
+    together = {w.start: w.displacement for part in parts for w in windows_of(part)}
+    assert set(together) == set(alone) and len(alone) > 80
+    for start, displacement in alone.items():
+        np.testing.assert_allclose(together[start], displacement, atol=1e-9)
+
+
+def test_runs_are_trained_on_traced_and_kept_in_order_of_time(blocks: dict[str, Split]) -> None:
+    assert len(blocks) == 2
+    for split in blocks.values():
+        ends = [(part.slider.stamp[0], part.slider.stamp[-1]) for part in (split.training, split.traced, split.later)]
+        assert np.all(np.diff(np.ravel(ends)) > 0)
+
+
+# --- mlab -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_windows_of_a_log_add_up_to_the_measured_pushes(logs: dict[str, Split], table: PushTable) -> None:
+    """A window of almost the whole push, so that few per cent of the measured displacement are outside it."""
+    share = 5.3 / table.duration
+    windows = windows_of(logs[WOOD].traced, 5.3)
+    assert len(windows) == 40
+    for row, window in enumerate(windows):
+        expected = share[row] * table.outcomes[row]
+        pose = [table.covariates[f"slider_{k}"][row] for k in ("x", "y", "heading")]
+        np.testing.assert_allclose(window.displacement, expected, rtol=0.01, atol=2e-5)
+        np.testing.assert_allclose(window.slider_start, pose, atol=1e-3)
+        assert window.velocity == pytest.approx(table.inputs[row, 0], rel=1e-3)
+        assert window.contact == pytest.approx(table.inputs[row, 1], abs=1e-3)
+        assert window.angle == pytest.approx(table.inputs[row, 2], abs=0.01)
+
+
+def test_logs_are_in_order_of_time_also_where_a_file_is_not(logs: dict[str, Split]) -> None:
+    assert any(name.startswith(f"mlab {MIXED}") for name in logs)
+    for split in logs.values():
+        stamps = np.concatenate([part.slider.stamp for part in (split.training, split.traced, split.later)])
+        assert np.all(np.diff(stamps) > 0)

@@ -3,6 +3,9 @@
 
 """The independent simulator: reproducible bags, plausible forces, an honest truth."""
 
+from __future__ import annotations
+
+import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,17 +14,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from benchmarks.points_rig.drivers import Driver
-from benchmarks.points_rig.effects import Effect
 from benchmarks.points_rig.outlines import rectangle
 from benchmarks.points_rig.pairs import make_pair, write_pair
-from benchmarks.points_rig.pieces import clean_ratio
 from benchmarks.points_rig.rigs import GRAVITY, Rig, draw_rig
 from benchmarks.points_rig.sensors import Streams
 from benchmarks.points_rig.sessions import Session, plan_session
 from benchmarks.points_rig.simulation import STEP, Tracks, draw_noise, simulate
 from benchmarks.support.bags import Samples, write_bag
-from benchmarks.support.plane import dot, quarter_turn, rotate
+from benchmarks.support.making import add_make, truth_file
+from benchmarks.support.plane import dot, quarter_turn, rotate, wrapped
 from push_predictor import read_recording
 
 TRUTH_KEYS = {
@@ -119,18 +120,6 @@ def test_bags_contain_the_readings(rig: Rig, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_the_clean_ratio_is_zero_without_a_change_and_large_with_a_large_one(
-    rig: Rig, session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("benchmarks.points_rig.pieces.JUDGED_PUSHES", 4)
-    noisy = replace(rig, noise=1.0)
-    change = Effect("centre_of_friction", 0.018, Driver("constant"), 0.0)
-    assert clean_ratio(noisy, session, 3, (), 1.0) == 0.0
-    assert clean_ratio(noisy, session, 3, (replace(change, value=0.0),), 1.0) < 1e-9
-    assert clean_ratio(noisy, session, 3, (change,), 1.0) > 1.0
-
-
-@pytest.mark.long
 def test_the_same_seed_writes_the_same_bag_and_a_whole_truth(tmp_path: Path) -> None:
     for name in ("first", "second"):
         write_pair(make_pair(6, 21, 2, 2), tmp_path / name / "data", tmp_path / name / "truth")
@@ -140,3 +129,39 @@ def test_the_same_seed_writes_the_same_bag_and_a_whole_truth(tmp_path: Path) -> 
         assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes()
     truth = json.loads((tmp_path / "first" / "truth" / "021.json").read_text())
     assert truth.keys() >= TRUTH_KEYS
+
+
+# --- rig support ------------------------------------------------------------------------------------------------------
+
+
+def write(options: argparse.Namespace, number: int) -> None:
+    """A stand-in for a simulator: the truth alone, made once."""
+    with truth_file(options, number).open("x") as file:
+        file.write(str(options.seed))
+
+
+def run(folder: Path, *arguments: str) -> int:
+    parser = argparse.ArgumentParser()
+    add_make(parser, write)
+    folders = ["--out", str(folder / "data"), "--truth", str(folder / "truth")]
+    options = parser.parse_args([*folders, "--seed", "4", *arguments])
+    status: int = options.work(options)
+    return status
+
+
+@pytest.mark.parametrize("cores", ["1", "2"])
+def test_only_missing_pairs_are_made(tmp_path: Path, cores: str) -> None:
+    for count in ("2", "3"):
+        assert run(tmp_path, "--count", count, "--cores", cores) == 0
+    assert sorted(path.name for path in (tmp_path / "truth").iterdir()) == ["000.json", "001.json", "002.json"]
+
+
+def test_truth_within_the_data_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="must not contain each other"):
+        run(tmp_path, "--count", "1", "--truth", str(tmp_path / "data" / "truth"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_angles_are_folded_around_zero() -> None:
+    turn = 2.0 * np.pi
+    np.testing.assert_allclose(wrapped(np.array([0.1, 3.5, -3.5, 7.0])), [0.1, 3.5 - turn, turn - 3.5, 7.0 - turn])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,30 +18,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hosted_nodes import hosted_node
-from mit_square_fits import Scores, fit_scaled, load_square
-from mit_square_fits import split_by_push as expected_split_by_push
 from ros_harness import free_domain, wait_until
 from synthetic import Push, pose_stream, stamps, translating_push, windows_of
 from validator_bench import hosting_replay, hosting_validator
 
-from benchmarks.measured.scores import pooled, total
+from benchmarks.measured.scores import total
 from benchmarks.measured.tables import leave_one_run_out, mean_speed, travelled
-from push_predictor.cli import main
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.offline import validate_recording
-from push_predictor.evaluation.splits import split_by_push
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.mechanics.fitted import analytical_mechanics
-from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.live_validation import window_log
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording, WrenchStream
-from push_predictor.recordings.table_file import read_table, write_table
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 
@@ -118,14 +111,6 @@ def test_textbook_physics_explains_the_long_pushes_and_no_mirror_of_them(importe
     assert min(score(1, -1), score(-1, 1), score(-1, -1)) > 1.0
 
 
-def test_learnt_from_other_runs_a_model_predicts_an_aluminium_run(imported: dict[str, Path]) -> None:
-    """Plain models of the raw outcomes, about no mechanics: these runs turn both ways, and a VHGP alone learns it."""
-    runs = block_runs(imported, "Al")
-    learnt, physics = (pooled(leave_one_run_out(runs, kind)) for kind in ("vhgp", "analytical"))
-    assert total(learnt, "nmse") < 0.15 and total(physics, "nmse") < 0.15
-    assert total(learnt, "nlpd") < total(physics, "nlpd")
-
-
 def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: dict[str, Path]) -> None:
     """Steel run 3 alone turns clockwise: what a plain model learnt from the others fails there, and says so."""
     folds = leave_one_run_out(block_runs(imported, "St"), "vhgp")
@@ -133,16 +118,6 @@ def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: d
     scores = [total(fold.push_scores, "nmse") for fold in folds]
     assert outside == [False, False, True, False]
     assert scores[2] > 1.0 > 0.3 > max(scores[:2] + scores[3:])
-
-
-def test_a_default_model_predicts_even_the_run_that_turns_as_no_other(imported: dict[str, Path]) -> None:
-    """It is learnt about mechanics, which know both directions of turning, and better than textbook mechanics."""
-    runs = block_runs(imported, "St")
-    folds = leave_one_run_out(runs, "vhgp", TrainingOptions(tails=False))
-    assert max(total(fold.push_scores, "nmse") for fold in folds) < 0.3
-    textbook = pooled(leave_one_run_out(runs, "analytical"))
-    assert total(pooled(folds), "nmse") < total(textbook, "nmse")
-    assert total(pooled(folds), "nlpd") < total(textbook, "nlpd")
 
 
 # --- through the real nodes -------------------------------------------------------------------------------------
@@ -232,59 +207,6 @@ def test_the_hexagons_push_is_found_as_its_file_name_states(found: dict[str, lis
     assert window.covariates["edge"] == 1.0, "i, the side"
     assert (window.contact - 1.0 / 6.0) * 6.0 == pytest.approx(0.0, abs=0.02), "s, the position on the side"
     assert 0.10 < window.velocity < 0.16, "v is 0.150; the tip sets off from rest in contact"
-
-
-def test_physics_predicts_the_sense_of_the_hexagons_rotation_not_its_size(
-    imported: dict[str, Path], found: dict[str, list[PushWindow]]
-) -> None:
-    rig, table = load_rig_for([imported[HEXAGON]]), load_data([imported[HEXAGON]])
-    predicted = analytical_mechanics(rig.outline, rig.pusher_radius).displacement(table.inputs, table.duration)[0]
-    observed = found[HEXAGON][0].displacement
-    assert np.hypot(*(predicted - observed)[:2]) < 0.005
-    assert observed[2] < 2.0 * predicted[2] < 0.0, "struck at its corner at 150 mm/s it spins faster than it is pushed"
-
-
-# --- the square's table through the command line ----------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def square(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The table that `import mit-square` writes, its rig beside it."""
-    out = tmp_path_factory.mktemp("square")
-    assert main(["import", "mit-square", str(measured_data / "mit_square" / "pushes_3500.npz"), "--out", str(out)]) == 0
-    return out / "pushes_3500.csv"
-
-
-@pytest.mark.parametrize("kind", ["gp", "vhgp"])
-def test_import_train_evaluate_score_what_the_regressors_score_by_themselves(
-    measured_data: Path, square: Path, tmp_path: Path, kind: str
-) -> None:
-    table, fold = read_table(square), 0
-    split = split_by_push(table, fold)
-    for name, rows in (("training", np.sort(split.training)), ("test", split.test)):
-        write_table(tmp_path / f"{name}.csv", table.take(rows))
-        shutil.copy(square.with_suffix(".rig.yaml"), tmp_path / f"{name}.rig.yaml")
-    model, report = str(tmp_path / "square.pushmodel"), tmp_path / "metrics.json"
-    options = ["--kind", kind, "--mean", "zero", "--n-train", "100", "--seed", str(fold), "--out", model]
-    assert main(["train", str(tmp_path / "training.csv"), *options]) == 0
-    learnt = load_model(Path(model))
-    assert isinstance(learnt.predictor, GaussianProcessPredictor) and learnt.predictor.tails is not None
-    save_model(replace(learnt, predictor=replace(learnt.predictor, tails=None)), Path(model))  # as the regressors
-    assert main(["evaluate", model, str(tmp_path / "test.csv"), "--json", str(report)]) == 0
-    metrics = json.loads(report.read_text())
-    direct = fitted_directly(measured_data, kind)
-    assert (metrics["n_train"], metrics["n_test"]) == (100, len(split.test))
-    assert metrics["nlpd"]["total"] == pytest.approx(direct.nlpd, abs=1e-6)
-    assert kind == "gp" or metrics["exact_nlpd"]["total"] == pytest.approx(direct.exact_nlpd, abs=1e-6)
-    assert metrics["nmse"]["total"] == pytest.approx(direct.nmse, rel=1e-6)
-
-
-def fitted_directly(measured_data: Path, kind: str) -> Scores:
-    """Of the same hundred rows without tables, files and command line."""
-    rows = load_square(measured_data)
-    drawn, test = expected_split_by_push(rows, 100, 0)
-    drawn = np.sort(drawn)
-    return fit_scaled(rows.inputs[drawn], rows.outputs[drawn], kind).scores(rows.inputs[test], rows.outputs[test])
 
 
 # --- contact of a tip that begins near the slider, as all of these recordings do ----------------------------------

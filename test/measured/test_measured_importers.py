@@ -74,24 +74,6 @@ def test_in_contact_the_tip_is_on_the_outline_and_the_force_points_out_of_the_sl
     assert np.median(along) > np.cos(np.radians(15.0)), "within friction of the contact normal"
 
 
-@pytest.mark.parametrize("run", RUNS)
-def test_every_run_yields_one_push_of_many_windows(mcube: Imported, run: str) -> None:
-    recording = mcube[1][run]
-    assert recording.rig is not None
-    windows = find_windows(recording, recording.rig)
-    assert len({window.push_id for window in windows}) == 1
-    assert len(windows) >= 8
-    assert len({window.covariates["edge"] for window in windows}) == 1
-    speeds = [window.velocity for window in windows]
-    mean = [np.hypot(*(_tip_at(recording, w.end) - _tip_at(recording, w.start))) / w.duration for w in windows]
-    assert np.median(np.abs(np.array(speeds) / mean - 1.0)) < 0.15, "the start's speed is about the window's"
-
-
-def _tip_at(recording: Recording, stamp: int) -> Array:
-    tip = recording.pusher
-    return np.array([np.interp(stamp, tip.stamp, tip.x), np.interp(stamp, tip.stamp, tip.y)])
-
-
 def test_the_clock_offset_is_that_of_the_delay_test_without_repeated_rows(measured_data: Path) -> None:
     folder, notes = measured_data / "mcube_preliminary" / "time_delay", Notes()
     vicon = in_order(read_numbers(folder / "Output_vicon_tcpvicon.txt", 2, notes), "vicon", notes)
@@ -182,22 +164,6 @@ def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(bags: Imported) 
         assert span > 30e9
 
 
-@pytest.mark.parametrize("name", BAGS[:2])
-def test_in_the_mlab_bags_the_force_on_the_pusher_opposes_its_motion(bags: Imported, name: str) -> None:
-    recording = bags[1][name]
-    assert recording.wrench is not None
-    grid = np.arange(recording.pusher.stamp[0], recording.pusher.stamp[-1], 100_000_000)
-    tip = np.column_stack(
-        [np.interp(grid, recording.pusher.stamp, z) for z in (recording.pusher.x, recording.pusher.y)]
-    )
-    wrench = recording.wrench
-    force = np.column_stack([np.interp(grid, wrench.stamp, z) for z in (wrench.fx, wrench.fy)])[:-1]
-    step = np.diff(tip, axis=0)
-    pushing = (np.hypot(*step.T) > 2e-4) & (np.hypot(*force.T) > 0.1)
-    against = -np.sum(force * step, axis=1)[pushing]
-    assert np.mean(against > 0.0) > 0.95
-
-
 # --- mit ----------------------------------------------------------------------------------------------------------
 
 
@@ -215,19 +181,6 @@ def test_the_mit_push_touches_its_outline_and_the_force_points_out_of_the_slider
 
 
 # --- mit-square ---------------------------------------------------------------------------------------------------
-
-
-def test_npz_and_csv_of_the_square_give_one_table(measured_data: Path, tmp_path: Path) -> None:
-    folder = measured_data / "mit_square"
-    import_source("mit-square", [folder / "pushes_3500.npz"], tmp_path / "npz")
-    import_source("mit-square", [folder / "pushes_3500.csv.gz"], tmp_path / "csv")
-    one, two = (read_table(tmp_path / name / "pushes_3500.csv") for name in ("npz", "csv"))
-    assert len(one) == 3500 and len(one.pushes) == 89
-    np.testing.assert_array_equal(one.push_id, two.push_id)
-    np.testing.assert_allclose(one.inputs, two.inputs, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(one.outcomes, two.outcomes, rtol=0, atol=1e-15)
-    outline = load_rig(tmp_path / "npz" / "pushes_3500.rig.yaml").outline
-    assert set(outline.edge(one.inputs[:, 1])[0].tolist()) == {0}
 
 
 def test_in_the_documented_frame_the_contact_stays_on_the_side(measured_data: Path, tmp_path: Path) -> None:
@@ -307,10 +260,3 @@ def test_irregular_logs_are_imported_as_far_as_possible_and_reported(
     told = "\n".join([*report.dropped, *report.repaired])
     assert report.pushes == pushes
     assert all(word in told for word in words)
-
-
-def test_a_log_whose_recording_failed_drops_every_push(measured_data: Path, tmp_path: Path) -> None:
-    report = import_source("mlab", [measured_data / "mlab" / "quirky_logs"], tmp_path)
-    failed = [line for line in report.dropped if "exp9_20.txt" in line]
-    assert len(failed) == 15 and all("robot poses" in line for line in failed)
-    assert not any("exp9_20" in path.name for path in report.written)

@@ -6,12 +6,10 @@
 from __future__ import annotations
 
 import ast
-import re
 import runpy
 import subprocess
 import sys
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -60,11 +58,19 @@ def modules(package: str) -> list[Path]:
     return sorted((PACKAGE / package).rglob("*.py"))
 
 
-@pytest.mark.parametrize("package", LIBRARY)
-def test_the_library_imports_no_ros(package: str) -> None:
-    for path in modules(package):
+@pytest.mark.parametrize(
+    ("packages", "forbidden"),
+    [
+        (LIBRARY, (*ROS, "msg_adapters")),
+        ([*(room for room in LIBRARY if room != "commands"), "nodes"], ("push_predictor_paper",)),
+        (["simulation"], ("push_predictor.models", "push_predictor.evaluation")),
+    ],
+    ids=["no ROS in the library", "only commands know the paper", "the simulator knows no model"],
+)
+def test_what_may_not_be_imported(packages: list[str], forbidden: tuple[str, ...]) -> None:
+    for path in (path for package in packages for path in modules(package)):
         for name in imports_of(path):
-            assert not name.startswith((*ROS, "msg_adapters")) and "_msgs" not in name, f"{path}: {name}"
+            assert not name.startswith(forbidden) and ("rclpy" not in forbidden or "_msgs" not in name), (path, name)
 
 
 def test_the_picture_shows_every_room(picture: list[list[str]]) -> None:
@@ -109,32 +115,7 @@ def test_no_folder_has_more_modules_than_one_can_survey(product: str) -> None:
         assert len(found) <= MOST_MODULES, package.parent
 
 
-@pytest.mark.parametrize("product", ["push_predictor", "msg_adapters", "push_predictor_paper/push_predictor_paper"])
-def test_every_package_has_a_docstring(product: str) -> None:
-    for package in (REPOSITORY / product).rglob("__init__.py"):
-        assert ast.get_docstring(ast.parse(package.read_text())), package
-
-
 # --- the paths of data in docs/architecture.md ------------------------------------------------------------------------
-
-
-def paths_of_data() -> dict[str, list[str]]:
-    """{title: modules in order} of the numbered lists."""
-    text = (REPOSITORY / "docs" / "architecture.md").read_text().split("## Three paths of data", 1)[1]
-    parts = re.split(r"^\*\*(.+)\*\*$", text, flags=re.MULTILINE)[1:]
-    lists = zip(parts[::2], parts[1::2], strict=True)
-    return {title: re.findall(r"^\d+\. `([\w/]+\.py)`", part, re.MULTILINE) for title, part in lists}
-
-
-def test_there_are_three_paths_of_data() -> None:
-    assert [title.split()[-1] for title in paths_of_data()] == ["row", "answer", "effect"]
-    assert all(len(path) > 3 for path in paths_of_data().values())
-
-
-@pytest.mark.parametrize("title", paths_of_data())
-def test_each_module_of_a_path_imports_the_next_or_is_imported_by_it(title: str) -> None:
-    for one, two in pairwise(paths_of_data()[title]):
-        assert imports(one, two) or imports(two, one), f"{one}, {two}"
 
 
 def imports(one: str, two: str) -> bool:
@@ -151,18 +132,6 @@ def module_name(module: str) -> str:
 
 
 # --- what may be imported where --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("package", [*(room for room in LIBRARY if room != "commands"), "nodes"])
-def test_only_commands_know_the_paper(package: str) -> None:
-    for path in modules(package):
-        assert not any(name.startswith("push_predictor_paper") for name in imports_of(path)), path
-
-
-def test_the_simulator_knows_no_model() -> None:
-    for path in modules("simulation"):
-        for name in imports_of(path):
-            assert not name.startswith(("push_predictor.models", "push_predictor.evaluation")), f"{path}: {name}"
 
 
 @pytest.mark.slow

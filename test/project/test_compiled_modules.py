@@ -104,17 +104,28 @@ def test_module_that_is_not_compiled_refuses_with_the_remedy(
     assert str(path) in message and message.endswith(f": run {REMEDY}") and "\n" not in message
 
 
-def test_command_without_compiled_modules_prints_one_line(tmp_path: Path):
-    words = ("-m", "push_predictor.cli", "simulate", "--shape", "rect1", "--surface", "abs")
-    words += ("--pushes", "2", "--speed", "0.05", "--out", str(tmp_path / "recording"))
-    done = python(*words, first=HIDE_COMPILED, folder=tmp_path)
-    (line,) = done.stderr.splitlines()
-    assert done.returncode == 1 and line.startswith("push_predictor simulate: the compiled mechanics")
-    assert line.endswith(REMEDY)
+SIMULATE = (
+    "push_predictor.cli",
+    "simulate",
+    "--shape",
+    "rect1",
+    "--surface",
+    "abs",
+    "--pushes",
+    "2",
+    "--speed",
+    "0.05",
+)
 
 
-@pytest.mark.ros
-def test_node_without_compiled_modules_prints_one_line(tmp_path: Path):
-    done = python("-m", "push_predictor.nodes.predict_server", first=HIDE_COMPILED, folder=tmp_path)
+@pytest.mark.parametrize(
+    ("words", "who"),
+    [
+        ((*SIMULATE, "--out", "never"), "push_predictor simulate"),
+        pytest.param(("push_predictor.nodes.predict_server",), "predict_server", marks=pytest.mark.ros),
+    ],
+)
+def test_command_or_node_without_compiled_modules_prints_one_line(words: tuple[str, ...], who: str, tmp_path: Path):
+    done = python("-m", *words, first=HIDE_COMPILED, folder=tmp_path)
     (line,) = done.stderr.splitlines()
-    assert done.returncode == 1 and line.startswith("predict_server: the compiled mechanics")
+    assert done.returncode == 1 and line.startswith(f"{who}: the compiled mechanics") and line.endswith(REMEDY)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The files that ROS's tools read: package.xml, changelogs, licences, executables and paths of the three packages."""
+"""The files that ROS's tools read, and the commands for an apt Jazzy: the tools, packages and arguments exist."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import ast
 import os
 import re
 import runpy
+import shlex
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -19,10 +21,13 @@ import pytest
 import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import Package, parse_package
+from fake_launch import install_fake_launch, load_launch_file
 from repository import REPOSITORY
 
 import push_predictor
+from push_predictor.cli import build_parser
 from push_predictor.commands import doctor_command
+from push_predictor.resources import SHIPPED
 
 FOLDERS = {
     "push_predictor": REPOSITORY,
@@ -189,13 +194,6 @@ def test_what_the_papers_package_imports_is_a_dependency():
         assert KEY_OF.get(name, name) in keys_of("push_predictor_paper", "exec"), name
 
 
-def test_what_the_messages_are_made_of_is_a_dependency():
-    listed = (FOLDERS["push_predictor_interfaces"] / "CMakeLists.txt").read_text()
-    used = set(re.search(r"DEPENDENCIES ([\w ]+)\)", listed)[1].split())  # type: ignore[index]
-    assert used <= keys_of("push_predictor_interfaces", "build") & keys_of("push_predictor_interfaces", "exec")
-    assert keys_of("push_predictor_interfaces", "buildtool") == {"ament_cmake", "rosidl_default_generators"}
-
-
 def test_rosdep_knows_every_key_and_no_rule_is_left_over():
     kinds = ("build", "buildtool", "exec", "test")
     declared = {key for name in FOLDERS for key in keys_of(name, *kinds)} - set(FOLDERS)
@@ -258,3 +256,73 @@ def test_every_console_script_has_an_executable_for_ros2_run():
         assert os.access(path, os.X_OK) and f'/../../bin/{name}"' in path.read_text()
         module = "push_predictor.cli" if name == "push_predictor" else f"push_predictor.nodes.{name}"
         assert f'exec python3 -m {module} "$@"' in path.read_text()
+
+
+# --- jazzy example ----------------------------------------------------------------------------------------------------
+
+
+SCRIPT = REPOSITORY / "scripts" / "jazzy_example.sh"
+LINES = [line for line in SCRIPT.read_text().splitlines() if line and not line.startswith("#") and line != "set -e"]
+CALLS = [shlex.split(line) for line in LINES]
+TOOLS = {".", "[", "colcon", "export", "ros2", "rosdep", "sudo"}
+OF_UBUNTU = {"python3-pip", "python3-rosdep", "python3-colcon-common-extensions"}  # the last two from ROS's repository
+
+
+def words_after(*start: str) -> list[str]:
+    """The words behind the only call that starts with these."""
+    (found,) = (call[len(start) :] for call in CALLS if tuple(call[: len(start)]) == start)
+    return found
+
+
+def test_readme_quotes_the_script():
+    blocks = re.findall(r"(?:^ {4}\S.*\n)+", (REPOSITORY / "README.md").read_text(), re.MULTILINE)
+    assert "".join(f"    {line}\n" for line in LINES) in blocks
+
+
+def test_the_shell_parses_it_and_every_tool_is_one_that_jazzy_has():
+    subprocess.run(["sh", "-n", str(SCRIPT)], check=True)
+    assert {call[0] for call in CALLS} == TOOLS
+    assert set(words_after("sudo", "apt", "install", "-y")) == OF_UBUNTU
+    assert words_after("export") == ["PIP_BREAK_SYSTEM_PACKAGES=1"]  # pip refuses Ubuntu's Python without it
+    assert words_after("colcon", "build") == ["--packages-up-to", "push_predictor"]
+
+
+def test_rosdep_is_given_the_folders_of_the_packages_that_are_built():
+    """It stops descending at a package, and the root is one."""
+    words = words_after("rosdep", "install")
+    assert set(words[: words.index("--from-paths")]) == {"-y", "--ignore-src"}
+    folders = words[words.index("--from-paths") + 1 :]
+    assert folders == [".", "push_predictor_interfaces"]
+    assert all((REPOSITORY / folder / "package.xml").is_file() for folder in folders)
+
+
+def test_the_executable_and_its_command_exist():
+    executable, *command = words_after("ros2", "run", "push_predictor")
+    assert (REPOSITORY / "scripts" / "run" / executable).is_file()
+    build_parser().parse_args(command)
+
+
+def test_the_launch_file_takes_its_arguments(monkeypatch: pytest.MonkeyPatch):
+    install_fake_launch(monkeypatch)
+    name, *words = words_after("ros2", "launch", "push_predictor")
+    launch_file: dict[str, Any] = load_launch_file(REPOSITORY / "launch" / name)
+    given = dict(word.split(":=") for word in words)
+    assert given.keys() <= {argument for argument, _, _ in launch_file["ARGUMENTS"]}
+    recording = Path(given["recording"].replace("$PWD", str(REPOSITORY)))
+    assert (recording / "metadata.yaml").is_file() and float(given["rate"]) > 0.0
+    assert given["model"] == SHIPPED  # nothing is trained before
+
+
+def test_every_documented_launch_names_a_file_and_its_arguments(monkeypatch: pytest.MonkeyPatch):
+    install_fake_launch(monkeypatch)
+    accepted = {
+        path.name: {argument for argument, _, _ in load_launch_file(path)["ARGUMENTS"]}
+        for path in (REPOSITORY / "launch").glob("*.launch.py")
+    }
+    documents = [*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")]
+    text = "\n".join(path.read_text().replace("\\\n", " ") for path in documents)
+    calls = re.findall(r"ros2 launch push_predictor (\w+\.launch\.py)([^`\n]*)", text)
+    assert len(calls) > 8
+    for name, words in calls:
+        given = set(re.findall(r"(\w+):=", words)) - {"recrding"}  # the example of what is refused
+        assert given <= accepted[name], words

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import Point
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -27,9 +26,7 @@ from rclpy.qos import (
 )
 from ros_harness import REPOSITORY, free_domain, ros_context, wait_until
 from validator_bench import hosting_replay, hosting_validator
-from visualization_msgs.msg import Marker
 
-from docs.pictures.draw_rviz import as_fields, translated
 from msg_adapters.markers import window_markers
 from push_predictor.models.prediction import Prediction
 from push_predictor.recordings.read import read_recording
@@ -111,34 +108,6 @@ def test_rviz_shows_each_namespace_of_the_markers_and_no_other():
     assert markers["Namespaces"] == dict.fromkeys(shown_namespaces(), True)
 
 
-def test_rviz_has_places_for_its_panels():
-    """Without them the panels cover the view, as RViz 1.14 showed."""
-    state = bytes.fromhex(RVIZ["Window Geometry"]["QMainWindow State"])
-    for panel in RVIZ["Panels"]:
-        assert panel["Name"].encode("utf-16-be") in state
-
-
-def test_the_translation_for_rviz_1_keeps_all_but_what_only_ros_2_has():
-    plain = translated(RVIZ)["Visualization Manager"]
-    assert "Transformation" in RVIZ["Visualization Manager"] and "Transformation" not in plain
-    assert [display["Name"] for display in plain["Displays"]] == [
-        display["Name"] for display in RVIZ["Visualization Manager"]["Displays"]
-    ]
-    topics = {display.get("Marker Topic", display.get("Topic")) for display in plain["Displays"]} - {None}
-    assert topics == {"/" + display["Topic"]["Value"] for display in displays()}
-    classes = {display["Class"] for display in plain["Displays"]} | {plain["Views"]["Current"]["Class"]}
-    assert classes == {"rviz/Grid", "rviz/MarkerArray", "rviz/Pose", "rviz/WrenchStamped", "rviz/TopDownOrtho"}
-
-
-def test_messages_for_ros_1_have_its_names_of_times_and_plain_values():
-    marker = Marker(ns="push", id=3, points=[Point(x=0.1, z=-0.2)])
-    marker.header.stamp.sec, marker.header.stamp.nanosec, marker.color.a = 4, 5, 0.5
-    fields = as_fields(marker)
-    assert fields["header"]["stamp"] == {"secs": 4, "nsecs": 5} and fields["lifetime"] == {"secs": 0, "nsecs": 0}
-    assert (fields["ns"], fields["id"], fields["color"]["a"]) == ("push", 3, 0.5)
-    assert fields["points"] == [{"x": 0.1, "y": 0.0, "z": -0.2}] and json.dumps(fields)
-
-
 def test_the_document_explains_each_marker():
     section = (
         (REPOSITORY / "docs" / "how_to" / "visualisation.md")
@@ -188,14 +157,6 @@ def test_every_panel_that_is_configured_is_placed_once():
     assert {panel.partition("!")[0] for panel in placed} == PANELS
     assert all(panel.partition("!")[2].isalnum() for panel in placed)
     assert FOXGLOVE.keys() == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
-
-
-def test_every_plot_and_the_scene_have_the_title_that_foxglove_shows():
-    """Foxglove shows foxglovePanelTitle; it ignores the key title."""
-    panels = {name: config for name, config in FOXGLOVE["configById"].items() if name.startswith(("Plot!", "3D!"))}
-    titles = [config.get("foxglovePanelTitle", "") for config in panels.values()]
-    assert len(panels) == 4 and all(titles) and len(set(titles)) == 4
-    assert not any("title" in config for config in panels.values())
 
 
 def test_every_message_path_leads_to_a_field_that_is_published(published):

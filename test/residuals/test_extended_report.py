@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from repository import BAGS
 
-from examples.overview_picture import readme_picture
 from push_predictor.evaluation.report.maps import (
     fine_cells,
     fixed_covariates,
@@ -122,11 +121,3 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     assert page.count(f"The map of extended is drawn at elapsed_time {time:.3g} s and slider_heading ") == 2
     assert "the first of the 6 equal sides is drawn." in page
     assert "The map of plain" not in page
-
-
-@pytest.mark.slow
-def test_readme_figure_accepts_an_extended_model(
-    base: PushModel, table: PushTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("push_predictor.evaluation.report.maps.FINE", 12)
-    assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

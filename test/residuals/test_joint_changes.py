@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from made_up_traces import physics, planted, pushes
-from search_bench import in_library
 from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -35,7 +34,9 @@ from push_predictor.residuals.extension.extended_model import extend
 
 CONSTANT = DriverBasis("constant")
 COUNT = 100  # pushes, as few as have blocks enough (FEWEST_BLOCKS)
-FEW = ("contact_friction", "pressure_spread", "body_anisotropy")
+# Three mechanisms of the library and three refinements.
+# Three mechanisms of the library and three refinements.
+TRIED = ("contact_friction", "pressure_spread", "body_anisotropy", "friction_by_angle", "outline_shift", "tip_offset")
 WEAR = DriverBasis("linear", ("elapsed_time",), (0.0,), (1000.0,))  # from nothing at the start
 
 
@@ -45,17 +46,6 @@ def constant(mechanism: str | None, *coefficients: float) -> Effect:
 
 LESS_FRICTION = constant("contact_friction", -0.12)
 BOTH = LESS_FRICTION, constant("body_anisotropy", 0.0, 0.15)
-
-
-@pytest.fixture(scope="module")
-def deployed() -> PushModel:
-    return train_model(pushes(COUNT, 1), square_rig(), "analytical", name="deployed")
-
-
-@pytest.fixture(autouse=True)
-def a_library_of_six(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three mechanisms of the library and three refinements: others take most of the time."""
-    in_library(monkeypatch, *FEW, "friction_by_angle", "outline_shift", "tip_offset")
 
 
 def found(model: PushModel, table: PushTable) -> tuple[MotionFinding, dict[Any, tuple[Effect, MotionTerm]]]:
@@ -97,19 +87,10 @@ def test_a_refinement_is_found_next_to_a_mechanism_of_the_library(deployed: Push
     assert within_interval(terms["friction_by_angle"][0], by_angle)
 
 
-def test_nothing_is_found_where_nothing_changed(deployed: PushModel) -> None:
-    assert not found(deployed, pushes(COUNT, 8))[0].terms
-
-
-def test_nothing_is_added_to_the_only_effect(deployed: PushModel) -> None:
-    finding, _ = found(deployed, pushes(COUNT, 10, LESS_FRICTION))
-    assert [term.best.label for term in finding.terms] == [("contact_friction", "model_inputs")]
-
-
-def test_nothing_is_added_to_the_only_effect_along_a_covariate(deployed: PushModel) -> None:
-    wear = planted("contact_friction", "elapsed_time", WEAR, 0.15)
-    finding, _ = found(deployed, pushes(COUNT, 10, wear))
-    assert [term.best.label for term in finding.terms] == [("contact_friction", "elapsed_time")]
+@pytest.mark.parametrize("only", [LESS_FRICTION, planted("contact_friction", "elapsed_time", WEAR, 0.15)])
+def test_nothing_is_added_to_the_only_effect(deployed: PushModel, only: Effect) -> None:
+    finding, _ = found(deployed, pushes(COUNT, 10, only))
+    assert [term.best.label for term in finding.terms] == [("contact_friction", only.covariate)]
 
 
 def test_an_unknown_constant_effect_keeps_no_name(deployed: PushModel) -> None:

@@ -12,10 +12,11 @@ from typing import cast
 import numpy as np
 import pytest
 from made_up_traces import NOISE, planted, pushes, slippery
-from search_bench import gate_of, in_library
+from search_bench import gate_of
 from synthetic import noisy_pushes, square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -28,19 +29,9 @@ from push_predictor.residuals.selection.gate import Gate
 from push_predictor.residuals.selection.naming import Naming
 from push_predictor.residuals.selection.search import Term, _Search
 
+TRIED = ("contact_friction", "pressure_spread")
 ALWAYS = DriverBasis("constant")
 ALONG_X = DriverBasis("linear", ("slider_x",), (0.0,), (0.1,))
-
-
-@pytest.fixture(scope="module")
-def deployed() -> PushModel:
-    return train_model(pushes(100, 1), square_rig(), "analytical", name="deployed")
-
-
-@pytest.fixture(autouse=True)
-def a_library_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Computing responses takes most of the time."""
-    in_library(monkeypatch, "contact_friction", "pressure_spread")
 
 
 def found(model: PushModel, table: PushTable) -> tuple[MotionTerm, ...]:
@@ -170,26 +161,25 @@ def warmed(table: PushTable) -> PushTable:
     return replace(table, covariates={**table.covariates, "topic:/warmth": 20.0 + time + uneven})
 
 
-def both() -> PushTable:
-    return warmed(pushes(120, 3, slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)))
+GROWN, WIDER = slippery(0.1), planted("pressure_spread", "slider_x", ALONG_X, 0.1)
 
 
-def test_terms_that_are_needed_stay(deployed: PushModel) -> None:
-    assert sorted(map(str, moved(deployed, both(), FRICTION, SPREAD))) == sorted(map(str, (FRICTION, SPREAD)))
-
-
-def test_a_term_that_another_explains_is_dropped(deployed: PushModel) -> None:
-    table = warmed(pushes(120, 3, slippery(0.1)))
-    assert moved(deployed, table, SPREAD, FRICTION) == [FRICTION]
-    assert moved(deployed, table, FRICTION, SPREAD) == [FRICTION]
-
-
-def test_a_term_with_a_worse_covariate_is_exchanged(deployed: PushModel) -> None:
-    assert set(moved(deployed, both(), SPREAD, WARMER)) == {FRICTION, SPREAD}
-
-
-def test_an_only_term_stays_as_it_was_chosen(deployed: PushModel) -> None:
-    assert moved(deployed, warmed(pushes(120, 3)), FRICTION) == [FRICTION]
+@pytest.mark.parametrize(
+    ("acting", "chosen", "left"),
+    [
+        ([GROWN, WIDER], [FRICTION, SPREAD], {FRICTION, SPREAD}),
+        ([GROWN], [SPREAD, FRICTION], {FRICTION}),
+        ([GROWN], [FRICTION, SPREAD], {FRICTION}),
+        ([GROWN, WIDER], [SPREAD, WARMER], {FRICTION, SPREAD}),
+        ([], [FRICTION], {FRICTION}),
+    ],
+    ids=["needed", "explained by the second", "by the first", "with a worse covariate", "the only one"],
+)
+def test_a_term_stays_is_dropped_or_exchanged(
+    deployed: PushModel, acting: list[Effect], chosen: list[tuple[str, str]], left: set[tuple[str, str]]
+) -> None:
+    found = moved(deployed, warmed(pushes(120, 3, *acting)), *chosen)
+    assert len(found) == len(left) and set(found) == left
 
 
 @pytest.mark.parametrize(

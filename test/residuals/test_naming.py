@@ -67,14 +67,15 @@ def base(gain: float = 0.0) -> Fit:
 
 
 @pytest.mark.parametrize(("advantage", "kept"), [(-5.0, True), (20.0, True), (25.0, False)])
-def test_a_covariate_remains_unless_it_is_worse_by_more_than_chance(
-    evidence: Evidence, advantage: float, kept: bool
+@pytest.mark.parametrize("other", [("contact_friction", "push_index"), ("pressure_spread", "elapsed_time")])
+def test_a_covariate_or_mechanism_remains_unless_it_is_worse_by_more_than_chance(
+    evidence: Evidence, other: tuple[str, str], advantage: float, kept: bool
 ) -> None:
     """2.33 standard errors of 10 nats."""
     chosen = made(evidence, "contact_friction", "elapsed_time", 500.0 * EVEN)
-    rival = made(evidence, "contact_friction", "push_index", (500.0 - advantage) * EVEN + UNEVEN)
-    found = naming_of(chosen, [rival], base())
-    assert found.covariates == (("elapsed_time", "push_index") if kept else ("elapsed_time",))
+    found = naming_of(chosen, [made(evidence, *other, (500.0 - advantage) * EVEN + UNEVEN)], base())
+    possible = zip(*{("contact_friction", "elapsed_time"): None, **({other: None} if kept else {})}, strict=True)
+    assert (found.mechanisms, found.covariates) == tuple(tuple(dict.fromkeys(names)) for names in possible)
 
 
 @pytest.mark.parametrize("first", ["elapsed_time", "push_index"])
@@ -83,16 +84,6 @@ def test_covariates_that_are_one_in_other_units_remain_whatever_the_rounding(evi
     (other,) = {"elapsed_time", "push_index"} - {first}
     rival = made(evidence, "contact_friction", other, 500.0 * EVEN)
     assert set(naming_of(chosen, [rival], base()).covariates) == {first, other}
-
-
-@pytest.mark.parametrize(("advantage", "kept"), [(20.0, True), (25.0, False)])
-def test_a_mechanism_remains_unless_it_is_worse_by_more_than_chance(
-    evidence: Evidence, advantage: float, kept: bool
-) -> None:
-    chosen = made(evidence, "contact_friction", "elapsed_time", 500.0 * EVEN)
-    rival = made(evidence, "pressure_spread", "elapsed_time", (500.0 - advantage) * EVEN + UNEVEN)
-    found = naming_of(chosen, [rival], base())
-    assert found.mechanisms == (("contact_friction", "pressure_spread") if kept else ("contact_friction",))
 
 
 def test_rivals_are_the_best_first_and_each_once(evidence: Evidence) -> None:

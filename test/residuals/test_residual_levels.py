@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_up_traces import DRIFT, planted, pushes, slippery
-from search_bench import FEW, gate_of, in_library, search_with
+from search_bench import FEW, gate_of, search_with
 from synthetic import square_rig
 
 from push_predictor.models.push_model import PushModel
@@ -24,18 +24,8 @@ from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.gate import baseline_of
 from push_predictor.residuals.selection.search import SearchResult
 
+TRIED = FEW
 BLOCKS, ROWS = 20, 3  # a block
-
-
-@pytest.fixture(scope="module")
-def deployed() -> PushModel:
-    return train_model(pushes(120, 1), square_rig(), "analytical", name="deployed")
-
-
-@pytest.fixture
-def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Computing responses takes most of the time."""
-    in_library(monkeypatch, *FEW)
 
 
 def searched(model: PushModel, table: PushTable, names: list[str], alpha: float = 0.01) -> SearchResult:
@@ -58,7 +48,6 @@ def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_proje
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("a_library_of_three")
 def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(deployed: PushModel) -> None:
     """Twelve recordings of 40 pushes at level 0.2: if that is the rate, seven or more have a probability of 0.4 %."""
     count = 0
@@ -68,19 +57,14 @@ def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(
     assert count < 7
 
 
-@pytest.mark.usefixtures("a_library_of_three")
-def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushModel) -> None:
-    found = searched(deployed, pushes(60, 2, slippery(0.1)), ["elapsed_time", "slider_x"], alpha=0.004)
+@pytest.mark.parametrize(("count", "seed", "size"), [(60, 2, 0.1), (24, 2, 0.2), (24, 3, 0.2)])
+def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(
+    deployed: PushModel, count: int, seed: int, size: float
+) -> None:
+    """Against the gate's noise, which contains the effect, it would pass in one of five recordings of two dozen."""
+    found = searched(deployed, pushes(count, seed, slippery(size)), ["elapsed_time", "slider_x"], alpha=0.004)
     assert found.terms[0].best.label == ("contact_friction", "elapsed_time")
     assert found.terms[0].p_value < 0.002
-
-
-@pytest.mark.usefixtures("a_library_of_three")
-def test_an_obvious_effect_in_two_dozen_pushes_is_found(deployed: PushModel) -> None:
-    """Against the gate's noise, which contains the effect, it would pass in one of five such recordings."""
-    for seed in (2, 3):
-        found = searched(deployed, pushes(24, seed, slippery(0.2)), ["elapsed_time", "slider_x"], alpha=0.004)
-        assert found.terms[0].mechanism == "contact_friction"
 
 
 def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
@@ -92,7 +76,6 @@ def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
     assert not searched(deployed, replace(table, covariates=covariates, outcomes=outcomes), ["topic:/odd"]).terms
 
 
-@pytest.mark.usefixtures("a_library_of_three")
 @pytest.mark.parametrize("before, session", [(0.0, True), (-0.12, False)])
 def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
     always = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), -0.12)

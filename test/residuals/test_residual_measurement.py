@@ -82,24 +82,17 @@ def judged(table: PushTable, baseline: PushTable | None) -> ChannelFinding:
     return finding
 
 
-def assert_found(finding: ChannelFinding, mechanism: str, values: tuple[float, ...]) -> None:
-    strongest = finding.effects[0]
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mechanism", "values", "compared"),
+    [*((*planted, True) for planted in PLANTED), *((*planted, False) for planted in PLANTED[1:])],
+)
+def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, ...], compared: bool) -> None:
+    """So small a lag as the first needs more pushes than these, or those of training."""
+    strongest = judged(with_error(mechanism, values), training() if compared else None).effects[0]
     assert strongest.mechanism == mechanism
     assert np.allclose(strongest.values, values, atol=UNIT[mechanism])
     assert all(parameter.low < parameter.value < parameter.high for parameter in strongest.parameters)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("mechanism", "values"), PLANTED)
-def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, ...]) -> None:
-    assert_found(judged(with_error(mechanism, values), training()), mechanism, values)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("mechanism", "values"), PLANTED[1:])
-def test_planted_error_is_found_without_training_windows(mechanism: str, values: tuple[float, ...]) -> None:
-    """A shift of half a millimetre needs more pushes than these."""
-    assert_found(judged(with_error(mechanism, values), None), mechanism, values)
 
 
 @pytest.mark.slow
@@ -143,10 +136,6 @@ def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
     assert judged(worn, training()).effects == ()
 
 
-def test_error_below_the_tracker_noise_is_not_reported() -> None:
-    assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).effects == ()
-
-
 def test_error_that_is_certain_but_smaller_than_the_noise_of_a_window_is_not_reported() -> None:
     table = concatenate([replace(clean(2), push_id=np.char.add(f"{k}-", clean(2).push_id)) for k in range(6)])
     response = gap_responses(table, RIG.outline)["frame_shift"][:, 0]
@@ -168,12 +157,6 @@ def test_contacts_close_to_a_corner_are_not_judged_and_a_smooth_outline_has_none
     around = _geometry(table, shape_outline("ellip2"))  # three waves along the outline, rather than a line
     waves = np.cos(6.0 * np.pi * table.inputs[:, 1])
     np.testing.assert_allclose(around @ np.linalg.lstsq(around, waves, rcond=None)[0], waves, atol=1e-9)
-
-
-def test_reports_every_candidate_tested() -> None:
-    tested = {t.mechanism: t.p_value for t in judged(clean(2), training()).tested}
-    assert set(tested) == {"clock_offset", "frame_rotation", "frame_shift"}
-    assert all(0.0 < p <= 1.0 for p in tested.values())
 
 
 def test_windows_without_a_gap_give_no_finding() -> None:
@@ -209,11 +192,6 @@ def test_clock_response_is_zero_in_the_first_window() -> None:
     lag = gap_responses(table, RIG.outline)["clock_offset"][:, 0]
     assert np.all(lag[first] == 0.0)
     assert np.allclose(lag[~first], -(table.inputs[:, 0] * np.cos(table.inputs[:, 2]))[~first])
-
-
-def test_rejects_unknown_mechanism() -> None:
-    with pytest.raises(KeyError):
-        correct(recorded(2), "contact_friction", (0.1,))
 
 
 # --- corrections ------------------------------------------------------------------------------------------------------

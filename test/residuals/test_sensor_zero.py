@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import NOTHING_FOUND, ChannelEffect
 from push_predictor.residuals.channels.sensor_zero import BETWEEN_SESSIONS, zero_shift
-from push_predictor.residuals.evidence.drivers import screening_bases
+from push_predictor.residuals.evidence.standardised import FEWEST_PUSHES
 from push_predictor.types import Array
 
 PUSHES, WINDOWS = 150, 3  # per push
@@ -74,6 +74,12 @@ def test_bias_from_a_push_on_is_found_as_a_step_with_its_size() -> None:
             assert size.low < truth < size.high and size.high - size.low < 0.03
 
 
+def test_a_step_may_have_no_more_than_the_fewest_pushes_behind_it() -> None:
+    bias = np.where(np.arange(25)[:, None] >= 25 - FEWEST_PUSHES, (0.0, 0.5), 0.0)
+    shift = found(reading(bias), None)
+    assert (shift.basis, shift.parameters[1].value) == ("step", pytest.approx(0.5))
+
+
 def test_smallest_bias_that_is_found_is_as_documented() -> None:
     """In docs/reference/trace.md, at a level of 0.001."""
     sound = reading(np.zeros((PUSHES, 2)))
@@ -122,7 +128,3 @@ def test_a_change_is_an_effect_up_to_the_level_and_a_candidate_beyond() -> None:
         finding = zero_shift(biased, sound, level)
         assert len(finding.effects) == count
         assert [(t.mechanism, t.covariate) for t in finding.tested] == [("wrench_bias", "session")]
-
-
-def test_zero_is_not_tried_as_a_cause() -> None:
-    assert {name for name, _ in screening_bases(made(1))} == {"push_index"}

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,24 +26,20 @@ from push_predictor.residuals.outcome import Trace, trace_json
 from push_predictor.residuals.reporting.sentences import answer
 from push_predictor.residuals.trace import trace, trace_data
 
+TRIED = ("contact_friction", "pressure_spread")
 LATE = Finding("wrench_lag", "warning", "The force is late.", "Synchronise.", {"lag": Value(0.12, "s", 0.002)})
 
 
-@cache
-def deployed() -> PushModel:
-    return train_model(pushes(60, 1), square_rig(), "analytical", name="deployed")
-
-
-def traced(clocks: Sequence[Finding], changed: bool) -> Trace:
+def with_clocks(model: PushModel, clocks: Sequence[Finding], changed: bool) -> Trace:
     table = pushes(60, 2, *([slippery(0.1)] * changed))
     table = replace(table, covariates={"elapsed_time": np.arange(float(len(table)))} | table.covariates)
     loaded = LoadedData(table, None, square_rig())
-    return trace(deployed(), loaded, covariates=["elapsed_time"], clocks=clocks)
+    return trace(model, loaded, covariates=["elapsed_time"], clocks=clocks)
 
 
-def test_an_effect_extends_the_model_only_if_the_clocks_are_right() -> None:
-    assert traced((), True).extended is not None
-    off = traced((LATE,), True)
+def test_an_effect_extends_the_model_only_if_the_clocks_are_right(deployed: PushModel) -> None:
+    assert with_clocks(deployed, (), True).extended is not None
+    off = with_clocks(deployed, (LATE,), True)
     assert (off.verdict, off.extended, off.terms) == ("measurement", None, ())
     assert not trace_json(off)["motion_model_changed"]
     (effect,) = off.effects
@@ -56,8 +51,8 @@ def test_an_effect_extends_the_model_only_if_the_clocks_are_right() -> None:
     )
 
 
-def test_without_an_effect_a_clock_that_is_off_is_a_note() -> None:
-    sound, off = traced((), False), traced((LATE,), False)
+def test_without_an_effect_a_clock_that_is_off_is_a_note(deployed: PushModel) -> None:
+    sound, off = with_clocks(deployed, (), False), with_clocks(deployed, (LATE,), False)
     assert sound.verdict == off.verdict != "measurement"
     assert set(off.notes) - set(sound.notes) and not set(sound.notes) - set(off.notes)
 

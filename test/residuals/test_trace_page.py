@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a reader of a trace sees: the answer in three sentences, pictures, folded tables, no raw values."""
+"""What a reader of a trace sees: the answer in three sentences, pictures and their numbers, folded tables."""
 
 from __future__ import annotations
 
@@ -15,15 +15,39 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_up_traces import LATE, TRACES, shifted, trace_of, without_motion_effect
+from made_up_traces import (
+    JUMP,
+    LATE,
+    TRACES,
+    made_up_trace,
+    planted,
+    pushes,
+    shifted,
+    slippery,
+    trace_of,
+    traced,
+    without_motion_effect,
+)
 
 from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.push_scores import push_means
 from push_predictor.models.effects.covariates import UNITS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
+from push_predictor.recordings.table import PushTable
+from push_predictor.reporting.chart import Bars, Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.measurement import CORRECTIONS
 from push_predictor.residuals.outcome import Sized, Trace, best_of, trace_json
+from push_predictor.residuals.reporting.figures.driver_basis import (
+    analysis_rows,
+    basis_charts,
+    per_push,
+    responses,
+    strength_of,
+)
+from push_predictor.residuals.reporting.figures.gallery import effect_figures
+from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, error_charts, gap_chart, means_along
 from push_predictor.residuals.reporting.page import role_of, write_trace_report
 from push_predictor.residuals.reporting.phrases import COVARIATES, OTHERS, interval, shift_size
 from push_predictor.residuals.reporting.sentences import answer, evidence, separating_words, summary_lines, worth
@@ -104,6 +128,7 @@ def test_page_begins_with_three_plain_sentences_shows_no_raw_values_and_folds_it
         ("two effects", "with elapsed time, and 1 further change was found", r"\(95 % CI", "^Use the extended model"),
         ("mechanism_only", "^Contact friction changes with elapsed time", r"\(95 % CI",
          r"^Use the extended model, and vary elapsed time and push count independently: these pushes do not"),
+        ("category", r"^Contact friction differs by side pushed\.$", "^It shifts a window by", ""),
         ("driver_only", "^Weak evidence: .* no known mechanism fits",
          r"^It shifts a window by 0\.\d+ mm and 0\.\d+ deg\.$",
          "^Keep the deployed model"),
@@ -193,7 +218,7 @@ def test_size_is_first_in_mm_and_deg_then_lower_or_higher() -> None:
     mm, deg = 1e3 * metres, np.degrees(radians)
     shift = f"It shifts a window by {mm:.2g} mm and {deg:.2g} deg: contact friction 0.21 lower"
     assert answer(found)[1] == f"{shift} (95 % CI 0.17 to 0.25)."
-    assert f"{shift} (95 % CI 0.17 to 0.25, p = 0.001)." in evidence(found)
+    assert f"{shift} (95 % CI 0.17 to 0.25, p = 0.001). It explains 23 % of" in evidence(found)
 
 
 def test_harmless_bias_reaches_json_and_is_no_candidate() -> None:
@@ -247,50 +272,57 @@ def test_key_picture_names_single_pushes(pages: Callable[[str], str], name: str)
     assert names <= pushes and len(names) > 0.5 * len(pushes)
 
 
-def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
+def with_columns(table: PushTable, **columns: Any) -> PushTable:
+    return replace(table, covariates={**table.covariates, **columns})
+
+
+def since_training() -> Trace:
+    """A change since training, with which no model is extended."""
     trace = trace_of("constant")
     (effect,), (term,) = trace.effects, trace.terms
-    since = DriverBasis("step", ("session",), place=0.5)
-
-    def later(table: Any) -> Any:
-        return replace(table, covariates={**table.covariates, "session": np.ones(len(table))})
-
-    changed = replace(
-        trace,
-        effects=(replace(effect, covariate="session", basis="step"),),
-        terms=(replace(term, covariate="session", basis=since),),
-        analysis=later(trace.analysis),
-        held_out=replace(trace.held_out, table=later(trace.held_out.table)),
-        extended=None,
-    )
-    page = write_trace_report(tmp_path / "trace.html", changed).read_text()
-    assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."  # nothing was extended
-    key = page[page.index("<svg") : page.index("<h2")]
-    assert "Elapsed time (s)" in key and key.count('class="dot push"') > 50
+    analysis, held = (with_columns(t, session=np.ones(len(t))) for t in (trace.analysis, trace.held_out.table))
+    since = replace(term, covariate="session", basis=DriverBasis("step", ("session",), place=0.5))
+    named = replace(effect, covariate="session", basis="step")
+    held_out = replace(trace.held_out, table=held)
+    return replace(trace, effects=(named,), terms=(since,), analysis=analysis, held_out=held_out, extended=None)
 
 
-def test_force_is_compared_with_that_in_training(tmp_path: Path) -> None:
+def pushed_harder() -> Trace:
     trace = trace_of("wrench_only")
-
-    def loaded(table: Any, force: float) -> Any:
-        return replace(table, covariates={**table.covariates, "normal_force": np.full(len(table), force)})
-
-    model = replace(trace.model, training=loaded(trace.model.training, 1.0))
-    known = replace(trace, model=model, analysis=loaded(trace.analysis, 1.2))
-    page = write_trace_report(tmp_path / "trace.html", known).read_text()
-    key = page[page.index("<svg") : page.index("<h2")]
-    assert "Normal force (N)" in key and "median in training" in key and ": 1.2 N<" in key
+    training, analysis = (
+        with_columns(t, normal_force=np.full(len(t), force))
+        for t, force in ((trace.model.training, 1.0), (trace.analysis, 1.2))
+    )
+    return replace(trace, model=replace(trace.model, training=training), analysis=analysis)
 
 
-def test_measured_gap_is_drawn_against_the_gap_that_the_error_causes(tmp_path: Path) -> None:
+def late() -> Trace:
     trace = trace_of("measurement")
-    table = trace.analysis
-    speed = table.inputs[:, 0] * np.cos(table.inputs[:, 2])
-    gaps = replace(table, covariates={**table.covariates, "contact_gap": -0.012 * speed})
-    page = write_trace_report(tmp_path / "trace.html", replace(trace, analysis=gaps)).read_text()
+    gap = -0.012 * trace.analysis.inputs[:, 0] * np.cos(trace.analysis.inputs[:, 2])
+    return replace(trace, analysis=with_columns(trace.analysis, contact_gap=gap))
+
+
+@pytest.mark.parametrize(
+    ("trace", "shown"),
+    [
+        (since_training, ["Elapsed time (s)", 'class="dot push"']),
+        (pushed_harder, ["Normal force (N)", "median in training", ": 1.2 N<"]),
+        (late, ["Gap that the error causes", "Measured gap at the contact (mm)", "as the error predicts"]),
+    ],
+)
+def test_key_picture_shows_what_the_finding_is_about(
+    tmp_path: Path, trace: Callable[[], Trace], shown: list[str]
+) -> None:
+    page = write_trace_report(tmp_path / "trace.html", trace()).read_text()
     key = page[page.index("<svg") : page.index("<h2")]
-    assert "Gap that the error causes" in key and "Measured gap at the contact (mm)" in key
-    assert "as the error predicts" in key
+    assert all(words in key for words in shown)
+    if trace is late:  # which the gap follows exactly
+        chart = gap_chart(late())
+        assert chart is not None
+        dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
+        np.testing.assert_allclose(dots.x, dots.y, atol=1e-9)
+    if trace is since_training:
+        assert sentences_of(page)[0] == "Weak evidence: contact friction differs from the model."
 
 
 def test_held_out_section_shows_errors_before_and_after_and_scores_with_intervals(pages: Callable[[str], str]) -> None:
@@ -305,12 +337,6 @@ def test_input_shift_beside_another_verdict_is_a_warning(tmp_path: Path) -> None
     page = write_trace_report(tmp_path / "trace.html", shifted(trace_of("effect"), "effect")).read_text()
     warning = re.search(r'<p class="warning">(.*?)</p>', page)
     assert warning and warning[1].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
-
-
-@pytest.mark.parametrize("name", ["none", "effect", "input_shift"])
-def test_terminal_begins_with_the_sentences_of_the_page(name: str) -> None:
-    trace = trace_of(name)
-    assert summary_lines(trace)[:4] == [*(sentence.replace("−", "-") for sentence in answer(trace)), ""]
 
 
 def test_json_lists_the_input_shift() -> None:
@@ -367,13 +393,6 @@ def test_page_escapes_names_from_the_data(tmp_path: Path, nothing: Trace) -> Non
 # --- sentences -------------------------------------------------------------------------------------------------------
 
 
-def test_verdict_starts_with_the_answer_then_size_and_interval(drift: Trace) -> None:
-    verdict = evidence(drift)
-    assert verdict.startswith("Contact friction changes with elapsed time. It shifts a window by 0.")
-    assert re.search(r" is 0\.0\d+ \(95 % CI 0\.0\d+ to 0\.0\d+, p = 0\.001\)\. It explains 23 % of", verdict)
-    assert max(len(sentence.split()) for sentence in re.split(r"[.;:] ", verdict)) <= 25
-
-
 def test_every_mechanism_and_covariate_has_a_phrase() -> None:
     assert {*CORRECTIONS, "surface_friction"} <= {*OTHERS}
     assert set(UNITS) <= set(COVARIATES)
@@ -382,14 +401,11 @@ def test_every_mechanism_and_covariate_has_a_phrase() -> None:
     assert all(phrases) and not any("_" in phrase for phrase in phrases)
 
 
-def test_no_number_is_minus_zero() -> None:
-    assert interval(Estimate(-8.0, -13.0, -0.2)) == "−8 (95 % CI −13 to 0)"
-
-
-def test_intervals_show_the_digits_that_they_determine() -> None:
+def test_intervals_show_the_digits_that_they_determine_and_no_minus_zero() -> None:
     assert interval(Estimate(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
     assert interval(Estimate(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
     assert interval(Estimate(0.5, float("nan"), float("nan"))) == "0.5"
+    assert interval(Estimate(-8.0, -13.0, -0.2)) == "−8 (95 % CI −13 to 0)"
 
 
 def test_advice_matches_the_rivals() -> None:
@@ -408,6 +424,103 @@ def test_tested_candidates_are_unique_pairs_with_smallest_p_and_role(drift: Trac
     assert roles["pressure_spread", "push_index"] == ""
 
 
-def test_repr_states_verdict_effects_and_whether_the_model_is_extended(drift: Trace) -> None:
+def test_repr_and_terminal_state_the_answer(drift: Trace) -> None:
+    for trace in map(trace_of, ("none", "effect", "input_shift")):
+        assert summary_lines(trace)[:4] == [*(sentence.replace("−", "-") for sentence in answer(trace)), ""]
     assert repr(drift) == "Trace of 'deployed': mechanism_only (contact_friction by elapsed_time), model extended"
     assert repr(trace_of("none")) == "Trace of 'deployed': none (no effect), model unchanged"
+
+
+# --- trace figures ----------------------------------------------------------------------------------------------------
+
+
+def test_key_chart_shows_the_step_of_the_effect() -> None:
+    trace = trace_of("effect")
+    (chart,) = basis_charts(trace, strength_of(trace.terms[0]), analysis_rows(trace))
+    dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
+    before, after = dots.x < JUMP.place, dots.x > JUMP.place
+    assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
+
+
+def test_effect_is_drawn_once_with_all_its_parameters() -> None:
+    """The key picture shows the first effect's only parameter, and the noise along the covariate if it is unknown."""
+    along = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+    grain = made_up_trace(slippery(0.06), planted("anisotropic_friction", "elapsed_time", along, 0.1, 0.05))
+    (figure,) = effect_figures(grain)
+    assert figure.count('<svg class="chart') == 2
+    assert "irection-dependent friction of the table against elapsed time (linear)" in figure
+    assert effect_figures(trace_of("effect")) == [] == effect_figures(trace_of("driver_only"))
+
+
+def test_held_out_errors_are_shown_for_each_push_before_and_after() -> None:
+    trace = trace_of("effect")
+    shown = trace.comparisons
+    position, heading = error_charts(trace.held_out.table, "elapsed_time", [shown[0], shown[-1]])
+    for chart in (position, heading):
+        before, after = (mark for mark in chart.marks if isinstance(mark, Dots))
+        assert len(before.x) == len(after.x) == len(trace.held_out.table.pushes)
+        late = before.x > JUMP.place
+        assert np.mean(before.y[late]) > 1.3 * np.mean(after.y[late])
+    error = 1e3 * (shown[0].observed - shown[0].mean)[:, :2]
+    square = [np.mean(np.sum(error[shown[0].push_id == push] ** 2, axis=1)) for push in np.unique(shown[0].push_id)]
+    dots = next(mark for mark in position.marks if isinstance(mark, Dots))
+    np.testing.assert_allclose(dots.y, np.sqrt(square))
+
+
+def test_levels_of_a_covariate_are_bins_of_their_own() -> None:
+    rng = np.random.default_rng(0)
+    speed = np.repeat([0.01, 0.02, 0.05], [30, 90, 30]) + 1e-4 * rng.standard_normal(150)
+    bins = bins_along(speed, 10)
+    assert [len(np.unique(bins[part])) for part in (slice(0, 30), slice(30, 120), slice(120, 150))] == [1, 1, 1]
+    assert len(np.unique(bins)) == 3 and len(np.unique(bins_along(rng.random(500), 10))) == 10
+
+
+def test_bins_have_the_mean_and_an_interval_around_it() -> None:
+    table = pushes(80, 4)
+    bins = means_along(axis_of(table, "elapsed_time"), table.push_id, table.covariates["elapsed_time"])
+    np.testing.assert_allclose(bins.place, bins.value)
+    assert len(bins.place) == 10
+    assert np.all((bins.low <= bins.value) & (bins.value <= bins.high))
+    bars = bins.bars("before", "s", "pushes, in bins")
+    assert bars.y is bins.value and bars.low is bins.low and bars.high is bins.high and " s (95 % CI " in bars.titles[0]
+
+
+def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:
+    table = pushes(10, 4)
+    assert axis_of(table, "model_inputs").label == "Elapsed time (s)"
+    assert axis_of(replace(table, covariates={}), "model_inputs").label == "Push count"
+    assert axis_of(table, "slider_heading").x.max() > 10.0  # degrees
+
+
+def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
+    """A step, fitted by a line: the bins stay on the step."""
+    trace = trace_of("effect")
+    line = traced(trace.model, trace.analysis, trace.held_out.table, (slippery(0.1),))
+    (chart,) = basis_charts(line, strength_of(line.terms[0]), analysis_rows(line))
+    bins = next(mark for mark in chart.marks if isinstance(mark, Bars))
+    before, after = bins.y[bins.x < 600.0], bins.y[bins.x > 650.0]
+    assert after.mean() - before.mean() == pytest.approx(0.15, abs=0.04)
+    assert abs(before[-1] - before[0]) < 0.4 * 0.15
+
+
+def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
+    strength = strength_of(drift.terms[0])
+    _, half = strength.curve({"elapsed_time": np.array([500.0, 800.0])}, 2)
+    np.testing.assert_allclose(half[:, 0], [0.0, 1.96 * np.sqrt(drift.terms[0].covariance[0, 0])], rtol=1e-12)
+
+
+def test_single_pushes_have_the_curve_as_median(drift: Trace) -> None:
+    strength, rows = strength_of(drift.terms[0]), analysis_rows(drift)
+    value = per_push(strength, rows, responses(drift, strength, rows))
+    place = push_means(rows.table.push_id, rows.table.covariates["elapsed_time"])[1]
+    assert len(value) == len(drift.analysis.pushes)
+    off = value[:, 0] - strength.curve({"elapsed_time": place}, len(place))[0][:, 0]
+    assert abs(np.nanmedian(off)) < 0.02
+
+
+def test_shift_is_that_of_the_windows(drift: Trace) -> None:
+    twice = replace(drift.terms[0], coefficients=2.0 * drift.terms[0].coefficients)
+    (metres, radians), larger = shift_size(drift, drift.terms[0]), shift_size(drift, twice)
+    assert larger == pytest.approx((2.0 * metres, 2.0 * radians), rel=0.2)
+    observed = drift.held_out.before.observed
+    assert 0.0 < metres < 0.5 * np.hypot(*np.sqrt(np.mean(observed[:, :2] ** 2, axis=0)))

@@ -209,27 +209,21 @@ def test_zero_of_the_sensor_is_only_noted_next_to_another_change(
     assert any("+0.5 N along x" in note and words in note for note in traced.notes)
 
 
-@pytest.mark.parametrize(("moved", "verdict"), [(0.0, "none"), (1e-3, "measurement")])
-def test_force_bias_is_a_measurement_error_only_if_its_correction_changes_the_windows(
-    monkeypatch: pytest.MonkeyPatch, moved: float, verdict: str
+@pytest.mark.parametrize(
+    ("moved", "share", "verdict"),
+    [(0.0, 1.0, "none"), (1e-3, 1.0, "measurement"), (1e-9, 0.01, "none"), (1e-9, 0.05, "measurement")],
+)
+def test_force_bias_is_a_measurement_error_if_its_correction_changes_two_per_cent_of_the_windows(
+    monkeypatch: pytest.MonkeyPatch, moved: float, share: float, verdict: str
 ) -> None:
-    """moved: by what the correction of the force would change the inputs of the windows, rad."""
+    """moved: by what the correction of the force would change the inputs of this share of the windows, rad."""
     found_by_channel(monkeypatch, zero=pulled())
-    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(moved))
+    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(moved, share))
     result = trace_json(trace(learnt(), faultless()))
     harmful = verdict == "measurement"
     assert (result["verdict"], result["channel"], result["motion_model_changed"]) == (verdict, verdict, False)
     assert [effect["mechanism"] for effect in result["effects"]] == ["wrench_bias"] * 2 * harmful
     assert [each["mechanism"] for each in result["harmless"]] == ["wrench_bias"] * 2 * (not harmful)
-
-
-@pytest.mark.parametrize(("share", "harmful"), [(0.01, False), (0.05, True)])
-def test_correction_of_the_force_does_harm_from_two_per_cent_of_the_windows(
-    monkeypatch: pytest.MonkeyPatch, share: float, harmful: bool
-) -> None:
-    found_by_channel(monkeypatch, zero=pulled())
-    monkeypatch.setattr("push_predictor.residuals.channel_search.cut_again", turned(1e-9, share))
-    assert (trace(learnt(), faultless()).verdict == "measurement") == harmful
 
 
 def test_force_bias_of_a_push_table_is_harmless_for_nothing_can_be_corrected(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -287,6 +281,9 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
 def test_a_covariate_that_varies_along_a_push_is_rejected_by_name() -> None:
     with pytest.raises(RequestError, match=r"contact_gap.*give one of .*elapsed_time"):
         Question.of(learnt(), faultless(), covariates=["contact_gap"])
+    for alpha in (0.0, 1.0):
+        with pytest.raises(RequestError, match=f"alpha: {alpha}"):
+            Question.of(learnt(), faultless(), alpha=alpha)
 
 
 @pytest.mark.usefixtures("a_library_of_four")
