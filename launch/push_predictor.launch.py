@@ -18,7 +18,15 @@ from typing import Any
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from push_predictor.nodes.launch_files import SWITCH, TOPICS, description, end_launch, is_true, stream_arguments
+from push_predictor.nodes.launch_files import (
+    SWITCH,
+    TOPICS,
+    description,
+    end_launch,
+    is_true,
+    require_package,
+    stream_arguments,
+)
 from push_predictor.nodes.parameter_tables import PUSH_REPLAY, PUSH_VALIDATOR
 from push_predictor.nodes.parameters import Param
 from push_predictor.resources import DEFAULT_MODEL, SHIPPED
@@ -67,6 +75,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
             _node("push_replay", "push_replay", given, _replay(given, recording), finished, _replay_defaults(given))
         )
     if is_true(given["rviz"]):
+        require_package("rviz2", "rviz:=true")
         nodes.append(_rviz(given))
     return nodes
 

@@ -50,8 +50,14 @@ def one_blas_thread() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def _libraries() -> list[LibController]:
-    """The BLAS libraries of numpy and scipy. To find them takes a thousand times as long as to limit them."""
-    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
-    from threadpoolctl import ThreadpoolController
+    """The BLAS libraries of numpy and scipy, none without threadpoolctl.
 
+    To find them takes a thousand times as long as to limit them.
+    """
+    import scipy.linalg  # noqa: F401 (its BLAS must be limited too, and would be loaded later)
+
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:  # on a robot, whose nodes are limited by `limit_process`
+        return []
     return [library for library in ThreadpoolController().lib_controllers if library.user_api == "blas"]

@@ -19,7 +19,8 @@ from push_predictor.commands.common.progress import progress
 from push_predictor.compiled import REMEDY
 from push_predictor.errors import PushPredictorError
 
-REQUIRED = ("numpy", "scipy", "mcap", "lz4", "zstandard", "yaml", "threadpoolctl")
+REQUIRED = ("numpy", "scipy", "mcap", "lz4", "zstandard", "yaml")
+OPTIONAL = {"threadpoolctl": "a program that imports numpy first uses many threads for small matrices, slowly"}
 COMPILED = (
     "geometry.boundary",
     "models.mechanics.kernel.surface",
@@ -121,7 +122,14 @@ def _compiled() -> str:
 
 def _packages() -> str:
     modules = [importlib.import_module(name) for name in REQUIRED]
-    return ", ".join(f"{module.__name__} {getattr(module, '__version__', '')}".rstrip() for module in modules)
+    notes = []
+    for name, without in OPTIONAL.items():
+        try:
+            modules.append(importlib.import_module(name))
+        except ImportError:
+            notes.append(f"without {name} {without}")
+    versions = [f"{module.__name__} {getattr(module, '__version__', '')}".rstrip() for module in modules]
+    return "; ".join([", ".join(versions), *notes])
 
 
 def _checked(name: str, check: Callable[[], str], remedy: str) -> Finding:

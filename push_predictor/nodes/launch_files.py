@@ -45,6 +45,17 @@ def description(
     return LaunchDescription([*declared, limited, OpaqueFunction(function=nodes)])
 
 
+def require_package(name: str, argument: str) -> None:
+    """Raise RuntimeError that names the apt package if a package that an argument needs is not installed."""
+    from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+    try:
+        get_package_prefix(name)
+    except (PackageNotFoundError, OSError):  # OSError: AMENT_PREFIX_PATH is not set
+        apt = f"ros-jazzy-{name.replace('_', '-')}"
+        raise RuntimeError(f"{argument} needs {name}, which is not installed: sudo apt install {apt}") from None
+
+
 def is_true(text: str) -> bool:
     """Whether a switch is on."""
     return text.lower() == "true"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any, TypeAlias
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -68,9 +69,14 @@ class Param:
 def declare(node: Node, params: Sequence[Param]) -> None:
     """Declare all rows. Check values given at start now, and later changes when they are made.
 
-    Raises RequestError that names the parameter, its value and what is accepted.
+    What is given and no row takes gets a warning. Raises RequestError that names the parameter, its value and what is
+    accepted.
     """
     table = {param.name: param for param in params}
+    for name in getattr(node, "_parameter_overrides", {}):  # rclpy has no public name for them
+        if name not in table and not node.has_parameter(name) and not name.startswith("qos_overrides."):
+            (nearest,) = get_close_matches(name, table, 1, cutoff=0.0)
+            node.get_logger().warning(f"parameter {name!r} is unknown and ignored; the nearest name is {nearest!r}")
     for param in params:
         given = given_value(node, param.name)
         if given is not None and not param.allows(given):

@@ -25,6 +25,7 @@ from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
 from msg_adapters.diagnostics import diagnostic_array, diagnostic_status, level_of
@@ -78,7 +79,7 @@ class PushReplay(Node):
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.publishers))
         self._status = self.create_publisher(ReplayStatus, "replay_status", LATCHED)
-        self._clock_publisher = self.create_publisher(Clock, "/clock", KEPT if self._topics.untimed else CLOCK)
+        self._clock_publisher = self._open_clock()
         self._rig = self.create_publisher(PushRig, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
@@ -118,6 +119,13 @@ class PushReplay(Node):
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")
         return topics
+
+    def _open_clock(self) -> Publisher | None:
+        """The publisher of /clock, only if it will be published, as by rosbag2."""
+        asked = [self._values[f"play.clock_publish_{when}"] for when in ("frequency", "on_topic_publish")]
+        if not any(asked) and not self._topics.untimed:
+            return None
+        return self.create_publisher(Clock, "/clock", KEPT if self._topics.untimed else CLOCK)
 
     def _publish_rig(self, bag: Bag) -> str:
         """Publish the given rig, or the recorded one; returns what is wrong with that, empty if nothing."""
@@ -229,7 +237,8 @@ class PushReplay(Node):
             self._player.report_time(self._publish_clock)
 
     def _publish_clock(self, recorded: int) -> None:
-        self._clock_publisher.publish(b"\0\1\0\0" + struct.pack("<iI", *divmod(recorded, SECOND)))
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(b"\0\1\0\0" + struct.pack("<iI", *divmod(recorded, SECOND)))
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from pathlib import Path
 
 import pytest
 from ros_harness import REPOSITORY, free_domain, node_environment
 
+from push_predictor import blas_threads
 from push_predictor.cli import main
 from push_predictor.commands import doctor_command
 from push_predictor.commands.doctor_command import compiled_modules, ros_node
@@ -95,3 +97,23 @@ def test_module_that_is_not_compiled_is_named_with_the_command(monkeypatch: pyte
     gone = compiled_modules()
     assert gone.state == "missing" and "No module named 'push_predictor.no_such_module'" in gone.found
     assert "`pip install -e .`" in gone.remedy and "colcon" in gone.remedy
+
+
+def test_without_threadpoolctl_all_else_works_and_is_noted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "threadpoolctl", None)
+    monkeypatch.setitem(blas_threads._process, "limited", False)
+    blas_threads._libraries.cache_clear()
+    try:
+        assert main(["doctor"]) == 0
+    finally:
+        blas_threads._libraries.cache_clear()
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "packages" in line)
+    assert (
+        line.startswith("ok")
+        and "yaml" in line
+        and line.endswith(
+            "; without threadpoolctl a program that imports numpy first uses many threads for small matrices, slowly"
+        )
+    )

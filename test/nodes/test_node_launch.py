@@ -169,7 +169,24 @@ def test_executables_are_installed_under_their_node_names_and_run_in_their_encla
     assert {node["arguments"][-1] for node in running.values()} == {e.attrib["path"] for e in policy.iter("enclave")}
 
 
-def test_rviz_is_optional_and_uses_the_installed_configuration() -> None:
+@pytest.fixture
+def rviz_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = tmp_path / "share" / "ament_index" / "resource_index" / "packages" / "rviz2"
+    entry.parent.mkdir(parents=True)
+    entry.touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+
+
+def test_rviz_that_is_not_installed_is_named_with_its_apt_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    for prefixes in ("/nowhere", ""):
+        monkeypatch.setenv("AMENT_PREFIX_PATH", prefixes)
+        message = "rviz:=true needs rviz2, which is not installed: sudo apt install ros-jazzy-rviz2"
+        with pytest.raises(RuntimeError, match=message):
+            nodes(rviz="true")
+        assert "rviz2" not in nodes()
+
+
+def test_rviz_is_optional_and_uses_the_installed_configuration(rviz_installed: None) -> None:
     rviz = nodes(rviz="true", namespace="cell", use_sim_time="true")["rviz2"]
     assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
     flag, config = rviz["arguments"]
@@ -200,7 +217,7 @@ def test_nodes_that_end_on_a_signal_of_the_launch_have_not_failed(status: int) -
     assert end_launch()(*exited(status, is_shutdown=True)) is None
 
 
-def test_the_end_of_a_node_ends_the_launch_unless_the_others_go_on_without_it() -> None:
+def test_the_end_of_a_node_ends_the_launch_unless_the_others_go_on_without_it(rviz_installed: None) -> None:
     found = nodes(recording="b", rviz="true") | nodes("record", bag="b")
     assert "on_exit" not in found.pop("rviz2"), "its window may be closed"
     assert found.pop("push_replay")["on_exit"](*exited(0)) is None

@@ -167,6 +167,7 @@ def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
         assert wait_until(lambda: client.received == len(push_messages(1.0)))
         assert time.monotonic() - begin > 0.99  # from before the first message to after the last
         report = client.report("finished")
+        assert not client.clock and client.node.count_publishers("/clock") == 0, "only if it is asked for"
     assert report["published"] == str(len(push_messages(1.0)))
     assert report["lost"] == "0"
     p50, p99, largest = (float(report[f"late_{figure}_us"]) for figure in ("p50", "p99", "max"))

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hosted_nodes import refused_start
+from hosted_nodes import hosted_node, refused_start
 from replay_bags import push_messages, write_bag
+from ros_harness import free_domain
 
 from push_predictor.nodes import runtime
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER, PUSH_REPLAY, PUSH_VALIDATOR
@@ -81,3 +82,27 @@ def test_topics_are_filtered_as_rosbag2_does(given: dict[str, Any], played: str)
     values = {f"play.{name}": value for name, value in {**none, **given}.items()}
     topics = {"slider": "/slider/pose", "pusher": "/pusher/pose", "wrench": "/pusher/wrench"}
     assert [name for name, topic in topics.items() if is_played(topic, values)] == played.split()
+
+
+@pytest.mark.parametrize(
+    ("executable", "wanted", "nearest"),
+    [
+        ("predict_server", {"modls": [""]}, "models"),
+        ("push_recorder", {"slyder_topc": "a", "covariate_topics": []}, "slider_topic"),
+        ("push_validator", {"slyder_topc": "a", "report": False}, "slider_topic"),
+    ],
+)
+def test_each_node_warns_once_of_a_parameter_that_it_does_not_know(
+    executable: str, wanted: dict[str, Any], nearest: str, tmp_path: Path
+) -> None:
+    given = {"qos_overrides./a.subscription.depth": 5, "use_sim_time": True, **wanted}
+    given |= {"bag": tmp_path / "bag"} if executable == "push_recorder" else {}
+    with hosted_node(executable, domain=free_domain(), params=given) as node:
+        found = [line.partition("parameter ")[2] for line in node.text().splitlines() if "is unknown and" in line]
+    (unknown,) = (name for name in wanted if name in ("modls", "slyder_topc"))
+    assert found == [f"{unknown!r} is unknown and ignored; the nearest name is {nearest!r}"]
+
+
+def test_a_rate_without_its_prefix_is_not_taken_in_silence(second: Path) -> None:
+    with hosted_node("push_replay", "-p", "rate:=10", domain=free_domain(), params={"recording": second}) as node:
+        node.wait_for_text("parameter 'rate' is unknown and ignored; the nearest name is 'play.rate'")

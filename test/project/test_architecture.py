@@ -11,6 +11,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from repository import REPOSITORY
@@ -162,3 +163,47 @@ def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
         "push_predictor.cli.build_parser()\n"
     )
     subprocess.run([sys.executable, "-c", forbidden + use], check=True, cwd=REPOSITORY)
+
+
+# --- the way of a message --------------------------------------------------------------------------------------------
+
+MADE_BY = {"Samples": ("StreamDecoder", "take")}  # a call that returns one need not name its class
+
+
+@cache
+def drawn() -> dict[str, Any]:
+    return runpy.run_path(str(REPOSITORY / "docs" / "pictures" / "draw_message.py"))
+
+
+@cache
+def names_in(path: Path) -> tuple[set[str], set[str]]:
+    """What a module defines at its top, and what its code names, without its imports."""
+    tree = ast.parse(path.read_text())
+    defined = {node.name for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+    named = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    named |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    named |= {made for made, by in MADE_BY.items() if {*by} <= named}
+    return defined, named
+
+
+@pytest.mark.parametrize("name", drawn()["BOXES"])
+def test_every_box_of_the_way_of_a_message_is_a_class_or_a_function(name: str) -> None:
+    assert any(name in names_in(path)[0] for room in ("recordings", "online", "nodes") for path in modules(room))
+
+
+@pytest.mark.parametrize(("one", "two"), drawn()["ARROWS"])
+def test_every_arrow_of_the_way_of_a_message_is_in_the_code(one: str, two: str) -> None:
+    """One uses the other, or a third module hands over from one to the other."""
+    assert any({one, two} <= set().union(*names_in(path)) for path in PACKAGE.rglob("*.py"))
+    assert drawn()["BOXES"][one][1] < drawn()["BOXES"][two][1], "it points down"
+
+
+def test_the_way_of_a_message_begins_at_a_bag_and_a_device_and_ends_at_the_table() -> None:
+    arrows = drawn()["ARROWS"]
+    begins, ends = {one for one, _ in arrows}, {two for _, two in arrows}
+    assert begins - ends == {"open_bag", "FollowingSubscription"} and "windows_to_table" in ends - begins
+    assert begins | ends == {*drawn()["BOXES"]}
+    for made, (maker, method) in MADE_BY.items():
+        assert f"def {method}(self, last: bool = False) -> {made}:" in next(
+            path.read_text() for path in PACKAGE.rglob("*.py") if maker in names_in(path)[0]
+        )

@@ -224,3 +224,32 @@ def test_reports_the_newest_stamps_without_taking_them() -> None:
     assert tip.recent(10).tolist() == every(4, 1064, 1101).tolist()
     assert len(tip) == waiting == 332, "they wait as before"
     assert len(tip.take()[0]) == 276 and len(tip) == 0
+
+
+@pytest.mark.parametrize("portion", [37, 5000])
+def test_a_frame_that_was_static_moves_once_it_is_on_tf(portion: int) -> None:
+    """Its static pose is one sample of it from then on, and not valid at all times."""
+    fine, coarse, lab = every(4, 0, 2001), every(20, 1000, 2001), Lab()
+    lab.transform("/tf_static", "world", "cart", every(4, 0, 1), [[5.0, *[0.0] * 5, 1.0]])
+    lab.transform("/tf", "world", "cart", coarse, line(coarse))
+    lab.transform("/tf", "cart", "tip", fine, line(fine))
+    tip = pose_frame("world")
+    stamp, rows = taken(tip, lab.in_order(), portion)
+    moving = stamp >= coarse[0]
+    assert stamp[moving].tolist() == fine[fine >= coarse[0]].tolist()
+    np.testing.assert_allclose(rows[moving, 0], 2e-9 * (stamp[moving] - START), atol=1e-9)
+    assert not tip.tf.histories["cart"].edge.static
+
+
+def test_single_stamps_wait_for_the_slowest_of_the_moving_transforms() -> None:
+    buffer, stamps = TransformBuffer("world"), START + np.array([400, 480, 520], np.int64) * MILLISECOND
+    put(buffer, cart(every(10, 0, 451), every(10, 0, 501)).in_order())
+    known, rows = buffer.at("tip", "world", stamps, "wrench")
+    assert known.tolist() == [True, False, False]
+    np.testing.assert_allclose(rows[:, 0], [0.8])
+    put(buffer, cart(every(10, 460, 601), every(10, 510, 516)).in_order())
+    known, rows = buffer.at("tip", "world", stamps[1:], "wrench")
+    assert known.tolist() == [True, False]
+    np.testing.assert_allclose(rows[:, 0], [0.96])
+    known, rows = buffer.at("tip", "world", stamps[2:], "wrench", last=True)
+    assert known.all() and np.isnan(rows).all(), "the tip ended before"

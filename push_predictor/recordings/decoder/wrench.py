@@ -28,7 +28,7 @@ from push_predictor.recordings.fields.sources import WRENCH_TARGET, Source
 from push_predictor.recordings.fields.transforms import TransformError
 from push_predictor.recordings.fields.wrench_bias import LEAST_FREE, WrenchBias
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import WrenchStream
+from push_predictor.recordings.streams import WrenchStream, joined
 from push_predictor.recordings.topics import FREE_MOTION, WORLD_AXES, Topics
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -141,6 +141,10 @@ class PosedWrench:
         stamp (w,), values (w, 6): new wrenches along the sensor's axes. tip_stamp (t,), tip (t, 7): new poses of the
         tip.
         """
+        if len(jumps := np.flatnonzero(np.diff(tip_stamp) < -CLOCK_SET)):  # the wrenches before that are due first
+            begin = int(jumps[0]) + 1
+            before = self.put(stamp, values, tip_stamp[:begin], tip[:begin])
+            return joined([before, self.put(stamp[:0], values[:0], tip_stamp[begin:], tip[begin:], last)])
         self._note_tip(tip_stamp, tip)
         self._stamp, self._values = np.concatenate([self._stamp, stamp]), np.concatenate([self._values, values])
         latest = np.maximum.accumulate(np.concatenate([[self._latest], stamp]))
