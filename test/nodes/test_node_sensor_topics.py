@@ -308,8 +308,7 @@ def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(mo
     slider: list[bytes] = []
     wrench: list[bytes] = []
     decoder = SimpleNamespace(poses={"slider": slider}, wrench=SimpleNamespace(messages=wrench))
-    scalars = SimpleNamespace(waiting=lambda: True)
-    sensors: Any = SimpleNamespace(decoder=decoder, _empty=0.0, _settled=True, _scalars=scalars)
+    sensors: Any = SimpleNamespace(decoder=decoder, _empty=0.0, _settled=True, _scalars=[])
     complete = SensorSubscriber.complete
     assert not complete(sensors), "no message yet"
     slider.append(b"pose")

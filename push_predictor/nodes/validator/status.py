@@ -20,6 +20,7 @@ from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
+from push_predictor.online.news import News
 from push_predictor.online.session import SILENCE, Session, State
 from push_predictor.recordings.windows.stream_faults import describe_faults
 
@@ -43,16 +44,14 @@ class StatusPublisher:
         self._node, self._session, self._writer = node, session, writer
         self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._logged: list[str] = []
+        self._news, self._topic_news = News(), News()
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
         self._log_topics()
         problems = self._problems(run)
-        if problems != self._logged:
-            self._logged = problems
-            for problem in problems:
-                self._node.get_logger().warning(problem)
+        for problem in self._news.of(dict.fromkeys(problems, "")):
+            self._node.get_logger().warning(problem)
         status = self._status(run, problems)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
@@ -61,9 +60,11 @@ class StatusPublisher:
         return _paragraph(["Nothing was validated", *self._problems(None), *self._sensors.problems()])
 
     def _log_topics(self) -> None:
-        """Log a line for each sensor topic of which something has changed."""
+        """Log a line for each topic of which something has changed."""
         log = self._node.get_logger()
-        for report in self._sensors.inspect():
+        reports = self._sensors.inspect()
+        for stream in self._topic_news.of({stream: report.key for stream, report in reports.items()}):
+            report = reports[stream]
             if report.refused:  # one line each: rclpy binds the severity to the place of the call
                 log.error(report.line)
             elif report.problem:
