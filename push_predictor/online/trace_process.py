@@ -82,7 +82,7 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
     A validator's table comes first, then the folder itself as a recording, then all push tables and recordings in it.
     """
-    from push_predictor.online.window_table import TABLE
+    from push_predictor.online.run_files import TABLE
     from push_predictor.recordings.table_file import ENDINGS
 
     if (folder / TABLE).is_file():
@@ -144,7 +144,7 @@ def _report(path: Path, trace: Trace) -> Sequence[str]:
 
 def _settled(path: Path, folder: Path) -> Path:
     """A copy of a table that a validator may be appending to, without an incomplete last line; else the path itself."""
-    from push_predictor.online.window_table import TABLE
+    from push_predictor.online.run_files import TABLE
     from push_predictor.recordings.table_file import rig_path
 
     if path.name != TABLE:

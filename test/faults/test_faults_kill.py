@@ -37,7 +37,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.server_client import PredictionClient
-from push_predictor.online.window_table import put_aside
+from push_predictor.online.run_files import put_aside
 from push_predictor.recordings import atomic
 from push_predictor.recordings.atomic import append_lines
 from push_predictor.recordings.load import load_data, load_rig_for

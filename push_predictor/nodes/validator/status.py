@@ -73,7 +73,7 @@ class StatusPublisher:
                 log.info(report.line)
 
     def _problems(self, run: ValidationRun | None) -> list[str]:
-        unsaved = run.journal.failure if run and run.journal else ""
+        unsaved = run.files.failure if run and run.files else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
         found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
@@ -92,7 +92,7 @@ class StatusPublisher:
         values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
         if run is not None:
             values |= _stream_figures(run, sensors) | _scores(run) | _checks(run)
-            values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
+            values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.files.path)} if run.files else {})
         message, name = _paragraph([failure, *warnings]) or state, self._node.get_fully_qualified_name()
         return diagnostic_status(name, "validation", level, message, values, rig.shape if rig else "")
 
@@ -126,8 +126,6 @@ def _run_problems(run: ValidationRun) -> list[str]:
     found += [*run.sync.problems(), *describe_faults(run.finder.counts)]
     if run.refused:
         found.append(f"predict_push refused {run.refused} requests. The last, of model {run.last_refusal}")
-    if run.table is not None and run.table.failure:
-        found.append(run.table.failure)
     if run.alarm is not None:
         found += _alarm_problems(run.alarm)
     return found
