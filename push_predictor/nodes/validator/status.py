@@ -76,13 +76,14 @@ class StatusPublisher:
         unsaved = run.files.failure if run and run.files else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
+        found += self._client.problems
         found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
         return [*filter(None, dict.fromkeys(found))]
 
     def _status(self, run: ValidationRun | None, problems: Sequence[str]) -> DiagnosticStatus:
         """ERROR for a failure, a refused topic or refused samples, WARN for a problem."""
         sensors, client, rig, failure = self._sensors, self._client, self._rigs.rig, self._session.failure
-        warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
+        warnings = [*problems, *sensors.problems(), *(_run_problems(run) if run else [])]
         if not client.server_available:
             warnings.append(NO_SERVER)
         wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
