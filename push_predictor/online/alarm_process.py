@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.child_process import Child
+from push_predictor.online.child_process import Child, Failure
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.types import Array
 
@@ -33,7 +32,6 @@ class _Reply:
     run: int
     state: AlarmState | None = None
     fired: int | None = None
-    off: str = ""
     skipped: tuple[str, ...] = ()
 
 
@@ -86,16 +84,16 @@ class AlarmProcess:
 
     def work(self) -> None:
         """Send the pushes that wait, take the replies."""
-        try:
-            while (reply := self._child.received()) is not None:
-                self._asked = False
+        while (reply := self._child.received()) is not None:
+            self._asked = False
+            if isinstance(reply, Failure):
+                self.stop()
+                self.off = reply.reason
+            else:
                 self._take(reply)
-            if self._waiting and not self._asked:
-                self._child.send((self._run, self._waiting))
-                self._waiting, self._asked = [], True
-        except (EOFError, OSError):
-            self.stop()
-            self.off = "the process of the alarm ended"
+        if self._waiting and not self._asked:
+            self._child.send((self._run, self._waiting))
+            self._waiting, self._asked = [], True
 
     def stop(self) -> None:
         """End the process."""
@@ -103,9 +101,7 @@ class AlarmProcess:
         self._asked, self._waiting = False, []
 
     def _take(self, reply: _Reply) -> None:
-        self.off = reply.off
-        if self.off:
-            self.stop()
+        self.off = ""
         if reply.run != self._run:
             return
         self.skipped += reply.skipped
@@ -116,21 +112,14 @@ class AlarmProcess:
 
 def _work(connection: Connection, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
-    try:
-        calibration = calibrate(model)
-    except RequestError as error:
-        connection.send(_Reply(0, off=str(error)))
-        return
-    connection.send(_Reply(0))
-    monitor, current = AlarmMonitor(calibration, rate), 0
-    try:
-        while True:
-            run, pushes = connection.recv()
-            if run != current:
-                monitor, current = AlarmMonitor(calibration, rate), run
-            connection.send(_reply(monitor, run, pushes))
-    except (EOFError, OSError):
-        return  # the node has ended
+    calibration, current = calibrate(model), 0
+    monitor = AlarmMonitor(calibration, rate)
+    connection.send(_Reply(current))
+    while True:
+        run, pushes = connection.recv()
+        if run != current:
+            monitor, current = AlarmMonitor(calibration, rate), run
+        connection.send(_reply(monitor, run, pushes))
 
 
 def _reply(monitor: AlarmMonitor, run: int, pushes: list[CompletedPush]) -> _Reply:
